@@ -96,6 +96,12 @@ class Stations:
             scenario, self._settings, detector, load_weights=load_weights, allow_torchscript=allow_torchscript
         )
         """Built beforehand, as what they cannot work with shall be told before the run."""
+        self.library_versions: Mapping[str, str] = {
+            name: version
+            for detector in self._detectors.values()
+            for name, version in sorted(detector.library_versions.items())
+        }
+        """Versions of the libraries that compute the detections of any station, by name."""
         self._encoders = declared_encoders(scenario, self._settings)
         if channel is not None:
             self._set_channel(channel, origin="--channel", line=None, scope=scenario.scope)

@@ -1,1 +1,1 @@
-"""From readings to detections. The only room that imports torch."""
+"""Perception: from sensor readings to detections. The only package that imports torch and ONNX Runtime."""

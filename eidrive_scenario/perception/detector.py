@@ -1,4 +1,4 @@
-"""The seam of perception: a Detector turns readings into boxes."""
+"""Abstract base class of detectors, which turn sensor readings into boxes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from eidrive_scenario.world.actor import ActorSpec
 
 @dataclass(frozen=True)
 class DetectorContext:
-    """Where a detector works: the body that carries it, its sensors by name, the map, and the run's seed."""
+    """Context of a detector: the body that carries it, its sensors by name, the map, and the seed of the run."""
 
     spec: ActorSpec
     sensors: Mapping[str, SensorSettings] = field(default_factory=dict)
@@ -31,46 +31,51 @@ class DetectorContext:
 
 
 class Detector(ABC):
-    """Turns the readings of one station into boxes in the world frame. Built anew for each station and run.
+    """Detector of the objects in the readings of one station, as boxes in the world frame.
 
-    A class is registered in the entry points `eidrive_scenario.detectors`. It is built as `cls()`, or as
-    `cls(settings)` where it has a `settings_type`: an instance of that, read from the controller's property
-    `detector_settings`. It may raise SettingError while it is built. Then `load_weights` is called before a run, but
-    not by `eidrive check`; then `setup` is called once, and `detect` in each tick in which all kinds of sensors in
-    `needs` were read.
+    A new instance is created for each station and run. A class is registered in the entry points
+    `eidrive_scenario.detectors`. It is constructed as `cls()`, or as `cls(settings)` if it has a `settings_type`;
+    `settings` is an instance of that type, read from the property `detector_settings` of the controller. The
+    constructor may raise SettingError.
+
+    Order of calls: `load_weights` before a run, but not by `eidrive check`; then `setup` once; then `detect` in each
+    tick with readings of all kinds of sensors in `needs`.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset()
-    """The kinds of sensors it reads: truth, camera, lidar."""
+    """Kinds of required sensors: truth, camera, lidar."""
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {}
-    """What a station gets, by name, that says nothing of its sensors; where empty, one of each kind in `needs`."""
+    """Sensors by name of a station that configures none; if empty, one of each kind in `needs`."""
     provides_velocity: ClassVar[bool] = False
-    """Whether its boxes have velocities; those of others get them from a tracker, unless the station says otherwise."""
+    """Whether the boxes have velocities; otherwise a tracker estimates them, unless the station disables it."""
     detectable_signals: frozenset[str] = frozenset()
-    """The kinds of signals that it reads, out of `light` and `stop sign`; the others a station knows by the map and the
-    line of sight."""
+    """Kinds of signals that the detector reads, out of `light` and `stop sign`. The station takes the others from the
+    map and the line of sight."""
     settings_type: ClassVar[type[Settings] | None] = None
-    """What the property `detector_settings` may say; nothing where None."""
+    """Type of the property `detector_settings`; None if the detector has no settings."""
+    library_versions: Mapping[str, str] = MappingProxyType({})
+    """Versions of the libraries that compute the detections, by name; part of the resolved settings."""
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
-    """What it found in the last picture of each camera, if it looks at pictures: they are kept with the boxes."""
+    """Detections in the last image of each camera, for detectors that process images; recorded with the boxes."""
 
-    def load_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - a hook that most do not need
-        """Load what the detector computes with, such as the weights of a network. May raise SettingError.
+    def load_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - an optional hook
+        """Load the data that the detector computes with, such as the weights of a network.
 
-        `allow_torchscript`: whether the user lets files of weights execute code.
+        Raise SettingError if that is not possible. `allow_torchscript`: whether the user permits weights to execute
+        code.
         """
 
-    def setup(self, installation: DetectorContext) -> None:  # noqa: B027 - a hook that most do not need
-        """Learn where it works, before the first reading."""
+    def setup(self, context: DetectorContext) -> None:  # noqa: B027 - an optional hook
+        """Store the context before the first reading."""
 
     @abstractmethod
     def detect(self, readings: Readings) -> Detections:
-        """The objects in these readings."""
+        """Return the objects in these readings."""
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
-        """(N,) share in [0, 1] of each of these boxes (N, 7) that these readings can show, where `found` may hide it.
+        """Return the share (N,) in [0, 1] of each box (N, 7) that these readings can show; `found` may occlude it.
 
-        A tracker does not expect to detect objects that are out of view. All are in view by default.
+        A tracker does not count objects out of view as missed. By default, all objects are in view.
         """
         return np.ones(len(boxes))
 

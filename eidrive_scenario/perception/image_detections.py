@@ -9,7 +9,7 @@ from eidrive_scenario.arrays import Array
 
 @dataclass(frozen=True)
 class ImageDetections:
-    """What a network found in a picture: boxes (N, 4) x1 y1 x2 y2 [px of the picture], best first, scores (N,)."""
+    """Detections of a network in an image: boxes (N, 4) x1 y1 x2 y2 [px], best first, and scores (N,)."""
 
     boxes: Array
     scores: Array

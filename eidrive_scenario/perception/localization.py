@@ -1,4 +1,4 @@
-"""Where a station takes itself to be: an extended Kalman filter on GNSS and IMU."""
+"""Localization of a station: an extended Kalman filter on GNSS and IMU."""
 
 from __future__ import annotations
 
@@ -20,15 +20,17 @@ PLANE = np.ix_((X, Y, YAW), (X, Y, YAW))
 
 @dataclass(frozen=True)
 class MotionNoise:
-    """What the filter does not know of its motion. The slip is that of a car whose tires give way by 0.075 m/s for each
-    m/s² across, in curves of some two seconds.
+    """Process noise of the filter.
 
-    acceleration, turn_rate            white noise of the inertial unit [m/s²/√Hz], [rad/s/√Hz]
-    acceleration_bias, turn_bias       biases that it may have, standard deviations [m/s²], [rad/s]
-    acceleration_walk, turn_walk       how fast these change [m/s²/√s], [rad/s/√s]
-    slip                               of tires in curves: velocity across the heading, which the model does not have,
-                                       white, per lateral acceleration [m/√s per m/s²]
-    drift                              the same when driving straight [m/√s]
+    The default slip is that of a car whose tires yield by 0.075 m/s per m/s² of lateral acceleration, in curves of
+    about two seconds.
+
+    acceleration, turn_rate            white noise of the IMU [m/s²/√Hz], [rad/s/√Hz]
+    acceleration_bias, turn_bias       initial biases of the IMU, standard deviations [m/s²], [rad/s]
+    acceleration_walk, turn_walk       random walk of the biases [m/s²/√s], [rad/s/√s]
+    slip                               lateral velocity of the tires in curves, which the model does not have: white noise
+                                       per lateral acceleration [m/√s per m/s²]
+    drift                              the same on a straight course [m/√s]
     """
 
     acceleration: float = 0.02
@@ -42,7 +44,7 @@ class MotionNoise:
 
 
 def motion_noise(imu: ImuSettings) -> MotionNoise:
-    """The noise that the data sheet of an inertial unit states."""
+    """Return the noise that the data sheet of an IMU states."""
     return MotionNoise(
         acceleration=imu.accelerometer_noise,
         turn_rate=imu.gyroscope_noise,
@@ -55,7 +57,7 @@ def motion_noise(imu: ImuSettings) -> MotionNoise:
 
 @dataclass(frozen=True)
 class StartNoise:
-    """How well a station knows its place when the run starts: standard deviations [m], [rad], [m/s]."""
+    """Uncertainty of the initial pose and speed: standard deviations [m], [rad], [m/s]."""
 
     position: float = 0.5
     yaw: float = math.radians(1.0)
@@ -63,37 +65,47 @@ class StartNoise:
 
 
 class Estimate(NamedTuple):
-    """x, y [m], yaw [rad], speed [m/s], biases of turn rate [rad/s] and acceleration [m/s²]; covariance (6, 6)."""
+    """State x, y [m], yaw [rad], speed [m/s], biases of turn rate [rad/s] and acceleration [m/s²]; covariance (6, 6)."""
 
     state: Array
     covariance: Array
 
 
 class InertialFilter:
-    """The extended Kalman filter of Thrun, Burgard and Fox (Probabilistic robotics, 2005, section 3.3) over a vehicle
-    that moves along its heading, driven by the inertial unit, whose biases are states as in Groves (Principles of GNSS,
-    inertial, and multisensor integrated navigation systems, 2013, section 14.2)."""
+    """Extended Kalman filter over a vehicle that moves along its heading, driven by the IMU.
+
+    The filter is that of Thrun, Burgard and Fox (Probabilistic robotics, 2005, section 3.3). The biases of the IMU are
+    states as in Groves (Principles of GNSS, inertial, and multisensor integrated navigation systems, 2013, section
+    14.2).
+    """
 
     def __init__(self, start: Estimate, noise: MotionNoise) -> None:
         self.estimate = start
         self._noise = noise
 
     def predict(self, imu: ImuReading, step: float) -> None:
-        """The vehicle has moved for `step` seconds as the inertial unit says."""
+        """Predict the state by `step` [s] with the accelerations and turn rates of the IMU."""
         x, y, yaw, speed, turn_bias, acceleration_bias = self.estimate.state.tolist()
         turn = float(imu.angular_rate[2]) - turn_bias
         gain = float(imu.acceleration[0]) - acceleration_bias
-        # The reading covers the step: the way is that of the mean speed in the mean direction.
+        # The reading covers the step: the displacement has the mean speed and the mean direction.
         middle, mean = yaw + 0.5 * turn * step, speed + 0.5 * gain * step
         cos, sin = math.cos(middle), math.sin(middle)
-        way = mean * step
+        distance = mean * step
         state = np.array(
-            [x + way * cos, y + way * sin, yaw + turn * step, speed + gain * step, turn_bias, acceleration_bias]
+            [
+                x + distance * cos,
+                y + distance * sin,
+                yaw + turn * step,
+                speed + gain * step,
+                turn_bias,
+                acceleration_bias,
+            ]
         )
         forward = np.eye(6)
-        forward[X, YAW], forward[Y, YAW] = -way * sin, way * cos
+        forward[X, YAW], forward[Y, YAW] = -distance * sin, distance * cos
         forward[X, SPEED], forward[Y, SPEED] = step * cos, step * sin
-        forward[X, TURN_BIAS], forward[Y, TURN_BIAS] = 0.5 * step * way * sin, -0.5 * step * way * cos
+        forward[X, TURN_BIAS], forward[Y, TURN_BIAS] = 0.5 * step * distance * sin, -0.5 * step * distance * cos
         forward[X, ACCELERATION_BIAS], forward[Y, ACCELERATION_BIAS] = -0.5 * step**2 * cos, -0.5 * step**2 * sin
         forward[YAW, TURN_BIAS] = forward[SPEED, ACCELERATION_BIAS] = -step
         noise = self._noise
@@ -109,7 +121,7 @@ class InertialFilter:
         self.estimate = Estimate(state, forward @ self.estimate.covariance @ forward.T + drive @ drive.T)
 
     def correct(self, gnss: GnssReading) -> None:
-        """The receiver measured the place."""
+        """Update the state with a position measured by the GNSS receiver."""
         state, covariance = self.estimate
         noise = gnss.covariance[:2, :2]
         gain = np.linalg.solve(covariance[:2, :2] + noise, covariance[:2]).T
@@ -121,11 +133,11 @@ class InertialFilter:
 
 
 class Localizer:
-    """Turns the readings of a station into what it can know, and keeps its estimate up.
+    """Estimate the pose of a station and replace the true pose in its readings.
 
-    The filter starts at the first reading with the true place and motion, off by a draw of `start` for this seed and
-    station. Height, pitch and roll stay true. What sensors measured in their own frames is kept; where that is in the
-    world follows from the estimate.
+    The filter starts at the first reading with the true pose and speed plus an error drawn from `start` for this seed
+    and station. Height, pitch and roll stay true. Measurements in sensor frames are unchanged; the sensor poses follow
+    from the estimate.
     """
 
     def __init__(
@@ -141,13 +153,13 @@ class Localizer:
 
     @property
     def estimate(self) -> Estimate:
-        """The newest estimate. Raises ValueError before the first reading."""
+        """Newest estimate. Raise ValueError before the first reading."""
         if self._filter is None:
             raise ValueError("there is no estimate before the first reading")
         return self._filter.estimate
 
     def with_estimated_pose(self, readings: Readings) -> Readings:
-        """The readings with the estimated motion, and the poses of the sensors that follow from it."""
+        """Return the readings with the estimated motion, and with the sensor poses that follow from it."""
         truth = readings.ego
         if self._filter is None:
             self._filter = InertialFilter(self._first(truth), self._noise)
@@ -182,23 +194,23 @@ class Localizer:
 
 
 def _moved(readings: Readings, ego: EgoState) -> Readings:
-    """The readings as if the station were where it takes itself to be."""
+    """Return the readings as if the station were at its estimated pose."""
     truth = readings.ego
     turn = ego.yaw - truth.yaw
     cos, sin = math.cos(turn), math.sin(turn)
     rigid = np.eye(4)
     rigid[:2, :2] = [[cos, -sin], [sin, cos]]
     rigid[:2, 3] = ego.position[:2] - rigid[:2, :2] @ truth.position[:2]
-    seen = readings.truth
-    if seen is not None:
-        boxes = seen.boxes.copy()
+    truth_reading = readings.truth
+    if truth_reading is not None:
+        boxes = truth_reading.boxes.copy()
         boxes[:, :2] = boxes[:, :2] @ rigid[:2, :2].T + rigid[:2, 3]
         boxes[:, 6] = wrap_angle(boxes[:, 6] + turn)
-        seen = replace(seen, boxes=boxes, velocity=seen.velocity @ rigid[:2, :2].T)
+        truth_reading = replace(truth_reading, boxes=boxes, velocity=truth_reading.velocity @ rigid[:2, :2].T)
     return replace(
         readings,
         ego=ego,
-        truth=seen,
+        truth=truth_reading,
         cameras={name: _camera(reading, rigid) for name, reading in readings.cameras.items()},
         lidars={name: _lidar(reading, rigid) for name, reading in readings.lidars.items()},
     )

@@ -1,4 +1,4 @@
-"""The oracle: a detector without error, of what is in sight."""
+"""Oracle: a detector without errors of all objects in the line of sight."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from eidrive_scenario.sensing.readings import Readings
 
 
 class OracleDetector(Detector):
-    """Exact boxes, classes and velocities of the objects that the truth sensor has in its line of sight, score 1."""
+    """Exact boxes, classes and velocities of the objects in the line of sight of the truth sensor, with score 1."""
 
     needs: ClassVar[frozenset[str]] = frozenset({"truth"})
     provides_velocity: ClassVar[bool] = True
@@ -36,7 +36,7 @@ class OracleDetector(Detector):
 
 @lru_cache(maxsize=64)
 def _certain(count: int) -> Array:
-    """(count,) scores of 1, to be shared."""
+    """Return shared read-only scores (count,) of 1."""
     scores = np.ones(count)
     scores.flags.writeable = False
     return scores
@@ -44,7 +44,7 @@ def _certain(count: int) -> Array:
 
 @lru_cache(maxsize=64)
 def _exact(count: int) -> Array:
-    """(count, 2, 2) covariances of 0, to be shared."""
+    """Return shared read-only covariances (count, 2, 2) of 0."""
     covariance = np.zeros((count, 2, 2))
     covariance.flags.writeable = False
     return covariance

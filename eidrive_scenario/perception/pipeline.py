@@ -1,4 +1,4 @@
-"""From the readings of a station to the objects that it knows of: detector, its latency, tracker."""
+"""Perception pipeline of a station: localization, detector, latency and tracker."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 
 class Perception:
-    """What one station makes of its sensors.
+    """Perception of one station.
 
-    latency    how long the detector computes: what it saw at t is known from t + latency on; readings that come
-               meanwhile are worked on beside each other, each as long [s]
-    tracker    None where the boxes are passed on as they are
-    localizer  None where the station knows where it is
+    latency    computing time of the detector [s]: detections of time t are available from t + latency on; readings that
+               arrive meanwhile are processed concurrently, each with the same latency
+    tracker    None if detections are passed on unchanged
+    localizer  None if the station has its true pose
     """
 
     def __init__(
@@ -42,28 +42,28 @@ class Perception:
 
     @property
     def pose_covariance(self) -> Array | None:
-        """(3, 3) of the own x, y and yaw as the station estimates them; None where it knows them exactly.
+        """Covariance (3, 3) of the estimated x, y and yaw of the station; None if its pose is exact.
 
-        The covariances of its objects do not contain it: it is common to all of them, and tracking does not lessen it.
+        The covariances of its objects do not contain it: it is common to all objects, and tracking does not reduce it.
         """
         return None if self._localizer is None else self._localizer.estimate.covariance[PLANE]
 
     def locate(self, readings: Readings) -> Readings:
-        """The readings as the station can know them, if it has to find out by itself where it is."""
+        """Return the readings with the estimated pose of the station if it has a localizer."""
         return readings if self._localizer is None else self._localizer.with_estimated_pose(readings)
 
     def signals(self, readings: Readings) -> Sequence[SignalReading]:
-        """The traffic lights and stop signs in sight: those that the detector reads, and the lookout's."""
+        """Return the signals in sight: those that the detector reads, and those of the signal sensor."""
         found = self.detector.signals()
         if not isinstance(found, Sequence):
             raise InvalidResult(self.detector, "signals", f"returned {describe(found)} (expected SignalReadings)")
         return (*found, *readings.signals)
 
     def perceive(self, readings: Readings) -> Detections | None:
-        """The newest objects that become known now; None if there is nothing new.
+        """Return the newest objects that become available now, or None if there is nothing new.
 
-        A tracker predicts them to the time of each tick, so that stations do not report where objects were when the
-        sensors were last read; less the latency, which is that of all that becomes known.
+        A tracker predicts the objects to the time of each tick minus the latency. So stations do not report the
+        positions of the last reading. The latency applies to all objects.
         """
         now = readings.time
         if _has_all(readings, self.detector.needs):
@@ -75,10 +75,10 @@ class Perception:
             self._computing.append((now + self._latency, found, readings))
         newest = None
         while self._computing and self._computing[0][0] <= now + TIME_TOLERANCE:
-            _, found, seen = self._computing.popleft()
-            newest = self._tracked(found, seen)
+            _, found, past = self._computing.popleft()
+            newest = self._tracked(found, past)
         if newest is None and self._tracker is not None:
-            newest = self._tracker.predicted(now - self._latency)
+            newest = self._tracker.predict(now - self._latency)
         return newest
 
     def _tracked(self, found: Detections, readings: Readings) -> Detections:
@@ -94,7 +94,7 @@ class Perception:
 
 
 def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:
-    """Whether a sensor of each of these kinds was due."""
+    """Return whether there are readings of all these kinds of sensors."""
     return (
         ("truth" not in kinds or readings.truth is not None)
         and ("camera" not in kinds or bool(readings.cameras))

@@ -1,4 +1,4 @@
-"""Checks of what detectors and fusion methods return: a list of objects of finite numbers and possible sizes."""
+"""Checks of the results of detectors and fusion methods: finite numbers and possible sizes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.registry import is_built_in
 
 _FINITE_BY_CONSTRUCTION = ("perception.oracle", "fusion.average")
-"""Modules whose classes copy or average finite numbers; a check of theirs in each tick would cost 1 % of a run."""
+"""Modules whose classes copy or average finite numbers; checking them in each tick would cost 1 % of a run."""
 
 LARGEST = 1e9
-"""Largest magnitude of a coordinate [m], as in road files; of speeds too [m/s]."""
+"""Maximum magnitude of a coordinate [m], as in road files, and of a speed [m/s]."""
 LARGEST_SIZE = 1e5
-"""Largest length, width or height of an object [m], as of objects in road files."""
+"""Maximum length, width or height of an object [m], as in road files."""
 _ROUNDING = 1e-5
 """Excess of a probability over 1 that single precision explains."""
 
@@ -77,7 +77,7 @@ def check_in_view(extension: object, shares: object, count: int) -> None:
 
 
 def raise_not_finite(extension: object, method: str, fields: dict[str, object]) -> None:
-    """Raise InvalidResult that names the first field that is no number or not finite; return if all are."""
+    """Raise InvalidResult that names the first field that is not numeric or not finite."""
     for name, value in fields.items():
         try:
             found = np.asarray(value)
@@ -86,37 +86,37 @@ def raise_not_finite(extension: object, method: str, fields: dict[str, object]) 
             array = None
         if array is None:
             raise InvalidResult(extension, method, f"returned {name} as {describe(value)} (expected numbers)")
-        wrong = array[~np.isfinite(array)] if array.ndim else array[None][~np.isfinite(array[None])]
-        if wrong.size:
+        invalid = array[~np.isfinite(array)] if array.ndim else array[None][~np.isfinite(array[None])]
+        if invalid.size:
             raise InvalidResult(
-                extension, method, f"returned {name} with the value {wrong[0]} (expected finite numbers)"
+                extension, method, f"returned {name} with the value {invalid[0]} (expected finite numbers)"
             )
 
 
 def raise_outside(
     extension: object, method: str, name: str, values: Array, low: float, high: float, tolerance: float = 0.0
 ) -> None:
-    """Raise InvalidResult that names the first of these values outside of [low, high]; NaN is inside."""
-    wrong = values[(values < low - tolerance) | (values > high + tolerance)]
-    if wrong.size:
-        text = f"returned {name} with the value {wrong[0]:g} (expected {low:g} to {high:g})"
+    """Raise InvalidResult that names the first value outside of [low, high]; NaN counts as inside."""
+    invalid = values[(values < low - tolerance) | (values > high + tolerance)]
+    if invalid.size:
+        text = f"returned {name} with the value {invalid[0]:g} (expected {low:g} to {high:g})"
         raise InvalidResult(extension, method, text)
 
 
 def are_within(values: Array, limit: float) -> bool:
-    """Return whether all values are real numbers in [-limit, limit]; not for NaN."""
+    """Return whether all values are real numbers in [-limit, limit]; False for NaN."""
     return bool(values.dtype.kind in _REAL and values.min() >= -limit and values.max() <= limit)
 
 
 def describe(value: object) -> str:
-    """Return what was returned in a few words: None, or the type of the object."""
+    """Return a short description of a result: None, or the type of the object."""
     if isinstance(value, np.ndarray):
         return f"an array of type {value.dtype}"
     return "None" if value is None else f"an object of type {type(value).__name__}"
 
 
 def _is_in_range(found: Detections) -> bool:
-    """Return whether all numbers of at least one object are surely in their ranges; each line is False for NaN."""
+    """Return whether all numbers of at least one object are certainly in range; each line is False for NaN."""
     boxes, covariance = found.boxes, found.covariance
     sizes = boxes[:, 3:6]
     return bool(
@@ -136,7 +136,7 @@ def _are_probabilities(values: Array) -> bool:
 
 
 def _check_rows(extension: object, method: str, found: Detections) -> None:
-    """Raise InvalidResult unless arrays are of real numbers, classes known, and tracks whole numbers."""
+    """Raise InvalidResult unless arrays are numeric, classes are known, and track numbers are integers."""
     for name in ("boxes", "scores", "velocity", "covariance", "existence"):
         array = getattr(found, name)
         if array.dtype.kind not in _REAL:
@@ -147,7 +147,7 @@ def _check_rows(extension: object, method: str, found: Detections) -> None:
             raise InvalidResult(extension, method, f"returned the class {kind!r} (expected one of {known})")
     for track in found.tracks:
         if not isinstance(track, int | np.integer):
-            raise InvalidResult(extension, method, f"returned the track {track!r} (expected a whole number)")
+            raise InvalidResult(extension, method, f"returned the track {track!r} (expected an integer)")
 
 
 def _without_nan(value: object) -> object:

@@ -1,4 +1,4 @@
-"""Traffic lights and stop signs on the way: where to stop for them, and whether they tell to."""
+"""Traffic lights and stop signs on the path: stop lines, and whether they require a stop."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from eidrive_scenario.sensing.signals import is_stop_sign
 Kind = Literal["light", "stop sign"]
 
 ON_PATH = 1.75
-"""A stop line belongs to a path that passes the middle of its lane at most this far aside [m]."""
+"""Maximum distance between a path and the lane center at the stop line of the lane [m]."""
 SAME_WAY = math.cos(math.radians(45.0))
 
 
 class StopLine(NamedTuple):
-    """Where a signal stops the traffic of one lane.
+    """Position at which a signal stops the traffic of one lane.
 
-    x, y      on the middle of the lane [m];  heading  of its traffic [rad]
-    beyond    a point that only the ways to which the signal applies pass, where the line alone does not tell
+    x, y      on the center of the lane [m];  heading  of its traffic [rad]
+    beyond    a point that only the routes with this signal pass; None if the line alone determines them
     """
 
     signal: str
@@ -39,9 +39,9 @@ class StopLine(NamedTuple):
 
 
 class SignalAhead(NamedTuple):
-    """A signal on the way: the way to its stop line [m], what it shows, and whether that tells to stop.
+    """Signal on the path: the distance to its stop line [m], its state, and whether it requires a stop.
 
-    `state` is None where nobody has seen it yet. A stop sign always tells to stop.
+    `state` is None until the signal has been in sight. A stop sign that has been in sight requires a stop.
     """
 
     signal: str
@@ -52,9 +52,9 @@ class SignalAhead(NamedTuple):
 
 
 def stop_lines(roads: RoadNetwork) -> tuple[StopLine, ...]:
-    """Every place where a traffic light or stop sign of the map stops a lane.
+    """Return all positions where a traffic light or stop sign of the map stops a lane.
 
-    Vehicles wait at the signal's s. For one on a connecting road they wait before the junction.
+    Vehicles wait at the s coordinate of the signal; for a signal on a connecting road they wait before the junction.
     """
     return tuple(
         line
@@ -66,25 +66,25 @@ def stop_lines(roads: RoadNetwork) -> tuple[StopLine, ...]:
 
 
 class SignalsAhead:
-    """The signals along the path of one vehicle. What they show is known from when they were seen last."""
+    """Signals along the path of one vehicle, with the state in which they were last in sight."""
 
     def __init__(self, roads: RoadNetwork | None) -> None:
         self._lines = stop_lines(roads) if roads is not None else ()
         self._colors = {signal.id: lamp_colors(signal) for signal in (roads.signals.values() if roads else ())}
         self._states: dict[str, str] = {}
-        self._on_way: list[tuple[float, StopLine]] = []
+        self._on_path: list[tuple[float, StopLine]] = []
 
     def follow(self, path: Array) -> None:
-        """A path (M, 2) is followed from now on; distances count along it."""
-        self._on_way = sorted(_along(self._lines, path)) if self._lines else []
+        """Set the path (M, 2) along which distances count."""
+        self._on_path = sorted(_along(self._lines, path)) if self._lines else []
 
     def see(self, readings: Iterable[SignalReading]) -> None:
-        """Signals in sight now."""
+        """Update the states of signals in sight."""
         self._states.update((reading.id, reading.state) for reading in readings)
 
     def ahead(self, progress: float) -> Iterator[SignalAhead]:
-        """The signals whose stop lines lie beyond `progress` [m] along the path, the nearest first."""
-        for place, line in self._on_way:
+        """Yield the signals whose stop lines are beyond `progress` [m] along the path, the nearest first."""
+        for place, line in self._on_path:
             if place > progress:
                 state = self._states.get(line.signal)
                 stop = state is not None
@@ -94,7 +94,7 @@ class SignalsAhead:
 
 
 def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[StopLine]:
-    """The stop lines of a signal, or of a reference to it, on the lanes for which it is valid."""
+    """Yield the stop lines of a signal, or of a reference to it, on the lanes for which it is valid."""
     road = roads.roads.get(place.road)
     if road is None:
         return
@@ -116,7 +116,7 @@ def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[S
 
 
 def _along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float, StopLine]]:
-    """The lines that a path (M, 2) crosses, and where along it [m]."""
+    """Yield the lines that a path (M, 2) crosses, with the distance along it [m]."""
     step = np.diff(path, axis=0)
     length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
     start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
@@ -133,7 +133,7 @@ def _along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float, Stop
 
 
 def _passes(path: Array, step: Array, length: Array, x: float, y: float) -> Iterator[tuple[int, float]]:
-    """Where a path comes by a point, each time: the segment nearest to it, and the place on that [share]."""
+    """Yield segment and position on it [share] for each passage of a path by a point."""
     dx, dy = x - path[:-1, 0], y - path[:-1, 1]
     share = np.clip((dx * step[:, 0] + dy * step[:, 1]) / length**2, 0.0, 1.0)
     gap = np.hypot(dx - share * step[:, 0], dy - share * step[:, 1])

@@ -58,7 +58,7 @@ def resolve_settings(
         dt=float(settings.dt),
         time_limit=float(settings.time_limit),
         files=tuple(dict.fromkeys(files)),
-        versions=dict(package_versions()),
+        versions={**package_versions(), **stations.library_versions},
         extensions=_extensions(stations, settings),
     )
 

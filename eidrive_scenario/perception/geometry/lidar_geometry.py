@@ -1,4 +1,4 @@
-"""A LiDAR's points in a level frame, and the pattern of its rays."""
+"""Lidar points in a level frame, and the angular pattern of lidar rays."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import LidarSettings
 
 LEAST_STEP = math.radians(0.02)
-"""Rays nearer to each other than this count as one column or ring [rad]."""
+"""Rays closer to each other than this count as one column or ring [rad]."""
 USUAL_STEP = math.radians(1.0)
-"""Where the points are too few to tell [rad]."""
+"""Angle between rays if there are too few points to estimate it [rad]."""
 
 
 @dataclass(frozen=True)
 class LevelFrame:
-    """A frame under a sensor: x along the sensor's heading in the plane, y to the left, z as in the world.
+    """Level frame below a sensor: x along the heading of the sensor in the plane, y to the left, z as in the world.
 
-    Its origin in the plane is the sensor's place; `height` is the sensor's height in the world [m].
+    Its origin in the plane is the position of the sensor; `height` is the height of the sensor in the world [m].
     """
 
     x: float
@@ -32,12 +32,12 @@ class LevelFrame:
 
     @classmethod
     def of(cls, pose: Array) -> LevelFrame:
-        """The level frame of a sensor pose (4, 4) whose x axis looks ahead."""
+        """Return the level frame of a sensor pose (4, 4) whose x axis points forward."""
         x, y, z = pose[:3, 3].tolist()
         return cls(x, y, z, math.atan2(pose[1, 0], pose[0, 0]))
 
     def points(self, reading: LidarReading) -> Array:
-        """(N, 3) the points of a sweep of this sensor in this frame."""
+        """Return the points (N, 3) of a reading of this sensor in this frame."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         level = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ reading.pose[:3, :3]
         points: Array = reading.points @ level.T
@@ -45,7 +45,7 @@ class LevelFrame:
         return points
 
     def to_world(self, plan: Array) -> Array:
-        """(..., 2) points of this frame in the world."""
+        """Return points (..., 2) of this frame in the world."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.stack(
             [self.x + cos * plan[..., 0] - sin * plan[..., 1], self.y + sin * plan[..., 0] + cos * plan[..., 1]],
@@ -53,35 +53,35 @@ class LevelFrame:
         )
 
     def to_local(self, plan: Array) -> Array:
-        """(..., 2) points of the world in this frame."""
+        """Return points (..., 2) of the world in this frame."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         x, y = plan[..., 0] - self.x, plan[..., 1] - self.y
         return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
 
     def boxes_to_world(self, boxes: Array) -> Array:
-        """(N, 7) boxes of this frame in the world."""
+        """Return boxes (N, 7) of this frame in the world."""
         moved = boxes.copy()
         moved[:, :2] = self.to_world(boxes[:, :2])
         moved[:, 6] = np.pi - (np.pi - boxes[:, 6] - self.yaw) % (2.0 * np.pi)
         return moved
 
     def covariance_to_local(self, covariance: Array) -> Array:
-        """(N, 2, 2) covariances in the plane, turned to this frame's axes."""
+        """Return covariances (N, 2, 2) in the plane, rotated to the axes of this frame."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         turn = np.array([[cos, sin], [-sin, cos]])
         return np.asarray(turn @ covariance @ turn.T)
 
     def covariance_to_world(self, covariance: Array) -> Array:
-        """(N, 2, 2) covariances in the plane, turned to the world's axes."""
+        """Return covariances (N, 2, 2) in the plane, rotated to the axes of the world."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         turn = np.array([[cos, -sin], [sin, cos]])
         return np.asarray(turn @ covariance @ turn.T)
 
 
 class Pattern(NamedTuple):
-    """Angles between neighboring rays, across and up, and that of the highest ring above the horizon [rad].
+    """Horizontal and vertical angles between neighboring rays, and the elevation of the highest ring [rad].
 
-    half_field  half the horizontal field of view, about the sensor's heading [rad]; pi if it looks all around
+    half_field  half the horizontal field of view, about the heading of the sensor [rad]; pi for a full circle
     """
 
     azimuth: float
@@ -91,7 +91,7 @@ class Pattern(NamedTuple):
 
 
 def pattern_from_settings(settings: LidarSettings) -> Pattern:
-    """The pattern of a sensor whose settings are known."""
+    """Return the pattern of a lidar with these settings."""
     columns = max(1, round(settings.points_per_second / settings.channels / settings.rotation))
     rings = settings.elevations or (settings.upper_fov, settings.lower_fov)
     spread = math.radians(max(rings) - min(rings)) / max(settings.channels - 1, 1)
@@ -104,7 +104,7 @@ def pattern_from_settings(settings: LidarSettings) -> Pattern:
 
 
 def pattern_from_points(points: Array) -> Pattern:
-    """The pattern that a sweep (N, 3) in the sensor frame shows: medians of the gaps between its columns and rings."""
+    """Return the pattern of points (N, 3) in the sensor frame: medians of the gaps between columns and rings."""
     if len(points) < 2:
         return Pattern(USUAL_STEP, USUAL_STEP, math.pi / 2.0)
     elevation = np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))

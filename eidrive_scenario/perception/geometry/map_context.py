@@ -1,4 +1,4 @@
-"""What a map tells a detector: where roads are, how they lead, how high they lie."""
+"""Map context of a detector: positions, directions and heights of roads."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.physics.ground import is_level
 
 CELL = 0.5
-"""The mask of what is near a road has cells of this size [m], larger ones where a map is so large that it would have
-more than MOST_CELLS."""
+"""Cell size of the mask of areas near roads [m]; larger for maps that would have more than MOST_CELLS."""
 MOST_CELLS = 16_000_000
 BEYOND = 20.0
-"""How far the mask goes on beside the lanes' center lines [m]."""
+"""Margin of the mask around the center lines of the lanes [m]."""
 UNKNOWN, OFF, ON = -1, 0, 1
 
 
 class MapContext:
-    """The roads around a station, asked for many points at once; without a map it knows nothing.
+    """Roads around a station, queried for many points at once. Without a map, all answers are neutral.
 
-    margin   how far beside a road something may be to count as near it [m]
+    margin   maximum distance to a road at which a point counts as near it [m]
     """
 
     def __init__(self, roads: RoadNetwork | None, *, margin: float = 0.5) -> None:
@@ -42,11 +41,11 @@ class MapContext:
 
     @property
     def has_map(self) -> bool:
-        """Whether there are roads to ask."""
+        """Whether there is a map."""
         return self._roads is not None
 
     def near_road(self, plan: Array) -> Bools:
-        """(N,) whether points (N, 2) lie at most `margin` beside a road, to within a cell; True without a map."""
+        """Return whether points (N, 2) are within `margin` of a road, to within a cell; True without a map."""
         if self._mask is None or self._roads is None or not len(plan):
             return np.ones(len(plan), dtype=bool)
         column, row = (np.floor((plan - self._corner) / self._cell).astype(np.int64)).T
@@ -64,7 +63,7 @@ class MapContext:
         return near
 
     def lane_heading(self, plan: Array) -> Array:
-        """(N,) direction in which traffic drives at points (N, 2) [rad], NaN off the roads and in junctions."""
+        """Return the driving direction (N,) at points (N, 2) [rad]; NaN off the roads and in junctions."""
         headings = np.full(len(plan), np.nan)
         if self._roads is None or not len(plan):
             return headings
@@ -78,13 +77,13 @@ class MapContext:
         return headings
 
     def facing(self, boxes: Array) -> Array:
-        """(N,) headings of boxes (N, 7), turned about where their lane clearly leads the other way [rad]."""
+        """Return headings (N,) of boxes (N, 7) [rad], reversed if their lane clearly has the opposite direction."""
         lane = self.lane_heading(boxes[:, :2])
         against = np.cos(boxes[:, 6] - np.nan_to_num(lane)) < -math.cos(math.pi / 4)
         return np.where(np.isfinite(lane) & against, wrap_angle(boxes[:, 6] + math.pi), boxes[:, 6])
 
     def ground(self, plan: Array, otherwise: float) -> Array:
-        """(N,) height of the road below points (N, 2); `otherwise` off the roads and without a map [m]."""
+        """Return the height (N,) of the road below points (N, 2) [m]; `otherwise` off the roads and without a map."""
         height = np.full(len(plan), otherwise)
         if self._roads is None or self._level or not len(plan):
             return height

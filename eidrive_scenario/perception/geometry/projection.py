@@ -1,4 +1,4 @@
-"""Between the world and the pixels of a camera."""
+"""Projection between the world and the pixels of a camera."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
 from eidrive_scenario.sensing.readings import CameraReading
 
 NEAREST = 0.1
-"""What is nearer along the optical axis is not in the picture [m]."""
+"""Minimum depth along the optical axis of a point in the image [m]."""
 
 
 def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
-    """(N, 2) where points (N, 3) of the world are in the picture [px], and (N,) how far along the optical axis [m].
+    """Return image positions (N, 2) of world points (N, 3) [px], and depths (N,) along the optical axis [m].
 
-    NaN for points that are not before the camera. Brown's distortion, as OpenCV has it.
+    Positions of points that are not in front of the camera are NaN. The distortion is Brown's, as in OpenCV.
     """
     inverse = camera.pose[:3, :3].T
-    seen = (points - camera.pose[:3, 3]) @ inverse.T
+    in_camera = (points - camera.pose[:3, 3]) @ inverse.T
     found = np.full((len(points), 2), np.nan)
-    ahead = seen[:, 2] > NEAREST
+    ahead = in_camera[:, 2] > NEAREST
     if ahead.any():
         plane: Any
         plane, _ = cv2.projectPoints(
-            np.ascontiguousarray(seen[ahead]), np.zeros(3), np.zeros(3), camera.intrinsics, camera.distortion
+            np.ascontiguousarray(in_camera[ahead]), np.zeros(3), np.zeros(3), camera.intrinsics, camera.distortion
         )
         found[ahead] = plane[:, 0]
-    return found, seen[:, 2]
+    return found, in_camera[:, 2]
 
 
 def straight_boxes(boxes: Array, camera: CameraReading) -> Array:
-    """(N, 4) boxes [px] in the plane at distance 1 from a camera without distortion: left, top, right, bottom.
+    """Return boxes (N, 4) [px] in the plane at distance 1 from an undistorted camera: left, top, right, bottom.
 
-    The middle of each edge is taken there.
+    The middle of each edge is transformed.
     """
     x0, y0, x1, y1 = boxes.T
     x, y = (x0 + x1) / 2.0, (y0 + y1) / 2.0
@@ -50,7 +50,7 @@ def straight_boxes(boxes: Array, camera: CameraReading) -> Array:
 
 
 def level_frame(camera: CameraReading) -> tuple[LevelFrame, Array]:
-    """The level frame under a camera, x along its optical axis, and (3, 3) its rotation to the camera's axes."""
+    """Return the level frame below a camera, x along its optical axis, and its rotation (3, 3) to the camera axes."""
     pose = camera.pose
     x, y, z = pose[:3, 3].tolist()
     yaw = math.atan2(pose[1, 2], pose[0, 2])

@@ -1,4 +1,4 @@
-"""How large what moves on roads usually is."""
+"""Prior distributions of the sizes of road users."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class SizePrior(NamedTuple):
-    """Length, width and height of a class [m], how much they vary (standard deviations), and its share of traffic."""
+    """Mean length, width and height of a class [m], their standard deviations, and the share of the class in traffic."""
 
     mean: tuple[float, float, float]
     deviation: tuple[float, float, float]
@@ -24,16 +24,16 @@ PRIORS: Mapping[str, SizePrior] = {
     "pedestrian": SizePrior((0.55, 0.55, 1.72), (0.15, 0.15, 0.15), 0.10),
     "pole": SizePrior((0.3, 0.3, 3.5), (0.15, 0.15, 1.5), 0.03),
 }
-"""Round figures for European traffic; two-wheelers with their riders. Poles and masts are what a scan shows beside road
-users, lest it takes them for such."""
+"""Rounded values for European traffic; two-wheelers include their riders. Poles and masts appear in point clouds beside
+road users; their class prevents that they are detected as road users."""
 
 UNKNOWN = SizePrior((1.0, 1.0, 1.2), (0.6, 0.6, 0.6), 0.01)
-"""For a class that the table does not have."""
+"""Prior of a class that the table does not have."""
 
 LARGEST = (14.0, 4.5, 4.8)
-"""What exceeds this is no road user [m]."""
+"""Maximum size of a road user [m]."""
 
 
 def prior_of(name: str) -> SizePrior:
-    """The prior of a class, UNKNOWN where the table has none."""
+    """Return the prior of a class, or UNKNOWN if the table has none."""
     return PRIORS.get(name, UNKNOWN)

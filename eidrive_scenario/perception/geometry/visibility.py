@@ -1,4 +1,4 @@
-"""Share of objects that a camera or a LiDAR can show: field of view, range, apparent height, and occlusion."""
+"""Share of objects that a camera or a lidar can show: field of view, range, apparent height, and occlusion."""
 
 from __future__ import annotations
 
@@ -15,17 +15,16 @@ from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 POINTS = 0.8 * np.array(
     [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)] + [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]
 )
-"""(10, 3) points of a box, in sizes from its center."""
+"""Points (10, 3) of a box, in sizes from its center."""
 LEAST_HEIGHT, LEGIBLE_HEIGHT = 8.0, 20.0
-"""Objects below the first height in the image are not expected to be detected, from the second on they are [px]. A
-third of what the networks miss is below 15 px (docs/perception.md)."""
+"""Objects below the first height in the image are not expected to be detected; from the second on they are [px]. A
+third of the vehicles that the networks miss is below 15 px (docs/perception.md)."""
 SAME = 0.5
-"""A detection hides nothing of a box whose center is nearer than this share of both their lengths: it is the object
-itself."""
+"""A detection does not occlude a box whose center is closer than this share of both lengths: it is the same object."""
 
 
 def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
-    """(N,) share in [0, 1] of boxes (N, 7) that the camera can show, past the boxes `others` (M, 7)."""
+    """Return the share (N,) in [0, 1] of boxes (N, 7) that the camera can show past the boxes `others` (M, 7)."""
     if not len(boxes):
         return np.empty(0)
     points = _points(boxes)
@@ -33,17 +32,17 @@ def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
     places, _ = pixels(points.reshape(-1, 3), camera)
     places = places.reshape(len(boxes), -1, 2)
     x, y = places[..., 0], places[..., 1]
-    shown = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
+    visible = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
     corners, _ = pixels(box_corners(boxes).reshape(-1, 3), camera)
     rows = corners.reshape(len(boxes), -1, 2)[..., 1]
     tall = np.where(np.isnan(rows).any(axis=1), LEGIBLE_HEIGHT, np.ptp(np.nan_to_num(rows), axis=1))
     legible = np.clip((tall - LEAST_HEIGHT) / (LEGIBLE_HEIGHT - LEAST_HEIGHT), 0.0, 1.0)
-    shown &= ~_hidden(camera.pose[:3, 3], points, boxes, others)
-    return np.asarray(shown.mean(axis=1) * legible)
+    visible &= ~_hidden(camera.pose[:3, 3], points, boxes, others)
+    return np.asarray(visible.mean(axis=1) * legible)
 
 
 def in_lidar(boxes: Array, lidar: LidarReading, half_field: float, reach: float, others: Array) -> Array:
-    """(N,) share in [0, 1] of boxes (N, 7) that the LiDAR can show, past the boxes `others` (M, 7).
+    """Return the share (N,) in [0, 1] of boxes (N, 7) that the lidar can show past the boxes `others` (M, 7).
 
     half_field  half its horizontal field of view [rad];  reach  its range [m]
     """
@@ -52,13 +51,13 @@ def in_lidar(boxes: Array, lidar: LidarReading, half_field: float, reach: float,
     points = _points(boxes)
     place = LevelFrame.of(lidar.pose).to_local(points[..., :2])
     bearing = np.abs(np.arctan2(place[..., 1], place[..., 0]))
-    shown = (bearing <= half_field) & (np.hypot(place[..., 0], place[..., 1]) <= reach)
-    shown &= ~_hidden(lidar.pose[:3, 3], points, boxes, others)
-    return np.asarray(shown.mean(axis=1))
+    visible = (bearing <= half_field) & (np.hypot(place[..., 0], place[..., 1]) <= reach)
+    visible &= ~_hidden(lidar.pose[:3, 3], points, boxes, others)
+    return np.asarray(visible.mean(axis=1))
 
 
 def _points(boxes: Array) -> Array:
-    """(N, 10, 3) points of boxes (N, 7)."""
+    """Return points (N, 10, 3) of boxes (N, 7)."""
     local = POINTS * boxes[:, None, 3:6]
     cos, sin = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
     x, y = local[..., 0], local[..., 1]
@@ -67,7 +66,7 @@ def _points(boxes: Array) -> Array:
 
 
 def _hidden(origin: Array, points: Array, boxes: Array, others: Array) -> Bools:
-    """(N, P) whether one of `others` (M, 7) is between `origin` (3,) and points (N, P, 3) of boxes (N, 7)."""
+    """Return whether one of `others` (M, 7) is between `origin` (3,) and points (N, P, 3) of boxes (N, 7)."""
     hidden = np.zeros(points.shape[:2], dtype=bool)
     for x, y, z, length, width, height, yaw in others.tolist():
         cos, sin = math.cos(yaw), math.sin(yaw)
@@ -76,11 +75,11 @@ def _hidden(origin: Array, points: Array, boxes: Array, others: Array) -> Bools:
         start = turn @ (origin - (x, y, z))
         if np.all(np.abs(start) <= half):
             continue
-        way = (points - (x, y, z)) @ turn.T - start
-        safe = np.where(np.abs(way) < 1e-9, 1e-9, way)
+        ray = (points - (x, y, z)) @ turn.T - start
+        safe = np.where(np.abs(ray) < 1e-9, 1e-9, ray)
         first, second = (-half - start) / safe, (half - start) / safe
         enter, leave = np.minimum(first, second).max(axis=-1), np.maximum(first, second).min(axis=-1)
         near = np.hypot(boxes[:, 0] - x, boxes[:, 1] - y)
-        itself = near < SAME * np.minimum(length, boxes[:, 3])
-        hidden |= (enter < leave) & (enter > 0.0) & (enter < 1.0) & ~itself[:, None]
+        is_same = near < SAME * np.minimum(length, boxes[:, 3])
+        hidden |= (enter < leave) & (enter > 0.0) & (enter < 1.0) & ~is_same[:, None]
     return hidden

@@ -24,6 +24,7 @@ from eidrive_scenario.perception.learned.classes import misspelt, object_categor
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork, Layout
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
+from eidrive_scenario.perception.learned.runtimes import runtime_versions
 from eidrive_scenario.perception.learned.weight_files import (
     DEFAULT_CONFIDENCE,
     MAX_CLASSES,
@@ -106,7 +107,9 @@ class LearnedDetector(Detector):
         self.settings = settings or LearnedSettings()
         self.image_detections: Mapping[str, ImageDetections] = {}
         self._signals: tuple[SignalReading, ...] = ()
-        check_weights_exist(weights_path(self.network, self.settings))
+        path = weights_path(self.network, self.settings)
+        check_weights_exist(path)
+        self.library_versions = runtime_versions(path)
         self._network: ImageNetwork | None = None
         self._surroundings = MapContext(None)
         self._patterns: dict[str, Pattern] = {}

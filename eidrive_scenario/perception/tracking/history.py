@@ -1,4 +1,4 @@
-"""Detections of one track so far: when, how surely and as what it was detected."""
+"""Detections of one track so far: times, scores and classes."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ from eidrive_scenario.perception.tracking.settings import TrackerSettings
 
 
 class TrackHistory:
-    """When a track was seen, how surely and as what."""
+    """Detection history of one track."""
 
-    __slots__ = ("_names", "_recent", "_seen", "hits", "number", "often_seen", "score")
+    __slots__ = ("_last_detection", "_names", "_recent", "hits", "is_often_detected", "number", "score")
 
     def __init__(self) -> None:
-        self.often_seen = False
-        """Whether it was detected in n of m successive scans."""
+        self.is_often_detected = False
+        """Whether the object was detected in n of m successive scans."""
         self.number: int | None = None
-        """Its number once it is confirmed."""
+        """Track number once the track is confirmed."""
         self.hits = 0
         self.score = 0.0
-        """Of its last detection."""
+        """Score of the last detection."""
         self._recent: list[bool] = []
         self._names: dict[str, float] = {}
-        self._seen = -math.inf
+        self._last_detection = -math.inf
 
     @property
     def name(self) -> str:
-        """The class for which the detections' scores add up to the most."""
+        """Class with the largest sum of detection scores."""
         return max(self._names, key=lambda name: self._names[name])
 
-    def note(self, hit: bool, settings: TrackerSettings) -> None:
-        """Whether the detections just processed show the object."""
+    def record_scan(self, hit: bool, settings: TrackerSettings) -> None:
+        """Record whether the scan contained a detection of the object."""
         self.hits += hit
-        if not self.often_seen:
+        if not self.is_often_detected:
             self._recent = [*self._recent, hit][-settings.confirm[1] :]
-            self.often_seen = sum(self._recent) >= settings.confirm[0]
+            self.is_often_detected = sum(self._recent) >= settings.confirm[0]
 
-    def see(self, detections: Detections, column: int) -> None:
-        """The object is this detection."""
-        self._seen = detections.time
+    def record_detection(self, detections: Detections, column: int) -> None:
+        """Record the detection that is assigned to the object."""
+        self._last_detection = detections.time
         self.score = float(detections.scores[column])
         name = detections.classes[column]
         self._names[name] = self._names.get(name, 0.0) + self.score
 
-    def goes_on(self, now: float, settings: TrackerSettings) -> bool:
-        """Whether the track is worth keeping."""
-        if self.often_seen:
-            return now - self._seen <= settings.coast + 1e-9
+    def is_alive(self, now: float, settings: TrackerSettings) -> bool:
+        """Return whether the track is kept."""
+        if self.is_often_detected:
+            return now - self._last_detection <= settings.coast + 1e-9
         return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]

@@ -1,4 +1,4 @@
-"""How tracked objects move: constant velocity, or constant turn rate and speed; for all tracks at once."""
+"""Motion models of tracks: constant velocity, or constant turn rate and speed; for all tracks at once."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 
 ACCELERATION_DENSITY = 6.0
-"""Of white acceleration [m²/s³]: within a second, a speed changes by 2.4 m/s (standard deviation)."""
+"""Spectral density of white acceleration [m²/s³]: a speed changes by 2.4 m/s in a second (standard deviation)."""
 TURN_DENSITY = 0.15
-"""Of white yaw acceleration [rad²/s³]: within a second, a turn rate changes by 0.4 rad/s."""
+"""Spectral density of white yaw acceleration [rad²/s³]: a turn rate changes by 0.4 rad/s in a second."""
 UNKNOWN_SPEED = 12.0
-"""Of an object seen for the first time, standard deviation [m/s]."""
+"""Standard deviation of the velocity of an object at its first detection [m/s]."""
 KNOWN_SPEED = 0.5
-"""Of a velocity that the detector gives [m/s]."""
+"""Standard deviation of a velocity that the detector provides [m/s]."""
 HEADING_DEVIATION = math.radians(6.0)
-"""Of the axis of a box from the axis of the object [rad]."""
+"""Standard deviation between the axes of a box and of its object [rad]."""
 UNKNOWN_TURN = 0.3
-"""Of the turn rate of an object seen for the first time [rad/s]."""
+"""Standard deviation of the turn rate of an object at its first detection [rad/s]."""
 BACKWARDS = 0.5
-"""A box that moves backwards faster than this is taken to have its front at the other end [m/s]."""
+"""Backward speed above which the front of a box is assumed at its other end [m/s]."""
 
 
 class Estimates(NamedTuple):
@@ -34,30 +34,32 @@ class Estimates(NamedTuple):
 
 
 class MotionModel(ABC):
-    """The state of a track, and how it goes on. Positions [m], angles [rad], all in the world frame."""
+    """State of a track and its transition. Positions [m], angles [rad], all in the world frame."""
 
     size: ClassVar[int]
 
     @abstractmethod
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
-        """First estimates from boxes (N, 7), velocities (N, 2), NaN where unknown, and position noise (N, 2, 2)."""
+        """Return initial estimates from boxes (N, 7), velocities (N, 2), NaN if unknown, and position noise (N, 2, 2)."""
 
     @abstractmethod
     def predict(self, tracks: Estimates, step: float) -> Estimates:
-        """The estimates `step` seconds later."""
+        """Return the estimates after `step` [s]."""
 
     @abstractmethod
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
-        """The estimates with boxes (N, 7) measured, one for each track, with position noise (N, 2, 2)."""
+        """Return the estimates updated with one measured box per track (N, 7) and position noise (N, 2, 2)."""
 
     @abstractmethod
     def velocity(self, state: Array) -> Array:
-        """(N, 2) velocities [m/s]."""
+        """Return velocities (N, 2) [m/s]."""
 
 
 class ConstantVelocity(MotionModel):
-    """State x, y, vx, vy; white noise acceleration (Bar-Shalom, Li and Kirubarajan, Estimation with applications to
-    tracking and navigation, 2001, section 6.2.2)."""
+    """Model with state x, y, vx, vy and white acceleration noise.
+
+    Bar-Shalom, Li and Kirubarajan, Estimation with applications to tracking and navigation, 2001, section 6.2.2.
+    """
 
     size: ClassVar[int] = 4
 
@@ -81,15 +83,18 @@ class ConstantVelocity(MotionModel):
         return Estimates(tracks.state @ forward.T, covariance)
 
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
-        return _corrected(tracks, boxes[:, :2] - tracks.state[:, :2], noise)
+        return _correct(tracks, boxes[:, :2] - tracks.state[:, :2], noise)
 
     def velocity(self, state: Array) -> Array:
         return state[:, 2:4]
 
 
 class TurnRate(MotionModel):
-    """State x, y, heading, speed, turn rate, the latter two constant but for white noise (Schubert, Richter and
-    Wanielik, Comparison and evaluation of advanced motion models for vehicle tracking, FUSION 2008, section III)."""
+    """Model with state x, y, heading, speed, turn rate; speed and turn rate are constant except for white noise.
+
+    Schubert, Richter and Wanielik, Comparison and evaluation of advanced motion models for vehicle tracking, FUSION
+    2008, section III.
+    """
 
     size: ClassVar[int] = 5
 
@@ -109,7 +114,7 @@ class TurnRate(MotionModel):
     def predict(self, tracks: Estimates, step: float) -> Estimates:
         x, y, heading, speed, turn = tracks.state.T
         half = 0.5 * turn * step
-        # A chord of the arc: its length is v·T·sin(half)/half, its direction that of the middle of the turn.
+        # Chord of the arc: its length is v·T·sin(half)/half, its direction that at half the turn.
         shrink = np.sinc(half / np.pi)
         middle = heading + half
         cos, sin = np.cos(middle), np.sin(middle)
@@ -131,14 +136,14 @@ class TurnRate(MotionModel):
         return Estimates(state, covariance)
 
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
-        """Position, and the axis of the box where it is nearer to the heading than its other axis is."""
+        """Update with the position, and with the box axis if it is closer to the heading than the other axis."""
         off = (boxes[:, 6] - tracks.state[:, 2] + np.pi / 2.0) % np.pi - np.pi / 2.0
         usable = np.abs(off) < np.pi / 4.0
         innovation = np.column_stack([boxes[:, :2] - tracks.state[:, :2], np.where(usable, off, 0.0)])
         full = np.zeros((len(boxes), 3, 3))
         full[:, :2, :2] = noise
         full[:, 2, 2] = np.where(usable, HEADING_DEVIATION**2, 1e6)
-        state, covariance = _corrected(tracks, innovation, full)
+        state, covariance = _correct(tracks, innovation, full)
         backwards = state[:, 3] < -BACKWARDS
         if backwards.any():
             # The same motion with the front at the other end: heading + pi, -speed.
@@ -153,8 +158,8 @@ class TurnRate(MotionModel):
         return np.stack([state[:, 3] * np.cos(state[:, 2]), state[:, 3] * np.sin(state[:, 2])], axis=1)
 
 
-def _corrected(tracks: Estimates, innovation: Array, noise: Array) -> Estimates:
-    """Kalman's update where the first entries of the state are measured, in Joseph's form."""
+def _correct(tracks: Estimates, innovation: Array, noise: Array) -> Estimates:
+    """Return the Kalman update in Joseph form; the first entries of the state are measured."""
     measured, size = innovation.shape[1], tracks.state.shape[1]
     spread = tracks.covariance[:, :measured, :measured] + noise
     gain = _transposed(np.asarray(np.linalg.solve(spread, tracks.covariance[:, :measured]), dtype=np.float64))

@@ -11,15 +11,15 @@ from eidrive_scenario.settings import Settings
 
 
 class TrackerSettings(Settings):
-    """The property `tracker`: a kind, or a mapping with these.
+    """Settings of the property `tracker`: a kind, or a mapping with these keys.
 
     kind      cv: constant velocity; ctrv: constant turn rate and speed; none
-    confirm   [n, m]: an object is reported once it was detected in n of m successive detections, and
-    confirm_existence   it exists with at least this probability: 0.5 is the likelier of the two hypotheses
+    confirm   [n, m]: an object is reported once it was detected in n of m successive scans, and
+    confirm_existence   minimum probability of existence for that: 0.5 is the likelier of the two hypotheses
     delete_existence    probability of existence below which a track is deleted
-    coast     maximum time without a detection, after which a track is deleted whatever its existence [s]
+    coast     maximum time without a detection, after which a track is deleted regardless of its existence [s]
     gate      probability that a detection of an object is within its gate
-    detection_probability   that an object in full view is detected in a scan
+    detection_probability   of an object in full view, per scan
     birth_density       of new objects [1/m² per scan]
     lifetime  mean time that an object remains [s]
 
@@ -40,16 +40,15 @@ class TrackerSettings(Settings):
     @model_validator(mode="after")
     def _n_of_m(self) -> TrackerSettings:
         if self.confirm[0] > self.confirm[1]:
-            raise ValueError(
-                f"{self.confirm[0]} of {self.confirm[1]} detections can never be; write [n, m] with n <= m"
-            )
+            n, m = self.confirm
+            raise ValueError(f"confirm: n exceeds m (got [{n}, {m}]; expected [n, m] with n <= m)")
         if self.delete_existence > self.confirm_existence:
             raise ValueError(
-                f"delete_existence {self.delete_existence:g} is above confirm_existence {self.confirm_existence:g}"
+                f"delete_existence exceeds confirm_existence (got {self.delete_existence:g} and {self.confirm_existence:g})"
             )
         return self
 
 
 def tracker_setting(value: Any) -> Any:
-    """A tracker may be written as its kind alone; None leaves it to the detector."""
+    """Return the tracker settings as a mapping if only a kind is given; None selects the default of the detector."""
     return {"kind": value} if isinstance(value, str) else value

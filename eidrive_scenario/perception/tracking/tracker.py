@@ -1,4 +1,4 @@
-"""Tracking: which boxes of one instant and the next are the same object, where it really is and how it moves."""
+"""Multi-object tracking: association of detections over time, with positions and velocities."""
 
 from __future__ import annotations
 
@@ -26,67 +26,69 @@ from eidrive_scenario.perception.tracking.settings import TrackerSettings
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
 MOVING = 1.0
-"""From this speed on, the front of an object is where it drives to [m/s]."""
+"""Minimum speed at which the front of an object is taken from its direction of motion [m/s]."""
 SMOOTHING = 0.2
-"""Share of a new box in the size, height and heading of an object that has been seen often."""
+"""Weight of a new box in the size, height and heading of an object with many detections."""
 
 
 class Tracker:
-    """A Kalman filter for each object, gated global nearest neighbors, and the life of tracks.
+    """Multi-object tracker: one Kalman filter per object, gated global nearest neighbors, and track management.
 
-    Pairs of tracks and boxes are the likeliest together (Hungarian method), each with a squared Mahalanobis distance
-    within the gate of the chi-square distribution (Bar-Shalom and Li, Multitarget-multisensor tracking, 1995, section
-    2.3.2). A box that no track explains begins a new one, which is reported once it has been seen often enough. Each
-    track has a probability of existence, see `eidrive_scenario.perception.tracking.existence`. The reported score of
-    an object is that of its last detection times this probability.
+    The assignment of tracks and boxes maximizes the total likelihood (Hungarian method). Each pair has a squared
+    Mahalanobis distance within the gate of the chi-square distribution (Bar-Shalom and Li, Multitarget-multisensor
+    tracking, 1995, section 2.3.2). An unassigned box initiates a track, which is reported after confirmation. Each
+    track has a probability of existence, see `eidrive_scenario.perception.tracking.existence`. The reported score of an
+    object is that of its last detection times this probability.
     """
 
     def __init__(self, settings: TrackerSettings) -> None:
         if settings.kind == "none":
-            raise ValueError("a tracker of kind 'none' is no tracker")
+            raise ValueError("tracker settings: kind 'none' disables tracking (expected cv or ctrv)")
         self.settings = settings
         self._model = MODELS[settings.kind]()
         self._gate = float(chdtri(2, 1.0 - settings.gate))
         self._time: float | None = None
         self._tracks = Estimates(np.empty((0, self._model.size)), np.empty((0, self._model.size, self._model.size)))
         self._shape = np.empty((0, 5))
-        """(N, 5) z, length, width, height, yaw."""
+        """z, length, width, height and yaw (N, 5)."""
         self._existence = np.empty(0)
-        self._life: list[TrackHistory] = []
+        self._histories: list[TrackHistory] = []
         self._confirmed = 0
 
     def update(self, detections: Detections, in_view: Callable[[Array], Array] | None = None) -> Detections:
-        """The confirmed objects at the time of these detections, with velocities, covariances and track numbers.
+        """Return the confirmed objects at the time of these detections, with velocities, covariances and track numbers.
 
-        in_view  gives the share (N,) of boxes (N, 7) that the sensors could see, in [0, 1]; None: all of them. An
-                 object out of view is not expected to be detected.
+        in_view  returns the share (N,) in [0, 1] of boxes (N, 7) that the sensors can show; None: all of them. An object
+                 out of view is not expected to be detected.
 
-        Raises ValueError if the detections are older than those of the last call.
+        Raise ValueError if the detections are older than those of the last call.
         """
         step = 0.0 if self._time is None else detections.time - self._time
         if step < 0.0:
-            raise ValueError(f"detections of {detections.time} s after those of {self._time} s")
+            raise ValueError(
+                f"detections are out of sequence (got {detections.time} s; expected at least {self._time} s)"
+            )
         self._time = detections.time
-        if step > 0.0 and self._life:
+        if step > 0.0 and self._histories:
             self._tracks = self._model.predict(self._tracks, step)
             self._existence = survived(self._existence, step, self.settings.lifetime)
         noise = position_noise(detections.covariance)
-        confirmed = np.array([life.number is not None for life in self._life], dtype=bool)
+        confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
         rows, columns = associate(self._tracks, confirmed, detections.boxes, noise, self._gate)
         hit = set(rows)
-        self._judge(rows, detections, columns, noise, in_view)
+        self._update_existence(rows, detections, columns, noise, in_view)
         if rows:
             self._correct(rows, detections, columns, noise)
-        for row, life in enumerate(self._life):
-            life.note(row in hit, self.settings)
+        for row, history in enumerate(self._histories):
+            history.record_scan(row in hit, self.settings)
         for row, column in zip(rows, columns, strict=True):
-            self._life[row].see(detections, column)
+            self._histories[row].record_detection(detections, column)
         taken = set(columns)
         self._initiate(detections, [column for column in range(len(detections)) if column not in taken], noise)
         self._delete(detections.time)
-        return self._reported(detections.time)
+        return self._confirm_and_report(detections.time)
 
-    def _judge(
+    def _update_existence(
         self,
         rows: list[int],
         detections: Detections,
@@ -109,13 +111,13 @@ class Tracker:
                 settings.birth_density,
             )
             self._existence[rows] = detected(self._existence[rows], ratio)
-        lost = np.setdiff1d(np.arange(len(self._life)), rows)
+        lost = np.setdiff1d(np.arange(len(self._histories)), rows)
         if len(lost):
             share = 1.0 if in_view is None else np.clip(in_view(self._boxes(lost, self._tracks.state[lost])), 0.0, 1.0)
             self._existence[lost] = missed(self._existence[lost], settings.detection_probability * share)
 
     def _boxes(self, rows: NDArray[np.intp] | list[int], state: Array) -> Array:
-        """(N, 7) boxes of these tracks, which have these states (N, D)."""
+        """Return boxes (N, 7) of these tracks with these states (N, D)."""
         shape = self._shape[rows]
         yaw = math.pi - (math.pi - shape[:, 4:]) % (2.0 * math.pi)
         return np.concatenate([state[:, :2], shape[:, :4], yaw], axis=1)
@@ -125,19 +127,19 @@ class Tracker:
         before = Estimates(self._tracks.state[rows], self._tracks.covariance[rows])
         state, covariance = self._model.update(before, boxes, noise[columns])
         self._tracks.state[rows], self._tracks.covariance[rows] = state, covariance
-        share = np.array([max(SMOOTHING, 1.0 / (self._life[row].hits + 1.0)) for row in rows])
+        share = np.array([max(SMOOTHING, 1.0 / (self._histories[row].hits + 1.0)) for row in rows])
         shape = self._shape[rows]
         shape[:, :4] += share[:, None] * (boxes[:, 2:6] - shape[:, :4])
         shape[:, 4] = self._headings(shape[:, 4], boxes[:, 6], state, share)
         self._shape[rows] = shape
 
     def _headings(self, held: Array, measured: Array, state: Array, share: Array) -> Array:
-        """(N,) headings: the axis of the boxes, its front where the object drives to or else where it was before."""
+        """Return headings (N,): the axis of the boxes, with the front in the direction of motion or else unchanged."""
         vx, vy = self._model.velocity(state).T
         course = np.where(vx * vx + vy * vy > MOVING * MOVING, np.arctan2(vy, vx), held)
         turned = np.where(np.cos(measured - course) < 0.0, measured + math.pi, measured)
         held = np.where(np.cos(held - course) < 0.0, held + math.pi, held)
-        # An axis across the course is the other one of the box: the fit of an L took the width for the length.
+        # An axis across the course is the other axis of the box: the L-shape fit mistook the width for the length.
         turned = np.where(np.cos(turned - course) < math.cos(math.pi / 4), held, turned)
         return np.asarray(held + share * ((turned - held + math.pi) % (2.0 * math.pi) - math.pi))
 
@@ -152,59 +154,61 @@ class Tracker:
         self._shape = np.concatenate([self._shape, boxes[:, 2:7]])
         self._existence = np.concatenate([self._existence, np.clip(detections.scores[columns], 0.0, MOST)])
         for column in columns:
-            life = TrackHistory()
-            life.note(True, self.settings)
-            life.see(detections, column)
-            self._life.append(life)
+            history = TrackHistory()
+            history.record_scan(True, self.settings)
+            history.record_detection(detections, column)
+            self._histories.append(history)
 
     def _delete(self, now: float) -> None:
         """Delete tracks that cannot be confirmed any more, hardly exist, or have coasted for too long."""
         existence = self._existence.tolist()
         kept = [
             row
-            for row, life in enumerate(self._life)
-            if existence[row] >= self.settings.delete_existence and life.goes_on(now, self.settings)
+            for row, history in enumerate(self._histories)
+            if existence[row] >= self.settings.delete_existence and history.is_alive(now, self.settings)
         ]
-        if len(kept) < len(self._life):
+        if len(kept) < len(self._histories):
             self._tracks = Estimates(self._tracks.state[kept], self._tracks.covariance[kept])
             self._shape = self._shape[kept]
             self._existence = self._existence[kept]
-            self._life = [self._life[row] for row in kept]
+            self._histories = [self._histories[row] for row in kept]
 
-    def predicted(self, time: float) -> Detections | None:
-        """The confirmed objects as they should be at a time [s] after the last detections.
+    def predict(self, time: float) -> Detections | None:
+        """Return the confirmed objects predict to a time [s] after the last detections.
 
-        None if there were none yet, or more than `coast` ago: then nothing is known of that time.
+        None before the first detections, and more than `coast` after the last ones.
         """
         if self._time is None or not 0.0 <= time - self._time <= self.settings.coast + 1e-9:
             return None
         step = time - self._time
         shown = [
-            row for row, life in enumerate(self._life) if life.number is not None and life.goes_on(time, self.settings)
+            row
+            for row, history in enumerate(self._histories)
+            if history.number is not None and history.is_alive(time, self.settings)
         ]
         tracks = Estimates(self._tracks.state[shown], self._tracks.covariance[shown])
         if shown and step > 0.0:
             tracks = self._model.predict(tracks, step)
         return self._report(time, shown, tracks, survived(self._existence[shown], step, self.settings.lifetime))
 
-    def _reported(self, now: float) -> Detections:
-        for life, existence in zip(self._life, self._existence.tolist(), strict=True):
-            if life.number is None and life.often_seen and existence >= self.settings.confirm_existence:
+    def _confirm_and_report(self, now: float) -> Detections:
+        for history, existence in zip(self._histories, self._existence.tolist(), strict=True):
+            if history.number is None and history.is_often_detected and existence >= self.settings.confirm_existence:
                 self._confirmed += 1
-                life.number = self._confirmed
-        shown = [row for row, life in enumerate(self._life) if life.number is not None]
+                history.number = self._confirmed
+        shown = [row for row, history in enumerate(self._histories) if history.number is not None]
         tracks = Estimates(self._tracks.state[shown], self._tracks.covariance[shown])
         return self._report(now, shown, tracks, self._existence[shown])
 
     def _report(self, time: float, rows: list[int], tracks: Estimates, existence: Array) -> Detections:
-        lives = [self._life[row] for row in rows]
+        histories = [self._histories[row] for row in rows]
         return Detections(
             time,
             self._boxes(rows, tracks.state),
-            np.array([life.score for life in lives]) * existence,
-            tuple([life.name for life in lives]),
+            np.array([history.score for history in histories]) * existence,
+            tuple([history.name for history in histories]),
             self._model.velocity(tracks.state).copy(),
             tracks.covariance[:, :2, :2],
-            tuple([life.number or 0 for life in lives]),
+            tuple([history.number or 0 for history in histories]),
             existence,
         )

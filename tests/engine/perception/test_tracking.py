@@ -115,7 +115,7 @@ def test_predicted_tracks_move_on_without_changing_the_tracker() -> None:
     for tick in range(20):
         track.update(seen(tick * DT, (tick * 1.0, 0.0)))
         other.update(seen(tick * DT, (tick * 1.0, 0.0)))
-    later = track.predicted(1.95)
+    later = track.predict(1.95)
     assert later is not None
     assert later.time == 1.95
     assert float(later.boxes[0, 0]) == pytest.approx(19.5, abs=0.1)
@@ -123,9 +123,9 @@ def test_predicted_tracks_move_on_without_changing_the_tracker() -> None:
     one, same = track.update(seen(2.0, (20.0, 0.0))), other.update(seen(2.0, (20.0, 0.0)))
     np.testing.assert_array_equal(one.boxes, same.boxes)
     np.testing.assert_array_equal(one.existence, same.existence)
-    assert track.predicted(1.9) is None
-    assert track.predicted(2.51) is None
-    assert tracker().predicted(0.0) is None
+    assert track.predict(1.9) is None
+    assert track.predict(2.51) is None
+    assert tracker().predict(0.0) is None
 
 
 def test_numbers_stay_with_objects_that_pass_each_other() -> None:

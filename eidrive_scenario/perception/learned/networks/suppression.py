@@ -1,14 +1,15 @@
-"""Boxes in a picture: overlap, and the choice of the best of several on one object."""
+"""Overlap of boxes in an image, and non-maximum suppression."""
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
 
 
 def overlap(first: Array, second: Array) -> Array:
-    """(N, M) intersection over union of boxes (N, 4) and (M, 4), each x1 y1 x2 y2."""
+    """Return the intersection over union (N, M) of boxes (N, 4) and (M, 4), each x1 y1 x2 y2."""
     low = np.maximum(first[:, None, :2], second[None, :, :2])
     high = np.minimum(first[:, None, 2:], second[None, :, 2:])
     shared = np.prod(np.maximum(high - low, 0.0), axis=2)
@@ -17,30 +18,29 @@ def overlap(first: Array, second: Array) -> Array:
 
 
 def covered(boxes: Array, regions: Array) -> Array:
-    """(N, M) share of each box (N, 4) that lies in each region (M, 4)."""
+    """Return the share (N, M) of each box (N, 4) that lies in each region (M, 4)."""
     low = np.maximum(boxes[:, None, :2], regions[None, :, :2])
     high = np.minimum(boxes[:, None, 2:], regions[None, :, 2:])
     shared = np.prod(np.maximum(high - low, 0.0), axis=2)
     return np.asarray(shared / np.maximum(_area(boxes)[:, None], 1e-12))
 
 
-def suppress(boxes: Array, scores: Array, groups: Integers, limit: float, most: int = 300) -> Integers:
-    """Rows to keep, best first: greedy non-maximum suppression within each group.
+def suppress(boxes: Array, scores: Array, groups: Integers, limit: float, max_boxes: int = 300) -> Integers:
+    """Return the rows to keep, best first: greedy non-maximum suppression within each group.
 
-    A box goes if it overlaps a better one of its group by more than `limit`; equal scores keep the order given.
+    A box is removed if it overlaps a better one of its group by more than `limit`, if it has no area, or if its score
+    is 0. Boxes of equal score keep their order.
     """
-    order = np.argsort(-scores, kind="stable")
-    shares = overlap(boxes[order], boxes[order])
-    rivals = (shares > limit) & (groups[order][:, None] == groups[order][None, :])
-    alive = np.ones(len(order), dtype=bool)
-    kept = []
-    for rank in range(len(order)):
-        if alive[rank]:
-            kept.append(rank)
-            if len(kept) == most:
-                break
-            alive[rank + 1 :] &= ~rivals[rank, rank + 1 :]
-    return np.asarray(order[kept], dtype=np.int64)
+    has_area = (boxes[:, 2:] > boxes[:, :2]).all(axis=1)  # OpenCV gives boxes without area an overlap of 1
+    kept = [np.zeros(0, dtype=np.int64)]
+    # One call per group: NMSBoxesBatched shifts the groups apart, which loses digits of distant boxes.
+    for group in np.unique(groups[has_area]):
+        rows = np.flatnonzero(has_area & (groups == group))
+        rectangles = np.concatenate([boxes[rows, :2], boxes[rows, 2:] - boxes[rows, :2]], axis=1)
+        best = cv2.dnn.NMSBoxes(rectangles.tolist(), scores[rows].tolist(), 0.0, limit)
+        kept.append(rows[np.asarray(best, np.int64)])
+    found = np.sort(np.concatenate(kept))
+    return np.asarray(found[np.argsort(-scores[found], kind="stable")][:max_boxes], dtype=np.int64)
 
 
 def _area(boxes: Array) -> Array:
