@@ -28,8 +28,8 @@ class MotionNoise:
     acceleration, turn_rate            white noise of the IMU [m/s²/√Hz], [rad/s/√Hz]
     acceleration_bias, turn_bias       initial biases of the IMU, standard deviations [m/s²], [rad/s]
     acceleration_walk, turn_walk       random walk of the biases [m/s²/√s], [rad/s/√s]
-    slip                               lateral velocity of the tires in curves, which the model does not have: white noise
-                                       per lateral acceleration [m/√s per m/s²]
+    slip                               lateral velocity of the tires in curves, which the model omits: white noise per
+                                       lateral acceleration [m/√s per m/s²]
     drift                              the same on a straight course [m/√s]
     """
 
@@ -65,7 +65,7 @@ class StartNoise:
 
 
 class Estimate(NamedTuple):
-    """State x, y [m], yaw [rad], speed [m/s], biases of turn rate [rad/s] and acceleration [m/s²]; covariance (6, 6)."""
+    """State x, y [m], yaw [rad], speed [m/s], biases of turn rate [rad/s], acceleration [m/s²]; covariance (6, 6)."""
 
     state: Array
     covariance: Array

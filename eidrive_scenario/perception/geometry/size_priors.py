@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class SizePrior(NamedTuple):
-    """Mean length, width and height of a class [m], their standard deviations, and the share of the class in traffic."""
+    """Mean length, width and height of a class [m], their standard deviations, and the share in traffic."""
 
     mean: tuple[float, float, float]
     deviation: tuple[float, float, float]

@@ -1,1 +1,1 @@
-"""Detectors on pictures, learned from pictures of this world. Torch is imported only when one of them is built."""
+"""Detectors with networks trained on images of this simulation. Torch is imported only when one is created."""

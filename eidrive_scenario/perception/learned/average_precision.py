@@ -1,4 +1,4 @@
-"""Average precision and recall of detections, in pictures and seen from above."""
+"""Average precision and recall of detections, in images and in plan view."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ LEAST_OVERLAP = 0.5
 
 @dataclass(frozen=True)
 class Matches:
-    """What the detections in one picture came to, those of one class or of all.
+    """Result of matching the detections of one image with its objects, of one class or of all.
 
-    scores (N,); correct (N,) the detection found an object; counted (N,) False for what fell on an ignored object;
-    found (M,) whether each object of the picture, ignored ones included, was found
+    scores (N,); correct (N,) whether the detection matches an object; counted (N,) False for detections of ignored
+    objects; found (M,) whether each object of the image, including ignored ones, is matched
     """
 
     scores: Array
@@ -28,9 +28,9 @@ class Matches:
 
 
 def match(boxes: Array, scores: Array, objects: Array, ignored: Bools, least: float = LEAST_OVERLAP) -> Matches:
-    """Detections (N, 4) against objects (M, 4) of one class; `ignored` (M,) need not be found and do no harm.
+    """Match detections (N, 4) with objects (M, 4) of one class; `ignored` (M,) objects are not required and not errors.
 
-    As `match_by_share`; a detection that lies by half in an ignored object does not count either.
+    As `match_by_share`; in addition, a detection that lies by half in an ignored object does not count.
     """
     return match_by_share(
         overlap(boxes, objects),
@@ -44,11 +44,11 @@ def match(boxes: Array, scores: Array, objects: Array, ignored: Bools, least: fl
 def match_by_share(
     shares: Array, scores: Array, ignored: Bools, least: float, harmless: Bools | None = None
 ) -> Matches:
-    """Detections against objects that they overlap by shares (N, M), in any sense; `harmless` (N,) do not count if they
-    find nothing.
+    """Match detections with objects that they overlap by shares (N, M), by any overlap measure.
 
-    Best detection first, each takes the object that it overlaps most among those still free, if by `least`. One that
-    takes an ignored object does not count.
+    In descending order of score, each detection takes the free object with the largest overlap if that is at least
+    `least`. A detection that takes an ignored object does not count. Detections that are `harmless` (N,) do not count
+    if they match no object.
     """
     order = np.argsort(-scores, kind="stable")
     correct, counted = np.zeros(len(order), dtype=bool), np.ones(len(order), dtype=bool)
@@ -70,10 +70,9 @@ def match_by_share(
 
 
 def average_precision(matches: Sequence[Matches], objects: int) -> float:
-    """Area under precision over recall, all points, the detections of the whole set sorted by score; NaN without any
-    object.
+    """Return the area under precision over recall, from all points sorted by score; NaN without objects.
 
-    At each recall counts the best precision at that recall or a greater one (Everingham et al., The PASCAL VOC
+    The precision at each recall is the maximum at that recall or a greater one (Everingham et al., The PASCAL VOC
     challenge: a retrospective, 2015, section 4.2).
     """
     recall, precision = precision_recall(matches, objects)
@@ -85,7 +84,7 @@ def average_precision(matches: Sequence[Matches], objects: int) -> float:
 
 
 def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, Array]:
-    """Recall and precision (K,) over the detections of the whole set, best score first."""
+    """Return recall and precision (K,) over the detections of the whole set, best score first."""
     if not matches:
         return np.empty(0), np.empty(0)
     counted = np.concatenate([entry.counted for entry in matches])
@@ -97,20 +96,20 @@ def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, A
 
 
 def best_confidence(matches: Sequence[Matches], objects: int) -> float:
-    """The score from which on to believe detections so that F1, the harmonic mean of precision and recall, is largest.
+    """Return the score threshold with the maximum F1, the harmonic mean of precision and recall.
 
-    Raises ValueError where nothing was found.
+    Raise ValueError if no detection is correct.
     """
     recall, precision = precision_recall(matches, objects)
     if not len(recall) or recall[-1] == 0.0:
-        raise ValueError("without any right detection there is no best confidence")
+        raise ValueError("matches: no detection is correct (expected at least one)")
     scores = np.concatenate([entry.scores[entry.counted] for entry in matches])
     f1 = 2.0 * precision * recall / np.maximum(precision + recall, 1e-12)
     return float(np.sort(scores)[::-1][int(np.argmax(f1))])
 
 
 def recall_at(matches: Sequence[Matches], objects: int, score: float) -> float:
-    """Share of the objects found by detections of at least this score; NaN without any object."""
+    """Return the share of objects that detections of at least this score find; NaN without objects."""
     if objects == 0:
         return float("nan")
     found = sum(int((entry.correct & entry.counted & (entry.scores >= score)).sum()) for entry in matches)

@@ -1,4 +1,4 @@
-"""What the learned detectors tell apart, and what of it is an object on the road."""
+"""Classes of the learned detectors, and their mapping to categories of road users."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ IMAGE_CLASSES = (*OBJECT_CLASSES, *(f"{LIGHT} {state}" for state in LIGHT_STATES
 """The classes of the shipped weights, in the order of the networks' outputs."""
 
 VERY_LIKE = 0.85
-"""Names that are so like to one of a class (ratio of Ratcliff and Obershelp) are slips."""
+"""Similarity (ratio of Ratcliff and Obershelp) from which a name is reported as misspelt."""
 _VEHICLES = ("car", "truck", "bus", "van")
 _SAME_AS = {"van": "car", "person": "pedestrian", "motorcycle": "motorbike"}
 
 
 def image_class(category: str) -> str:
-    """The class under which an actor of this category is looked for: a van counts as a car."""
+    """Return the class of the image detectors for this actor category; a van is a car."""
     return _SAME_AS.get(category, category)
 
 
 def object_category(name: str) -> str | None:
-    """One of eidrive_scenario.detections.CLASSES for a class of a network, None for what is no object on the road."""
+    """Return the class out of eidrive_scenario.detections.CLASSES for a network class; None for other things."""
     if name in CLASSES:
         return name
     known = _SAME_AS.get(name)
@@ -38,15 +38,18 @@ def object_category(name: str) -> str | None:
 
 
 def light_state(name: str) -> str | None:
-    """The state in the name of a traffic light's class; None for all other classes."""
+    """Return the state in the name of a traffic light class; None for all other classes."""
     if name == LIGHT:
         return "unknown"
     return name.removeprefix(f"{LIGHT} ") if name.startswith(f"{LIGHT} ") else None
 
 
 def misspelt(name: str) -> str | None:
-    """The class that a name of one which means nothing here is very like to; None for all other names, as networks tell
-    many more things apart than are of use here."""
+    """Return the class whose name is very similar to this name; None for classes that are in use, and if none is
+    similar.
+
+    Networks distinguish many things that are not used here, so an unknown name is not an error by itself.
+    """
     state = light_state(name)
     if object_category(name) or name == STOP_SIGN or (state and (state in ("off", "unknown") or _lights_a_lamp(state))):
         return None
@@ -59,9 +62,9 @@ def _lights_a_lamp(state: str) -> bool:
 
 
 def suppression_groups(names: Sequence[str]) -> NDArray[np.int64]:
-    """(C,) group of each class: of two boxes of one group on one place, only the better one counts.
+    """Return the group (C,) of each class: overlapping boxes of one group are one object.
 
-    One lamp cannot be red and green, so the states of a light are a group; a vehicle is not a car and a truck.
+    A traffic light has one state, so its states are one group; a vehicle is not both a car and a truck.
     """
     groups: dict[str, int] = {}
     keys = [LIGHT if light_state(name) else "vehicle" if name in _VEHICLES else name for name in names]

@@ -1,4 +1,4 @@
-"""The detectors `yolov5` and `ssd`: a network on each camera's picture, its boxes lifted to the world."""
+"""Detectors `yolov5` and `ssd`: a network on each camera image, with boxes lifted to the world."""
 
 from __future__ import annotations
 
@@ -40,26 +40,26 @@ from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Sen
 from eidrive_scenario.settings import Settings
 
 SHIPPED = Path(__file__).parents[1] / "weights"
-OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)
+OWN_SUFFIX, EXTERNAL_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)
 
 SAME_PLACE = 0.1
-"""Lifted boxes that overlap this much in plan view are one object; the surer one counts."""
+"""Overlap in plan view above which lifted boxes are one object; the one with the highest score is kept."""
 
 
 Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
-"""Width or height of a network's input [px]."""
+"""Width or height of a network input [px]."""
 
 
 class LearnedSettings(Settings):
-    """What the property `detector_settings` may say.
+    """Settings of the property `detector_settings`.
 
-    weights      a file, seen from the working directory: .npz as training/train.py writes it, an ONNX model (.onnx) or
-                 a TorchScript model (.pt), which is loaded only where the user allows it; None is what is shipped
-    classes, input_size, layout   of an .onnx or .pt: its classes in their order, width and height of its input [px],
-                 and how its output is laid out, where the shape does not tell
-    letterbox    of an .onnx or .pt: whether it takes pictures in their own shape, with gray margins; else stretched
-    confidence   below which a box does not count; None is what suits shipped weights best, and 0.35 for others
-    threads      of the network's computation, in the whole process
+    weights      path relative to the working directory: .npz as training/train.py writes it, an ONNX model (.onnx) or a
+                 TorchScript model (.pt), which is loaded only with permission of the user; None: the shipped weights
+    classes, input_size, layout   of an .onnx or .pt: its classes in order, width and height of its input [px], and the
+                 layout of its outputs, if the shape does not determine it
+    letterbox    of an .onnx or .pt: whether images keep their aspect ratio, with gray margins; otherwise stretched
+    confidence   minimum score of a box; None: the optimum of the shipped weights, and 0.35 for others
+    threads      of the computation of the network, in the whole process
     """
 
     weights: str | None = None
@@ -71,28 +71,29 @@ class LearnedSettings(Settings):
     threads: Annotated[int, Field(ge=1, le=256)] = 1
 
     @model_validator(mode="after")
-    def _fit_together(self) -> LearnedSettings:
+    def _check_consistency(self) -> LearnedSettings:
         suffix = Path(self.weights or OWN_SUFFIX).suffix or OWN_SUFFIX
-        if suffix in FOREIGN_SUFFIXES:
+        if suffix in EXTERNAL_SUFFIXES:
             if not self.classes or self.input_size is None:
-                raise ValueError(f"weights {suffix} need `classes: [...]` and `input_size: [width, height]`")
+                raise ValueError(f"weights: {suffix} files require `classes: [...]` and `input_size: [width, height]`")
             for name in self.classes:
-                meant = misspelt(name)
-                if meant is not None:
-                    raise ValueError(f"class {name!r} means nothing here; did you mean {meant!r}?")
+                suggestion = misspelt(name)
+                if suggestion is not None:
+                    raise ValueError(f"classes: class {name!r} is unknown (did you mean {suggestion!r}?)")
             if not any(object_category(name) for name in self.classes):
-                raise ValueError("none of `classes` is an object on the road such as car, truck, bus or pedestrian")
+                raise ValueError("classes: none is a road user (expected for example car, truck, bus or pedestrian)")
         elif self.weights is not None and suffix != OWN_SUFFIX:
-            raise ValueError(f"weights end in .npz, .onnx or .pt, not in {suffix!r}")
+            raise ValueError(f"weights: unknown file type (got {suffix!r}; expected .npz, .onnx or .pt)")
         elif self.classes is not None or self.input_size is not None or self.layout is not None or self.letterbox:
-            raise ValueError("`classes`, `input_size`, `layout` and `letterbox` are for weights .onnx and .pt")
+            raise ValueError("`classes`, `input_size`, `layout` and `letterbox` apply to weights .onnx and .pt only")
         return self
 
 
 class LearnedDetector(Detector):
-    """What a network finds in the pictures of all cameras, lifted by LiDAR points where there are, else by the ground.
+    """Detections of a network in the images of all cameras, lifted by lidar points if there are any, else by the
+    ground.
 
-    Of boxes on one place, from one camera or several, the surest counts.
+    Of overlapping boxes from one or several cameras, the one with the highest score is kept.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"camera"})
@@ -111,51 +112,51 @@ class LearnedDetector(Detector):
         check_weights_exist(path)
         self.library_versions = runtime_versions(path)
         self._network: ImageNetwork | None = None
-        self._surroundings = MapContext(None)
+        self._map_context = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
 
     def load_weights(self, *, allow_torchscript: bool = False) -> None:
-        """Build the network. Raises SettingError if its weights do not fit."""
+        """Create the network. Raise SettingError if its weights are not suitable."""
         if self._network is None:
             self._network = build_network(self.network, self.settings, allow_torchscript=allow_torchscript)
             self.detectable_signals = signal_kinds(self._network.classes)
 
-    def setup(self, installation: DetectorContext) -> None:
-        """Learn the map and the patterns of the LiDARs."""
-        self._surroundings = MapContext(installation.roads)
-        self._lights = LightsOnMap(installation.roads)
-        for name, sensor in installation.sensors.items():
+    def setup(self, context: DetectorContext) -> None:
+        """Store the map and the ray patterns of the lidars."""
+        self._map_context = MapContext(context.roads)
+        self._lights = LightsOnMap(context.roads)
+        for name, sensor in context.sensors.items():
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
 
     def detect(self, readings: Readings) -> Detections:
-        """The road users in the pictures of all cameras that were read."""
+        """Return the road users in the images of all cameras with a reading."""
         self.load_weights()
         assert self._network is not None
         self.image_detections = {
             camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()
         }
         self._signals = self._lights.read(self.image_detections, readings.cameras)
-        parts = [self._lifted(found, readings, camera) for camera, found in self.image_detections.items()]
+        parts = [self._lift_image(found, readings, camera) for camera, found in self.image_detections.items()]
         return merge_duplicates(parts, readings.time)
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
-        """(N,) the largest share of each box (N, 7) that one of the cameras can show."""
+        """Return the maximum share (N,) of each box (N, 7) that one of the cameras can show."""
         shares = [in_camera(boxes, reading, found.boxes) for reading in readings.cameras.values()]
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
     def signals(self) -> tuple[SignalReading, ...]:
-        """The traffic lights and stop signs of the map that were seen in the last pictures."""
+        """Return the traffic lights and stop signs of the map that are in the last images."""
         return self._signals
 
-    def _lifted(self, found: ImageDetections, readings: Readings, camera: str) -> Detections:
-        """The objects of one picture; of several LiDARs the one that locates an object best."""
-        sweeps: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
-        return most_certain([self._lifted_by(found, readings, camera, *sweep) for sweep in sweeps.items()])
+    def _lift_image(self, found: ImageDetections, readings: Readings, camera: str) -> Detections:
+        """Return the objects of one image; of several lidars, the one with the best position estimate is used."""
+        clouds: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
+        return most_certain([self._lift_with(found, readings, camera, *cloud) for cloud in clouds.items()])
 
-    def _lifted_by(
-        self, found: ImageDetections, readings: Readings, camera: str, lidar: str, sweep: LidarReading | None
+    def _lift_with(
+        self, found: ImageDetections, readings: Readings, camera: str, lidar: str, cloud: LidarReading | None
     ) -> Detections:
         categories = [object_category(name) for name in found.classes]
         rows = [row for row, category in enumerate(categories) if category is not None]
@@ -164,35 +165,35 @@ class LearnedDetector(Detector):
             [category for category in categories if category is not None],
             found.scores[rows],
             readings.cameras[camera],
-            sweep,
+            cloud,
             time=readings.time,
             ground=float(readings.ego.position[2]),
-            surroundings=self._surroundings,
+            surroundings=self._map_context,
             pattern=self._patterns.get(lidar),
         )
 
 
 class YoloDetector(LearnedDetector):
-    """The detector `yolov5`."""
+    """Detector `yolov5`."""
 
     network: ClassVar[Literal["yolov5", "ssd"]] = "yolov5"
 
 
 class SsdDetector(LearnedDetector):
-    """The detector `ssd`."""
+    """Detector `ssd`."""
 
     network: ClassVar[Literal["yolov5", "ssd"]] = "ssd"
 
 
 def weights_path(name: str, settings: LearnedSettings) -> Path:
-    """The file of weights that the settings of the detector of this name ask for."""
+    """Return the path of the weights that the settings of this detector select."""
     return SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
 
 
 def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
-    """The network that the settings ask for.
+    """Return the network that the settings select.
 
-    Raises SettingError if its weights are missing or do not fit, or are TorchScript, which the user has to allow.
+    Raise SettingError if its weights are missing or not suitable, or are TorchScript without permission of the user.
     """
     path = weights_path(name, settings)
     check_weights_exist(path)
@@ -200,9 +201,9 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
         raise refused_torchscript(path)
     if path.suffix != ".onnx" and importlib.util.find_spec("torch") is None:
-        message = f"detector {name!r} needs torch, which is not installed"
+        message = f"detector {name!r} requires torch, which is not installed"
         raise SettingError(Diagnostic(message, "run: pip install eidrive-scenario[learned]"))
-    if path.suffix in FOREIGN_SUFFIXES and settings.classes is not None and settings.input_size is not None:
+    if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         confidence = settings.confidence or DEFAULT_CONFIDENCE
         return ExternalNetwork(
             path,
@@ -218,13 +219,13 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
 
     network = TorchNetwork(path, settings.confidence, settings.threads)
     if network.name != name:
-        message = f"weights {quoted(str(path))} do not fit: they are of {network.name!r}, not of {name!r}"
-        raise SettingError(Diagnostic(message, f"take the detector {network.name!r}"))
+        message = f"weights {quoted(str(path))} are of another network (got {network.name!r}; expected {name!r})"
+        raise SettingError(Diagnostic(message, f"use the detector {network.name!r}"))
     return network
 
 
 def most_certain(estimates: Sequence[Detections]) -> Detections:
-    """Of several estimates of the same objects, row by row, those with the least variance of the position."""
+    """Return, row by row, the estimate of the same object with the minimum position variance."""
     if len(estimates) == 1:
         return estimates[0]
     variances = [np.trace(estimate.covariance, axis1=1, axis2=2) for estimate in estimates]
@@ -237,11 +238,11 @@ def most_certain(estimates: Sequence[Detections]) -> Detections:
 
 
 def merge_duplicates(parts: list[Detections], time: float) -> Detections:
-    """All detections, those left out that lie on the place of a surer one."""
+    """Return all detections except those that overlap one with a higher score."""
     parts = [part for part in parts if len(part)]
     if not parts:
         return Detections(time)
-    together = Detections(
+    merged = Detections(
         time,
         np.concatenate([part.boxes for part in parts]),
         np.concatenate([part.scores for part in parts]),
@@ -249,9 +250,9 @@ def merge_duplicates(parts: list[Detections], time: float) -> Detections:
         np.concatenate([part.velocity for part in parts]),
         np.concatenate([part.covariance for part in parts]),
     )
-    shared = iou_bev(together.boxes, together.boxes)
+    shared = iou_bev(merged.boxes, merged.boxes)
     kept: list[int] = []
-    for row in np.argsort(-together.scores, kind="stable").tolist():
+    for row in np.argsort(-merged.scores, kind="stable").tolist():
         if not kept or shared[row, kept].max() <= SAME_PLACE:
             kept.append(row)
-    return together.subset(sorted(kept))
+    return merged.subset(sorted(kept))

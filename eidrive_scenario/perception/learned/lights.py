@@ -1,4 +1,4 @@
-"""Traffic lights and stop signs in pictures, told apart by the map."""
+"""Traffic lights and stop signs in images, identified by the map."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ from eidrive_scenario.sensing.signals import RANGE, SIGNAL_KINDS, signal_kind
 from eidrive_scenario.world.road_objects import signal_heads
 
 NEAR_BOX = 0.75
-"""A signal of the map is one that was found if it lies within this many sizes of the box from the box's middle."""
+"""Maximum distance of a signal of the map from the center of its box, in box sizes."""
 LEAST_FACING = 0.25
-"""Cosine of the angle between where a light looks and where the camera is, below which its lamps are not seen."""
+"""Minimum cosine of the angle between the direction of a light and that to the camera for visible lamps."""
 LEAST_HEIGHT = 6.0
-"""Lights lower in the picture are not read [px]."""
+"""Minimum height of a light in the image [px]."""
 SURE, SURE_IN_BOX = 0.9, 0.6
-"""From which probability on lamps are believed: where nothing but the map says that there is a light, and where the
-network has found one."""
+"""Minimum probability of a lamp state: for lights that only the map locates, and for lights that the network detected.
+"""
 STOP = "stop"
-"""The state of a stop sign that was found."""
-_NEEDS = {"red": {RED}, "redYellow": {RED, YELLOW}, "yellow": {YELLOW}, "green": {GREEN}}
-"""The lamps that a light must have for each state."""
+"""State of a detected stop sign."""
+_REQUIRED_LAMPS = {"red": {RED}, "redYellow": {RED, YELLOW}, "yellow": {YELLOW}, "green": {GREEN}}
+"""Lamps that a light requires for each state."""
 
 
 class LightView(NamedTuple):
-    """A traffic light of the map that may be in a picture: its row in the map's heads, id, middle and height [px]."""
+    """Traffic light of the map that may be in an image: its row in the heads of the map, id, center and height [px]."""
 
     row: int
     id: str
-    middle: tuple[float, float]
+    center: tuple[float, float]
     height: float
 
 
 class LightsOnMap:
-    """Which signals of the map the boxes in a picture show, and what the lamps of lights show.
+    """Association of image boxes with signals of the map, and lamp states of traffic lights.
 
-    A light is found by the detector's network, or looked up where the map has it. Its state is read from the lamps in
-    the picture, by a small network of its own; where that is not sure, the class that the detector gave counts.
+    A light is detected by the network, or located by the map. Its state is read from the lamps in the image by a
+    separate small network. If that is not certain, the class of the detector is used.
     """
 
     def __init__(self, roads: RoadNetwork | None) -> None:
@@ -60,17 +60,17 @@ class LightsOnMap:
         self._facing = np.array([(math.cos(head.pose.h), math.sin(head.pose.h)) for head in heads]).reshape(-1, 2)
         colors = [set(lamp_colors(head.signal)) for head in heads]
         self._possible: Bools = np.array(
-            [[_NEEDS.get(state, set()) <= own for state in SHOWN] for own in colors], dtype=bool
+            [[_REQUIRED_LAMPS.get(state, set()) <= own for state in SHOWN] for own in colors], dtype=bool
         ).reshape(-1, len(SHOWN))
 
     def read(
         self, found: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
     ) -> tuple[SignalReading, ...]:
-        """The signals of the map that were seen, each once, as the surest look has it; in the order of the map."""
+        """Return the visible signals of the map, each once with its most certain state, in the order of the map."""
         best: dict[int, tuple[float, str]] = {}
         for name, camera in cameras.items() if self._ids else ():
-            boxes = self._matched(found[name], camera) if name in found else {}
-            for row, (score, state) in (boxes | self._shown(camera, boxes)).items():
+            boxes = self._match(found[name], camera) if name in found else {}
+            for row, (score, state) in (boxes | self._lamp_states(camera, boxes)).items():
                 if row not in best or score > best[row][0]:
                     best[row] = (score, state)
         return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
@@ -78,38 +78,40 @@ class LightsOnMap:
     def by_class(
         self, found: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
     ) -> tuple[SignalReading, ...]:
-        """The same by the classes of the boxes alone."""
+        """Return the same from the classes of the boxes alone."""
         best: dict[int, tuple[float, str]] = {}
         for name, detections in found.items() if self._ids else ():
-            for row, look in self._matched(detections, cameras[name]).items():
-                best[row] = max(best.get(row, look), look)
+            for row, candidate in self._match(detections, cameras[name]).items():
+                best[row] = max(best.get(row, candidate), candidate)
         return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
 
     def in_view(self, camera: CameraReading) -> list[LightView]:
-        """The lights that are near enough, within the picture, and look towards the camera."""
-        to_eye = camera.pose[:2, 3] - self._feet[:, :2]
-        away = np.maximum(np.hypot(to_eye[:, 0], to_eye[:, 1]), 1e-6)
-        towards = np.einsum("ni,ni->n", to_eye, self._facing) >= LEAST_FACING * away
+        """Return the lights within range and within the image that face the camera."""
+        to_camera = camera.pose[:2, 3] - self._feet[:, :2]
+        away = np.maximum(np.hypot(to_camera[:, 0], to_camera[:, 1]), 1e-6)
+        towards = np.einsum("ni,ni->n", to_camera, self._facing) >= LEAST_FACING * away
         rows = np.flatnonzero(self._dynamic & towards & (away <= RANGE))
         if not rows.size:
             return []
         tops = self._feet[rows] + self._heights[rows, None] * (0.0, 0.0, 1.0)
         low, high = pixels(self._feet[rows], camera)[0], pixels(tops, camera)[0]
-        middles, heights = (low + high) / 2.0, np.abs(low - high)[:, 1]
+        centers, heights = (low + high) / 2.0, np.abs(low - high)[:, 1]
         size = camera.rgb.shape[1], camera.rgb.shape[0]
-        inside = ((middles >= 0.0) & (middles < size)).all(axis=1) & (heights >= LEAST_HEIGHT)
+        inside = ((centers >= 0.0) & (centers < size)).all(axis=1) & (heights >= LEAST_HEIGHT)
         return [
-            LightView(int(rows[k]), self._ids[rows[k]], (float(middles[k, 0]), float(middles[k, 1])), float(heights[k]))
+            LightView(int(rows[k]), self._ids[rows[k]], (float(centers[k, 0]), float(centers[k, 1])), float(heights[k]))
             for k in np.flatnonzero(inside).tolist()
         ]
 
-    def _shown(self, camera: CameraReading, boxes: Mapping[int, tuple[float, str]]) -> dict[int, tuple[float, str]]:
-        """What the lamps show, and how sure that is, by the rows of lights."""
+    def _lamp_states(
+        self, camera: CameraReading, boxes: Mapping[int, tuple[float, str]]
+    ) -> dict[int, tuple[float, str]]:
+        """Return the states of the lamps and their probabilities, by rows of lights."""
         views = self.in_view(camera)
         if not views:
             return {}
-        middles, heights = np.array([view.middle for view in views]), np.array([view.height for view in views])
-        shares = lamp_network().probabilities(crops(camera.rgb, middles, heights))
+        centers, heights = np.array([view.center for view in views]), np.array([view.height for view in views])
+        shares = lamp_network().probabilities(crops(camera.rgb, centers, heights))
         found = {}
         for view, share in zip(views, shares, strict=True):
             likely = np.where(self._possible[view.row], share, 0.0)
@@ -117,15 +119,15 @@ class LightsOnMap:
             if in_box:
                 likely[SHOWN.index(NONE)] = 0.0
                 likely /= max(float(likely.sum()), 1e-9)
-            which = int(np.argmax(likely))
-            if SHOWN[which] != NONE and likely[which] >= (SURE_IN_BOX if in_box else SURE):
-                found[view.row] = (float(likely[which]), SHOWN[which])
+            index = int(np.argmax(likely))
+            if SHOWN[index] != NONE and likely[index] >= (SURE_IN_BOX if in_box else SURE):
+                found[view.row] = (float(likely[index]), SHOWN[index])
         return found
 
-    def _matched(self, found: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
-        """Score and state of the surest box on each signal, by its row."""
+    def _match(self, found: ImageDetections, camera: CameraReading) -> dict[int, tuple[float, str]]:
+        """Return score and state of the box with the highest score for each signal, by its row."""
         places, _ = pixels(self._feet + self._heights[:, None] * (0.0, 0.0, 0.5), camera)
-        matched: dict[int, tuple[float, str]] = {}
+        matches: dict[int, tuple[float, str]] = {}
         for box, score, name in zip(found.boxes, found.scores.tolist(), found.classes, strict=True):
             state = STOP if name == STOP_SIGN else light_state(name)
             if state is None:
@@ -135,11 +137,14 @@ class LightsOnMap:
             reach = np.where(np.isnan(away).any(axis=1), np.inf, away.max(axis=1))
             reach[self._dynamic == (name == STOP_SIGN)] = np.inf
             nearest = int(np.argmin(reach))
-            if reach[nearest] <= NEAR_BOX and (nearest not in matched or score > matched[nearest][0]):
-                matched[nearest] = (score, state)
-        return matched
+            if reach[nearest] <= NEAR_BOX and (nearest not in matches or score > matches[nearest][0]):
+                matches[nearest] = (score, state)
+        return matches
 
 
 def signal_kinds(classes: Sequence[str]) -> frozenset[str]:
-    """What can be read with a network of these classes: lights without it, as the map says where their lamps are."""
+    """Return the kinds of signals that a network of these classes reads.
+
+    Lights need no class, as the map locates their lamps.
+    """
     return SIGNAL_KINDS if STOP_SIGN in classes else SIGNAL_KINDS - {"stop sign"}

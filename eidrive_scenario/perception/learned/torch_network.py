@@ -1,4 +1,4 @@
-"""The project's own networks on a CPU."""
+"""Shipped networks on the CPU."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from eidrive_scenario.perception.learned.weights import load
 
 
 class TorchNetwork(ImageNetwork):
-    """`yolov5` or `ssd`, by what the file of weights says. Raises SettingError if that does not fit.
+    """Network `yolov5` or `ssd`, as the weights specify. Raise SettingError if the weights are not suitable.
 
-    Without a confidence, that of the weights counts. On a given machine and number of threads the same picture gives
-    the same bits.
+    If `confidence` is None, that of the weights is used. On one machine with one number of threads, equal images give
+    equal bits.
     """
 
     def __init__(self, path: Path, confidence: float | None = None, threads: int = 1) -> None:
@@ -35,9 +35,9 @@ class TorchNetwork(ImageNetwork):
         width, height = description.input_size
         self._defaults = default_boxes(height, width)
 
-    def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
+    def candidates(self, image: NDArray[np.uint8]) -> Candidates:
         with torch.inference_mode():
-            pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)[None]
+            pixels = torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1)[None]
             outputs = self._network(pixels.to(torch.float32).div_(255.0))
             if isinstance(self._network, YoloV5):
                 boxes, scores, classes = yolo_candidates(self._network.anchors, outputs, self.confidence)
@@ -47,7 +47,7 @@ class TorchNetwork(ImageNetwork):
 
 
 def yolo_candidates(anchors: Tensor, outputs: list[Tensor], confidence: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Boxes (N, 4) as corners, scores (N,) and classes (N,) of the first picture; score = objectness · class.
+    """Return boxes (N, 4) as corners, scores (N,) and classes (N,) of the first image; score = objectness · class.
 
     Decodes like `YoloV5.decode`, but only the cells whose objectness alone reaches the confidence.
     """
@@ -70,7 +70,10 @@ def yolo_candidates(anchors: Tensor, outputs: list[Tensor], confidence: float) -
 def ssd_candidates(
     outputs: tuple[Tensor, Tensor], defaults: Tensor, confidence: float
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """The same for `ssd`. A class reaches the confidence only if its logit exceeds that of the background by enough."""
+    """Return the same for `ssd`.
+
+    A class reaches the confidence only if its logit exceeds that of the background by enough.
+    """
     encoded, logits = outputs[0][0], outputs[1][0]
     likely = (logits[:, 1:].amax(dim=1) - logits[:, 0] >= _logit(confidence)).nonzero()[:, 0]
     score, number = logits[likely].softmax(dim=1)[:, 1:].max(dim=1)

@@ -1,4 +1,4 @@
-"""Files of weights as untrusted input: their size, the permission to execute TorchScript, and the arrays of a .npz."""
+"""Weight files as untrusted input: size, permission to execute TorchScript, and arrays of .npz files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
 
 MAX_BYTES = 512 * MIB
-"""Size of a file of weights, and of all arrays in a .npz together."""
+"""Maximum size of a weight file, and of all arrays in a .npz together."""
 MAX_SIDE = 8192
 """Maximum width and height of a network's input [px]."""
 MAX_CLASSES = 10_000
@@ -25,24 +25,24 @@ MAX_CLASSES = 10_000
 DEFAULT_CONFIDENCE = 0.35
 """Minimum score of a detection if neither the settings nor the weights state one."""
 ALLOW_TORCHSCRIPT = "EIDRIVE_ALLOW_TORCHSCRIPT"
-"""Environment variable: 1 lets runs load TorchScript weights, as the option --allow-torchscript does."""
+"""Environment variable: 1 permits TorchScript weights, as the option --allow-torchscript does."""
 TORCHSCRIPT_SUFFIX = ".pt"
 
 
 def torchscript_is_allowed(option: bool) -> bool:
-    """Whether the user lets weights execute code: by the option, or by the environment variable."""
+    """Return whether the option or the environment variable permits that weights execute code."""
     return option or os.environ.get(ALLOW_TORCHSCRIPT) == "1"
 
 
 def refused_torchscript(path: Path) -> SettingError:
-    """The error for TorchScript weights without permission."""
+    """Return the error for TorchScript weights without permission."""
     message = f"weights {quoted(str(path))} are TorchScript, which can execute any code with your rights"
     hint = f"export the model to ONNX; or, if you trust it, run with --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
     return SettingError(Diagnostic(message, hint))
 
 
 def check_weights_exist(path: Path) -> None:
-    """Raise SettingError if the path does not lead to a regular file. Nothing of the file is read."""
+    """Raise SettingError if the path is not a regular file. The file is not read."""
     if not is_regular_file(path):
         hint = "check `weights` of the detector's settings"
         raise SettingError(Diagnostic(f"no file {quoted(str(path))} with weights", hint))
@@ -61,7 +61,7 @@ def read_arrays(content: bytes) -> Mapping[str, NDArray[Any]]:
     """Return the arrays of a .npz, by name.
 
     Raise ValueError or zipfile.BadZipFile if the file is damaged, holds Python objects, or unpacks to more than
-    MAX_BYTES. Sizes are checked before memory is taken.
+    MAX_BYTES. Sizes are checked before memory is allocated.
     """
     arrays: dict[str, NDArray[Any]] = {}
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -83,12 +83,12 @@ def _array(data: bytes) -> NDArray[Any]:
         (2, 0): np.lib.format.read_array_header_2_0,
     }.get(version)
     if read_header is None:
-        raise ValueError("an array has an unknown version of its format")
+        raise ValueError("an array has an unknown format version")
     shape, fortran_order, dtype = read_header(stream)
     if dtype.hasobject:
-        raise ValueError("an array holds Python objects, which are not read")
+        raise ValueError("an array holds Python objects, which are not supported")
     body = data[stream.tell() :]
     if any(side < 0 for side in shape) or math.prod(shape) * dtype.itemsize != len(body):
-        raise ValueError("an array is not as long as its header states")
+        raise ValueError("the length of an array differs from its header")
     array = np.frombuffer(body, dtype=dtype)
     return array.reshape(shape, order="F" if fortran_order else "C")

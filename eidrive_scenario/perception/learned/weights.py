@@ -1,4 +1,4 @@
-"""The weights of the project's own networks: one .npz file, with a card beside it that says where they come from."""
+"""Weights of the shipped networks: one .npz file, with metadata about their origin in a .json file beside it."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ _DESCRIPTION = "description"
 
 @dataclass(frozen=True)
 class Description:
-    """What a file of weights is for.
+    """Description of a weight file.
 
     network     `yolov5` or `ssd`;  classes  in the order of its outputs
     input_size  width and height of its input [px];  anchors  of yolov5 [px]
-    confidence  from which on its boxes are believed, where nobody says another
+    confidence  default of the minimum score of a box
     """
 
     network: str
@@ -43,16 +43,16 @@ class Description:
     confidence: float = DEFAULT_CONFIDENCE
 
     def build(self) -> YoloV5 | Ssd:
-        """The network, untrained. Raises ValueError if the description fits none."""
+        """Return the untrained network. Raise ValueError if the description fits no network."""
         if self.network == "yolov5" and self.anchors is not None:
             return YoloV5(len(self.classes), self.anchors)
         if self.network == "ssd":
             return Ssd(len(self.classes))
-        raise ValueError("its description names no network, or lacks anchors")
+        raise ValueError("its description specifies no known network, or lacks anchors")
 
 
 def save(path: Path, network: nn.Module, description: Description, card: dict[str, Any]) -> None:
-    """Write weights and card. Convolutions are kept in half precision, the rest in single."""
+    """Write weights and metadata. Convolutions are stored in half precision, other tensors in single precision."""
     arrays: dict[str, Any] = {}
     for name, value in network.state_dict().items():
         array = value.detach().cpu().numpy()
@@ -63,25 +63,25 @@ def save(path: Path, network: nn.Module, description: Description, card: dict[st
 
 
 def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
-    """The network with its weights, ready to be trained on. Raises SettingError if the file is not one of weights."""
+    """Return the network with its weights, trainable. Raise SettingError if the file does not contain weights."""
     content = read_weights(path)
     try:
         stored = read_arrays(content)
-        description = _described(json.loads(str(stored[_DESCRIPTION])))
+        description = _parse_description(json.loads(str(stored[_DESCRIPTION])))
         network = description.build()
-        own = network.state_dict()
-        missing = [name for name in own if name not in stored]
+        expected = network.state_dict()
+        missing = [name for name in expected if name not in stored]
         if missing:
             raise ValueError(f"{missing[0]} is missing")
-        wrong = [name for name, value in own.items() if tuple(value.shape) != stored[name].shape]
-        if wrong:
-            raise ValueError(f"{wrong[0]} has another shape than the network")
+        mismatched = [name for name, value in expected.items() if tuple(value.shape) != stored[name].shape]
+        if mismatched:
+            raise ValueError(f"{mismatched[0]} has another shape than the network")
         network.load_state_dict(
-            {name: torch.from_numpy(stored[name].copy()).to(value.dtype) for name, value in own.items()}
+            {name: torch.from_numpy(stored[name].copy()).to(value.dtype) for name, value in expected.items()}
         )
     except _DAMAGED as error:
         reason = shortened(str(error), 200) if type(error) is ValueError else type(error).__name__
-        hint = "give a file that training/train.py has written, or an ONNX model (.onnx)"
+        hint = "use a file that training/train.py has written, or an ONNX model (.onnx)"
         raise SettingError(Diagnostic(f"weights {quoted(str(path))} do not fit: {reason}", hint)) from error
     return description, network
 
@@ -99,10 +99,10 @@ _DAMAGED = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""What a damaged file may raise: in zipfile, in the headers of its arrays, in its description, in torch."""
+"""Exceptions that a damaged file causes: in zipfile, in array headers, in its description, in torch."""
 
 
-def _described(data: dict[str, Any]) -> Description:
+def _parse_description(data: dict[str, Any]) -> Description:
     anchors = data["anchors"]
     width, height = (int(side) for side in data["input_size"])
     classes = tuple(str(name) for name in data["classes"])
@@ -110,10 +110,10 @@ def _described(data: dict[str, Any]) -> Description:
         raise ValueError("its description has no usable input size or classes")
     network, coarsest = str(data["network"]), STRIDES[-1]
     if network == "yolov5" and (width % coarsest or height % coarsest):
-        raise ValueError(f"its input size is {width} x {height}, which are not multiples of {coarsest}")
+        raise ValueError(f"its input size is invalid (got {width} x {height}; expected multiples of {coarsest})")
     confidence = float(data.get("confidence", Description.confidence))
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"its confidence is {confidence:g} (expected a number between 0 and 1)")
+        raise ValueError(f"its confidence is invalid (got {confidence:g}; expected a number between 0 and 1)")
     return Description(
         network=network,
         classes=classes,

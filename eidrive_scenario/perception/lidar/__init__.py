@@ -1,1 +1,1 @@
-"""Object detection in LiDAR point clouds."""
+"""Object detection in lidar point clouds."""

@@ -1,4 +1,4 @@
-"""An oriented box around the points of one object, of which a LiDAR sees only the sides that face it."""
+"""Fit of an oriented box to the points of one object; a lidar measures only the sides that face it."""
 
 from __future__ import annotations
 
@@ -15,28 +15,33 @@ from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
 from eidrive_scenario.perception.lidar.l_shape import Rectangle, bounds, rectangles
 
 RANGE_NOISE = 0.03
-"""Of the points on a surface, standard deviation [m]."""
+"""Standard deviation of the points on a surface [m]."""
 THIN = 3.0 * RANGE_NOISE
-"""Points within so small an extent may be those of a surface across it [m]."""
+"""Maximum extent of points that may be those of a surface across the axis [m]."""
 SHAPELESS = 0.4
-"""Points within so small a rectangle have no heading of their own [m]."""
+"""Maximum size of a rectangle around points that show no heading [m]."""
 FEW_COLUMNS = 1.6
-"""A rectangle of fewer gaps between columns of rays has one that is worse than that of the lane."""
+"""Number of gaps between columns of rays below which the heading of a rectangle is worse than that of the lane."""
 LANE_DEVIATION = math.radians(25.0)
-"""How much an object's heading differs from the expected one [rad]."""
+"""Standard deviation between the heading of an object and the expected one [rad]."""
 HEADING_DEVIATION = 0.4
-"""Of a heading that is a guess [rad]."""
+"""Standard deviation of an assumed heading [rad]."""
 NEGLIGIBLE = 12.0
-"""Choices whose cost exceeds the least one by more are not likely enough to matter."""
+"""Excess cost above which a hypothesis is neglected."""
 ABOVE_TOP = 0.3
-"""A sensor this much above an object sees its top [m]."""
+"""Height of a sensor above an object from which its top is visible [m]."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A box x y z l w h yaw in the level frame, its class, the covariance of its center x y [m²], how well the points
-    fit the class: the sum of squared deviations of its size from what is usual; and whether something nearer hides its
-    left and its right end."""
+    """Box fitted to the points of an object.
+
+    box         x y z l w h yaw in the level frame
+    name        class
+    covariance  (2, 2) of the center x y [m²]
+    deviation   sum of squared deviations of the size from that of the class, in standard deviations
+    hidden      whether something nearer hides the left and the right end
+    """
 
     box: tuple[float, float, float, float, float, float, float]
     name: str
@@ -46,24 +51,24 @@ class Fit:
 
 
 class _Span(NamedTuple):
-    """What the points say of a box along one axis."""
+    """Extent of a box along one axis, as far as the points determine it."""
 
     low: float
     high: float
     gap: float
-    """How much longer than its points the object may be; inf where the side along this axis is not seen [m]."""
+    """Maximum extent of the object beyond its points; inf if the side along this axis is not visible [m]."""
     open_low: bool
-    """Whether it may reach farther than its points at either end."""
+    """Whether the object may extend beyond its points at either end."""
     open_high: bool
     hidden: bool
-    """Whether something stands before one of the ends."""
+    """Whether something nearer hides one of the ends."""
 
 
-class _Choice(NamedTuple):
-    """A way to see the points: its costs, by size and by heading, and what it takes them for."""
+class _Hypothesis(NamedTuple):
+    """Hypothesis about the points: costs by size and by heading, class, length axis, rectangle and extents."""
 
     cost: float
-    astray: float
+    heading_cost_term: float
     name: str
     lengthwise: int
     shape: Rectangle
@@ -71,8 +76,8 @@ class _Choice(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Minus twice the log of its likelihood, up to a constant."""
-        return self.cost + self.astray
+        """Minus twice the log-likelihood, up to a constant."""
+        return self.cost + self.heading_cost_term
 
 
 def fit_box(
@@ -87,18 +92,21 @@ def fit_box(
     heading: float | None = None,
     heading_cost: Callable[[float], float] | None = None,
 ) -> Fit:
-    """The box of the likeliest of `classes` around points (N, 3) of a level frame, the sensor above its origin.
+    """Return the box of the likeliest of `classes` around points (N, 3) of a level frame with the sensor above its
+    origin.
 
     ground   height of the ground below the object [m]; the box stands on it
-    hidden   whether something nearer ends the object's points at its left and its right end, as the sensor sees it
-    cut      whether the sensor's field of view ends them there
-    heading  of its length, where one is to be expected; taken if the points are too few to show one [rad]
-    heading_cost  squared deviations of a heading of the length from what else is known of it; None is the deviation
-             from `heading`
+    hidden   whether something nearer hides the left and the right end of the object, as viewed from the sensor
+    cut      whether the field of view of the sensor ends there
+    heading  expected heading of the length [rad]; used if there are too few points to determine one
+    heading_cost  squared deviations of a heading of the length from other information; None is the deviation from
+             `heading`
 
-    Extents that the points show are believed as far as the gaps between the rays allow; sides that face away or are
-    hidden are completed to the usual size of the class, towards the end that is not seen. The axis of the length
-    follows from the fit; its direction leads away from the sensor, as points do not tell front from back.
+    Measured extents are uncertain by the gaps between the rays. Sides that face away or are hidden are completed to the
+    usual size of the class, towards the end that is not visible. The axis of the length follows from the fit. Its
+    direction points away from the sensor, because points do not distinguish front and rear.
+
+    Raise ValueError if `classes` is empty.
     """
     x, y = points[:, :2].mean(axis=0).tolist()
     top = float(points[:, 2].max()) - ground
@@ -110,7 +118,7 @@ def fit_box(
         shapes, axes = [bounds(points[:, :2], heading)], (0,)
     elif shapeless:
         shapes = [bounds(points[:, :2], math.atan2(y, x))]
-    choices: list[_Choice] = []
+    hypotheses: list[_Hypothesis] = []
     for shape in shapes:
         spans = _spans(points, shape, sensor_height - ground, top, pattern, hidden, cut)
         for lengthwise in axes:
@@ -118,17 +126,17 @@ def fit_box(
             if heading_cost is not None:
                 turned = heading_cost(yaw)
             else:
-                turned = 0.0 if heading is None else _astray(yaw - heading)
+                turned = 0.0 if heading is None else _axis_cost(yaw - heading)
             for name in classes:
                 cost = _cost(prior_of(name), spans, lengthwise, top, highest)
-                choices.append(_Choice(cost, turned, name, lengthwise, shape, spans))
-    if not choices:
-        raise ValueError("a box needs a class to fit")
-    best = choices[0]
-    for choice in choices:
-        if choice.total < best.total - 1e-9:
-            best = choice
-    sizes, center, covariance = _placed(best, shapeless)
+                hypotheses.append(_Hypothesis(cost, turned, name, lengthwise, shape, spans))
+    if not hypotheses:
+        raise ValueError("classes: no class is given (expected at least one)")
+    best = hypotheses[0]
+    for hypothesis in hypotheses:
+        if hypothesis.total < best.total - 1e-9:
+            best = hypothesis
+    sizes, center, covariance = _complete_box(best, shapeless)
     x, y = center
     yaw = best.shape.yaw + best.lengthwise * math.pi / 2.0
     if math.cos(yaw) * x + math.sin(yaw) * y < 0.0:
@@ -138,52 +146,53 @@ def fit_box(
     return Fit(
         (x, y, ground + height / 2.0, sizes[0], sizes[1], height, yaw),
         best.name,
-        covariance + _doubt(choices, best, center, shapeless),
+        covariance + _hypothesis_spread(hypotheses, best, center, shapeless),
         best.cost + 2.0 * math.log(prior.share),
         hidden,
     )
 
 
-def _placed(choice: _Choice, shapeless: bool) -> tuple[list[float], tuple[float, float], Array]:
-    """Length and width, the center and its covariance (2, 2), if this choice is right."""
-    prior = prior_of(choice.name)
-    order = (0, 1) if choice.lengthwise == 0 else (1, 0)
+def _complete_box(hypothesis: _Hypothesis, shapeless: bool) -> tuple[list[float], tuple[float, float], Array]:
+    """Return length and width, the center and its covariance (2, 2) under this hypothesis."""
+    prior = prior_of(hypothesis.name)
+    order = (0, 1) if hypothesis.lengthwise == 0 else (1, 0)
     sizes, middles, variances = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
     for place, axis in enumerate(order):
-        sizes[place], middles[axis], variances[axis] = _completed(
-            choice.spans[axis], prior.mean[place], prior.deviation[place]
+        sizes[place], middles[axis], variances[axis] = _complete_span(
+            hypothesis.spans[axis], prior.mean[place], prior.deviation[place]
         )
     if shapeless:
         swing = (HEADING_DEVIATION * sizes[0] / 2.0) ** 2
         variances = [variance + swing for variance in variances]
-    cos, sin = math.cos(choice.shape.yaw), math.sin(choice.shape.yaw)
+    cos, sin = math.cos(hypothesis.shape.yaw), math.sin(hypothesis.shape.yaw)
     center = cos * middles[0] - sin * middles[1], sin * middles[0] + cos * middles[1]
     turn = np.array([[cos, -sin], [sin, cos]])
     return sizes, center, turn @ np.diag(variances) @ turn.T
 
 
-def _doubt(choices: Sequence[_Choice], best: _Choice, center: tuple[float, float], shapeless: bool) -> Array:
-    """(2, 2) how far the center would be elsewhere by the other ways to see an object of this class in the points, each
-    as likely as its cost says [m²].
+def _hypothesis_spread(
+    hypotheses: Sequence[_Hypothesis], best: _Hypothesis, center: tuple[float, float], shapeless: bool
+) -> Array:
+    """Return the spread (2, 2) of the center over the other hypotheses of this class, weighted by likelihood [m²].
 
     Spread of the means of a Gaussian mixture (Bar-Shalom, Li and Kirubarajan 2001, section 1.4.16).
     """
     spread, total = np.zeros((2, 2)), 0.0
-    for choice in choices:
-        excess = choice.total - best.total
-        if choice.name != best.name or excess > NEGLIGIBLE:
+    for hypothesis in hypotheses:
+        excess = hypothesis.total - best.total
+        if hypothesis.name != best.name or excess > NEGLIGIBLE:
             continue
         weight = math.exp(-0.5 * excess)
         total += weight
-        if choice is not best:
-            there = _placed(choice, shapeless)[1]
+        if hypothesis is not best:
+            there = _complete_box(hypothesis, shapeless)[1]
             off = np.array([there[0] - center[0], there[1] - center[1]])
             spread += weight * np.outer(off, off)
     return spread / total
 
 
-def _astray(angle: float) -> float:
-    """The squared deviation of an axis from where it should lead."""
+def _axis_cost(angle: float) -> float:
+    """Return the squared deviation of an axis from its expected direction."""
     off = (angle + math.pi / 2.0) % math.pi - math.pi / 2.0
     return (off / LANE_DEVIATION) ** 2
 
@@ -197,7 +206,7 @@ def _spans(
     hidden: tuple[bool, bool],
     cut: tuple[bool, bool],
 ) -> tuple[_Span, _Span]:
-    """Both axes; `above` is how high the sensor stands over the ground."""
+    """Return the extents along both axes; `above` is the height of the sensor above the ground."""
     axes = ((math.cos(shape.yaw), math.sin(shape.yaw)), (-math.sin(shape.yaw), math.cos(shape.yaw)))
     x, y = points[:, :2].mean(axis=0).tolist()
     distance = math.hypot(x, y)
@@ -216,10 +225,10 @@ def _spans(
         open_low, open_high = not low > 0.0, not high < 0.0
         ends = _hidden_ends(points[:, :2], (ax, ay), low, high, hidden)
         if high - low <= THIN < shape.high[1 - axis] - shape.low[1 - axis]:
-            # A side across this axis: it faces the sensor and ends the object, whatever hides more of it.
+            # A side across this axis faces the sensor and ends the object, even if something hides more of it.
             ends = ends[0] and open_low, ends[1] and open_high
         if any(cut):
-            # A side that faces the sensor ends the object: only the other end may lie beyond the field of view.
+            # A side that faces the sensor ends the object; only the other end may be outside the field of view.
             at_low, at_high = _ends_of(points[:, :2], (ax, ay), low, high, cut)
             ends = ends[0] or (at_low and open_low), ends[1] or (at_high and open_high)
         if any(ends):
@@ -232,23 +241,23 @@ def _spans(
 def _hidden_ends(
     plan: Array, axis: tuple[float, float], low: float, high: float, hidden: tuple[bool, bool]
 ) -> tuple[bool, bool]:
-    """Whether the low and the high end along an axis is where something hides the object's left or right end."""
+    """Return whether the low and the high end along an axis is a hidden left or right end of the object."""
     if not any(hidden):
         return False, False
     x, y = plan.mean(axis=0).tolist()
     across = abs(axis[0] * y - axis[1] * x) / max(math.hypot(x, y), 1e-9)
     if across < 0.5:
-        return False, False  # the axis leads away from the sensor: its far end is hidden by the object itself
+        return False, False  # the axis points away from the sensor: the object itself hides its far end
     return _ends_of(plan, axis, low, high, hidden)
 
 
 def _ends_of(
     plan: Array, axis: tuple[float, float], low: float, high: float, flags: tuple[bool, bool]
 ) -> tuple[bool, bool]:
-    """Whether the low and the high end along an axis is the left or right end that `flags` (left, right) name."""
+    """Return whether the low and the high end along an axis is an end that `flags` (left, right) select."""
     x, y = plan.mean(axis=0).tolist()
     if high - low <= THIN:
-        # The points lie side by side along the axis, so their places are noise; the axis itself leads to one side.
+        # The points have almost equal positions along the axis, so their order is noise; the axis points to one side.
         leads_left = x * axis[1] - y * axis[0] > 0.0
         return (flags[1], flags[0]) if leads_left else flags
     bearing = np.arctan2(x * plan[:, 1] - y * plan[:, 0], x * plan[:, 0] + y * plan[:, 1])
@@ -264,7 +273,7 @@ def _ends_of(
 
 
 def _highest(points: Array, sensor_height: float, top: float, ground: float, pattern: Pattern) -> float:
-    """How high above the ground the object may reach, by the next ring over its highest point [m]."""
+    """Return the maximum height of the object above the ground, from the next ring above its highest point [m]."""
     row = int(np.argmax(points[:, 2]))
     reach = math.hypot(float(points[row, 0]), float(points[row, 1]))
     elevation = math.atan2(float(points[row, 2]) - sensor_height, max(reach, 1e-6))
@@ -274,7 +283,7 @@ def _highest(points: Array, sensor_height: float, top: float, ground: float, pat
 
 
 def _cost(prior: SizePrior, spans: tuple[_Span, _Span], lengthwise: int, top: float, highest: float) -> float:
-    """Squared deviations of what is seen from a class, in its standard deviations, less twice the log of its share."""
+    """Return squared deviations from a class, in standard deviations, minus twice the log of its share in traffic."""
     cost = -2.0 * math.log(prior.share)
     for place, axis in enumerate((lengthwise, 1 - lengthwise)):
         cost += _deviation(spans[axis], prior.mean[place], prior.deviation[place])
@@ -283,34 +292,34 @@ def _cost(prior: SizePrior, spans: tuple[_Span, _Span], lengthwise: int, top: fl
 
 
 def _deviation(span: _Span, mean: float, deviation: float) -> float:
-    seen = span.high - span.low
-    if seen > mean:
-        return ((seen - mean) / deviation) ** 2
-    least = mean - seen - span.gap
+    measured = span.high - span.low
+    if measured > mean:
+        return ((measured - mean) / deviation) ** 2
+    least = mean - measured - span.gap
     if span.hidden or least <= 0.0:
         return 0.0
     return (least / deviation) ** 2
 
 
-def _blend(seen: float, gap: float, mean: float, deviation: float) -> float:
-    """A size of which `seen` is certain and up to `gap` more is possible, joined with what is usual [m]."""
+def _blend(measured: float, gap: float, mean: float, deviation: float) -> float:
+    """Return the fusion of a measured size, which may be up to `gap` too small, with the usual one [m]."""
     if not math.isfinite(gap):
-        return max(seen, mean)
-    measured, variance = seen + gap / 2.0, gap**2 / 12.0 + RANGE_NOISE**2
-    return max(seen, (measured * deviation**2 + mean * variance) / (variance + deviation**2))
+        return max(measured, mean)
+    expected, variance = measured + gap / 2.0, gap**2 / 12.0 + RANGE_NOISE**2
+    return max(measured, (expected * deviation**2 + mean * variance) / (variance + deviation**2))
 
 
-def _completed(span: _Span, mean: float, deviation: float) -> tuple[float, float, float]:
-    """Size, middle and variance of the middle along one axis."""
-    seen = span.high - span.low
+def _complete_span(span: _Span, mean: float, deviation: float) -> tuple[float, float, float]:
+    """Return size, middle and variance of the middle along one axis."""
+    measured = span.high - span.low
     if span.hidden or span.gap > 2.0 * mean:
-        size, spread = max(seen, mean), deviation**2
+        size, spread = max(measured, mean), deviation**2
     else:
-        size = _blend(seen, span.gap, mean, deviation)
+        size = _blend(measured, span.gap, mean, deviation)
         variance = span.gap**2 / 12.0
         spread = variance * deviation**2 / (variance + deviation**2)
     if span.open_low == span.open_high:
-        slack = size - seen
-        return size, (span.low + span.high) / 2.0, slack**2 / 12.0 + RANGE_NOISE**2
+        unseen = size - measured
+        return size, (span.low + span.high) / 2.0, unseen**2 / 12.0 + RANGE_NOISE**2
     middle = span.low + size / 2.0 if span.open_high else span.high - size / 2.0
     return size, middle, spread / 4.0 + RANGE_NOISE**2

@@ -1,4 +1,4 @@
-"""Which points belong together."""
+"""Clustering of lidar points into objects."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from scipy.spatial import cKDTree
 from eidrive_scenario.arrays import Array, Integers
 
 CELL = 0.1
-"""Points of one cell of this size seen from above are joined beforehand [m]."""
+"""Size of the cells in plan view whose points are merged beforehand [m]."""
 NEAREST = 0.5
-"""Points within this distance always belong together [m]."""
+"""Maximum distance of points that always belong to one cluster [m]."""
 COLUMNS = 2.0
-"""Farther away they do within so many gaps between two neighboring columns of rays."""
+"""Maximum number of gaps between neighboring columns of rays within a cluster, at larger distances."""
 NEXT_COLUMN = 1.5
 GRAZING = math.radians(10.0)
-"""Points of neighboring columns belong together where a surface through both meets the ray at this angle or more."""
+"""Minimum angle between the ray and the surface through two points of neighboring columns in one cluster."""
 DEEPEST = 4.5
-"""But not if one lies this much behind the other: less than the length of a car [m]."""
+"""Maximum difference in range of such points [m]: less than the length of a car."""
 
 
 def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> list[Integers]:
-    """The rows of each cluster of points (N, 2 or more) seen from above, the sensor at the origin.
+    """Return the rows of each cluster of points (N, 2 or more) in plan view, with the sensor at the origin.
 
-    Euclidean clustering by a k-d tree (Rusu, Semantic 3D object maps, 2010) with a reach that grows with the distance
-    from the sensor, as the gaps between its columns of rays do. With `grazing`, neighboring columns are also joined by
-    the angle between the ray and what joins their points, for surfaces that the rays graze (Bogoslavskyi and Stachniss,
-    Fast range image-based segmentation of sparse 3D laser scans, IROS 2016).
+    Euclidean clustering with a k-d tree (Rusu, Semantic 3D object maps, 2010). The distance threshold grows with the
+    distance from the sensor, as the gaps between the columns of rays do. With `grazing`, points of neighboring columns
+    are also connected by the angle between the ray and the line through the points, for surfaces at grazing incidence
+    (Bogoslavskyi and Stachniss, Fast range image-based segmentation of sparse 3D laser scans, IROS 2016).
     """
     if not len(points):
         return []
@@ -38,7 +38,7 @@ def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> lis
     _, cell = np.unique(np.floor(plan / CELL).astype(np.int64) @ (1 << 24, 1), return_inverse=True)
     counts = np.bincount(cell)
     x, y = np.bincount(cell, plan[:, 0]) / counts, np.bincount(cell, plan[:, 1]) / counts
-    first, second = _joined(x, y, azimuth_step, grazing)
+    first, second = _connected_pairs(x, y, azimuth_step, grazing)
     links = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(len(x), len(x)))
     count, of_cell = connected_components(links, directed=False)
     label = of_cell[cell]
@@ -47,8 +47,8 @@ def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> lis
     return [order[ends[number] : ends[number + 1]].astype(np.int64) for number in range(count)]
 
 
-def _joined(x: Array, y: Array, azimuth_step: float, grazing: bool) -> tuple[Integers, Integers]:
-    """Pairs of places that belong together."""
+def _connected_pairs(x: Array, y: Array, azimuth_step: float, grazing: bool) -> tuple[Integers, Integers]:
+    """Return the pairs of cells that are connected."""
     distance = np.hypot(x, y)
     reach = np.maximum(NEAREST, COLUMNS * azimuth_step * distance)
     farthest = math.hypot(float(reach.max()), DEEPEST) if grazing else float(reach.max())

@@ -1,4 +1,4 @@
-"""The detector `lidar`: boxes from a LiDAR alone, without learning."""
+"""Detector `lidar`: boxes from lidar point clouds, without learning."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.settings import Settings
 
 HALF_SURE = 5.0
-"""Points at which the score reaches half of what it can be."""
+"""Number of points at which the score is half of its maximum."""
 TIME_TOLERANCE = 1e-6
 SAME = 0.1
-"""Boxes of two sensors of one station that overlap this much show one object (intersection over union)."""
+"""Overlap above which boxes of two sensors of one station show one object (intersection over union)."""
 
 
 class LidarDetectorSettings(Settings):
-    """What the property `detector_settings` may say.
+    """Settings of the property `detector_settings`.
 
-    off_road      how far beside the roads of the map an object may be [m]; None looks everywhere
-    min_points  of an object
-    min_score   below which an object is not reported
+    off_road    maximum distance of an object from the roads of the map [m]; None: unrestricted
+    min_points  minimum number of points of an object
+    min_score   minimum score of a reported object
     """
 
     off_road: NonNegativeFloat | None = 0.5
@@ -49,9 +49,9 @@ class LidarDetectorSettings(Settings):
 
 
 class LidarDetector(Detector):
-    """Ground removal, clustering, box fit, class by size; a revolution of each LiDAR at a time.
+    """Ground removal, clustering, box fit and classification by size, on one revolution of each lidar at a time.
 
-    The front of an object is that end that leads along its lane where a map tells, else the end that looks away.
+    The front of an object points along its lane if there is a map, else away from the sensor.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"lidar"})
@@ -59,36 +59,36 @@ class LidarDetector(Detector):
 
     def __init__(self, settings: LidarDetectorSettings | None = None) -> None:
         self.settings = settings or LidarDetectorSettings()
-        self._surroundings = MapContext(None)
+        self._map_context = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
-        self._turns: dict[str, _Turn] = {}
+        self._revolutions: dict[str, _Revolution] = {}
         self._reach: dict[str, tuple[float, float]] = {}
         """Half the field of view [rad] and the range [m] of each sensor."""
 
-    def setup(self, installation: DetectorContext) -> None:
-        """Learn the map and the patterns of the sensors."""
-        self._surroundings = MapContext(installation.roads, margin=self.settings.off_road or 0.0)
-        for name, sensor in installation.sensors.items():
+    def setup(self, context: DetectorContext) -> None:
+        """Store the map and the ray patterns of the sensors."""
+        self._map_context = MapContext(context.roads, margin=self.settings.off_road or 0.0)
+        for name, sensor in context.sensors.items():
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
-                self._turns[name] = _Turn(1.0 / sensor.rotation)
+                self._revolutions[name] = _Revolution(1.0 / sensor.rotation)
                 self._reach[name] = math.radians(sensor.field_of_view) / 2.0, sensor.range
 
     def detect(self, readings: Readings) -> Detections:
-        """The road users in the sweeps of all LiDARs of the station."""
+        """Return the road users in the point clouds of all lidars of the station."""
         foot = float(readings.ego.position[2])
-        restricted = self.settings.off_road is not None and self._surroundings.has_map
+        restricted = self.settings.off_road is not None and self._map_context.has_map
         found: list[tuple[FittedObject, LevelFrame]] = []
         for name, reading in readings.lidars.items():
             pattern = self._patterns.get(name) or pattern_from_points(reading.points)
-            turn = self._turns[name].add(readings.time, reading) if name in self._turns else reading
-            scan = Scan(turn, pattern, foot, self._surroundings.near_road if restricted else None)
-            found += [(one, scan.frame) for one in objects(scan, self._surroundings, self.settings.min_points)]
+            cloud = self._revolutions[name].add(readings.time, reading) if name in self._revolutions else reading
+            scan = Scan(cloud, pattern, foot, self._map_context.near_road if restricted else None)
+            found += [(one, scan.frame) for one in objects(scan, self._map_context, self.settings.min_points)]
         found = [(one, frame) for one, frame in found if _score(one) >= self.settings.min_score]
         if not found:
             return Detections(readings.time)
         boxes = np.concatenate([frame.boxes_to_world(np.array([one.fit.box])) for one, frame in found])
-        boxes[:, 6] = self._surroundings.facing(boxes)
+        boxes[:, 6] = self._map_context.facing(boxes)
         detections = Detections(
             readings.time,
             boxes,
@@ -97,10 +97,10 @@ class LidarDetector(Detector):
             np.full((len(found), 2), np.nan),
             np.concatenate([frame.covariance_to_world(one.fit.covariance[None]) for one, frame in found]),
         )
-        return detections if len(readings.lidars) < 2 else _without_doubles(detections)
+        return detections if len(readings.lidars) < 2 else _without_duplicates(detections)
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
-        """(N,) the largest share of each box (N, 7) that one of the LiDARs can show."""
+        """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show."""
         shares = [
             in_lidar(boxes, reading, *self._reach.get(name, (math.pi, math.inf)), found.boxes)
             for name, reading in readings.lidars.items()
@@ -108,35 +108,35 @@ class LidarDetector(Detector):
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
 
-class _Turn:
-    """The readings of one sensor that cover its last revolution, where each covers only a part of it."""
+class _Revolution:
+    """Readings of one sensor that cover its last revolution, for readings that each cover only a part of it."""
 
     def __init__(self, period: float) -> None:
         self._period = period
         self._parts: deque[tuple[float, LidarReading]] = deque()
 
     def add(self, time: float, reading: LidarReading) -> LidarReading:
-        """All of them, as seen from where the newest was taken."""
+        """Return all points of the last revolution in the frame of the newest reading."""
         while self._parts and self._parts[0][0] <= time - self._period + TIME_TOLERANCE:
             self._parts.popleft()
         self._parts.append((time, reading))
         if len(self._parts) == 1:
             return reading
-        turn, place = reading.pose[:3, :3], reading.pose[:3, 3]
+        rotation, origin = reading.pose[:3, :3], reading.pose[:3, 3]
         points = [
-            (old.points @ old.pose[:3, :3].T + old.pose[:3, 3] - place) @ turn for _, old in list(self._parts)[:-1]
+            (old.points @ old.pose[:3, :3].T + old.pose[:3, 3] - origin) @ rotation for _, old in list(self._parts)[:-1]
         ]
         intensities = [old.intensity for _, old in self._parts]
         return LidarReading(np.concatenate([*points, reading.points]), np.concatenate(intensities), reading.pose)
 
 
 def _score(found: FittedObject) -> float:
-    """Half for five points that fit a class well; less where the size is unusual."""
+    """Return the score: one half for five points that fit a class well; less for unusual sizes."""
     return len(found.rows) / (len(found.rows) + HALF_SURE) * math.exp(-found.fit.deviation / UNLIKELY)
 
 
-def _without_doubles(detections: Detections) -> Detections:
-    """Of boxes that overlap, the one of the highest score."""
+def _without_duplicates(detections: Detections) -> Detections:
+    """Return the box with the highest score of each group of overlapping boxes."""
     overlap = iou_bev(detections.boxes, detections.boxes)
     kept: list[int] = []
     for row in np.argsort(-detections.scores, kind="stable").tolist():

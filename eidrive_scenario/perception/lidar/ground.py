@@ -1,4 +1,4 @@
-"""Which points of a sweep are the ground."""
+"""Ground estimation in lidar point clouds."""
 
 from __future__ import annotations
 
@@ -12,31 +12,35 @@ from eidrive_scenario.randomness import generator
 
 SECTORS = 24
 BIN = 2.0
-"""Width of a bin along the range [m]."""
+"""Bin size along the range [m]."""
 NEAR = 30.0
-"""The plane is fitted to points within this distance [m]."""
+"""Maximum distance of points for the fit of the plane [m]."""
 TRIALS = 60
-"""With half of the points on the ground, the odds that 60 pairs hold none with both there are 0.75^60 = 3e-8."""
+"""Number of RANSAC trials. With half of the points on the ground, the probability that no pair of 60 has both points
+there is 0.75^60 = 3e-8."""
 STEEPEST = 0.25
-"""Slope of the plane at most."""
+"""Maximum slope of the plane."""
 ON_PLANE = 0.12
-"""Points this near to the plane support it [m]."""
+"""Maximum distance of supporting points from the plane [m]."""
 BEND = 0.02
-"""How fast the ground may leave the plane, or come back to it, along the way outwards."""
+"""Maximum slope of the ground relative to the plane."""
 ROUGHNESS = 0.1
-"""By how much it may do so at once [m]."""
+"""Maximum step of the ground relative to the plane [m]."""
 CLEARANCE = 0.25
-"""What is higher above the ground is not ground [m]."""
+"""Height above the ground from which points are not ground [m]."""
 
 
 def ground_height(points: Array, foot: float) -> Array:
-    """(N,) height of the ground under each of the points (N, 3) of a level frame [m].
+    """Return the height (N,) of the ground below each of the points (N, 3) of a level frame [m].
 
-    First a plane through `foot`, the height of the ground below the sensor, by RANSAC (Fischler and Bolles 1981) over
-    the lowest points of the bins of each sector. Then the lowest points are followed outwards in each sector, as roads
-    are not planes; one that leaves the ground before it faster than roads bend is none. After Himmelsbach, von
-    Hundelshausen and Wünsche, Fast segmentation of 3D point clouds for ground vehicles, IV 2010, with lowest points in
-    place of lines. Sectors are centered on the frame's x axis, so that a mirrored scene has mirrored ones.
+    First, a plane through `foot`, the height of the ground below the sensor, is fitted by RANSAC (Fischler and Bolles
+    1981) to the lowest points of the bins of each sector. Then the lowest points are followed outwards in each sector,
+    because roads are not planar. A point that deviates from the ground before it by more than the slope of roads is not
+    ground.
+
+    The method follows Himmelsbach, von Hundelshausen and Wünsche, Fast segmentation of 3D point clouds for ground
+    vehicles, IV 2010, with lowest points instead of lines. Sectors are centered on the x axis of the frame, so that a
+    mirrored scene has mirrored sectors.
     """
     if not len(points):
         return np.empty(0)
@@ -52,7 +56,7 @@ def ground_height(points: Array, foot: float) -> Array:
     offset, where = np.full((SECTORS, bins), np.inf), np.zeros((SECTORS, bins))
     offset.ravel()[cell[low]] = points[low, 2] - plane[low]
     where.ravel()[cell[low]] = distance[low]
-    is_ground = _followed(offset, where)
+    is_ground = _follow_ground(offset, where)
     order = np.argsort(sector, kind="stable")
     bounds = np.searchsorted(sector[order], np.arange(SECTORS + 1))
     for number in range(SECTORS):
@@ -65,14 +69,14 @@ def ground_height(points: Array, foot: float) -> Array:
 
 
 def _lowest(z: Array, cell: Integers) -> Integers:
-    """The row of the lowest point of each cell."""
+    """Return the row of the lowest point of each cell."""
     order = np.lexsort((z, cell))
     first: Integers = order[np.concatenate([[True], np.diff(cell[order]) > 0])]
     return first
 
 
 def _plane(plan: Array, rise: Array) -> Array:
-    """(2,) slopes of the plane through the origin that most of the points (K, 2) with their rises (K,) support."""
+    """Return the slopes (2,) of the plane through the origin that most points (K, 2) with heights (K,) support."""
     if len(plan) < 2:
         return np.zeros(2)
     pairs = generator(0, "ground plane").integers(0, len(plan), size=(TRIALS, 2))
@@ -94,8 +98,8 @@ def _plane(plan: Array, rise: Array) -> Array:
     return best
 
 
-def _followed(offset: Array, where: Array) -> NDArray[np.bool_]:
-    """(SECTORS, bins) whether the lowest point of a bin is ground: offsets from the plane, and distances."""
+def _follow_ground(offset: Array, where: Array) -> NDArray[np.bool_]:
+    """Return whether the lowest point of each bin (SECTORS, bins) is ground, from plane offsets and distances."""
     found = np.zeros(offset.shape, dtype=bool)
     last, at = np.zeros(SECTORS), np.zeros(SECTORS)
     for number in range(offset.shape[1]):

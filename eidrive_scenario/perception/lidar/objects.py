@@ -1,4 +1,4 @@
-"""The road users among the points of a scan; poles are none."""
+"""Road users among the points of a scan; poles are excluded."""
 
 from __future__ import annotations
 
@@ -18,46 +18,45 @@ from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
 
 UNLIKELY = 16.0
-"""Sum of squared deviations from the sizes of its class beyond which a cluster is no road user: with three sizes, one
-in a thousand is beyond."""
+"""Sum of squared size deviations above which a cluster is not a road user: with three sizes, one in a thousand exceeds
+it."""
 DOUBTFUL = 9.0
-"""Beyond this a cluster is looked at again, as it may be several objects close to each other."""
+"""Sum of squared size deviations above which a cluster is split, as it may be several objects close to each other."""
 FEW = 12
-"""A cluster of so few points may show no heading; then that of its lane is looked up."""
+"""Number of points below which the heading of the lane is used, as they may show none."""
 
 
 TOUCHING = 0.2
-"""Boxes this near to each other are taken to touch [m]."""
+"""Distance below which boxes are assumed to touch [m]."""
 
 
 class FittedObject(NamedTuple):
-    """The points of one object, as rows of the scan, and the box around it."""
+    """Points of one object, as rows of the scan, and the box around them."""
 
     rows: Integers
     fit: Fit
 
 
 def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[FittedObject]:
-    """The objects of a scan that have at least so many points.
+    """Return the objects of a scan with at least `min_points` points.
 
-    A cluster that fits no class is taken apart where its points lie apart; clusters whose boxes overlap are put
-    together where one box fits them both.
+    A cluster that fits no class is split at its gaps. Clusters with overlapping boxes are merged if one box fits both.
     """
-    found = _fitted(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
-    whole = [one for one in found if one.fit.deviation <= DOUBTFUL]
+    found = _fit_clusters(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
+    merged = [one for one in found if one.fit.deviation <= DOUBTFUL]
     for doubtful in (one for one in found if one.fit.deviation > DOUBTFUL):
         parts = clusters(scan.points[doubtful.rows], scan.pattern.azimuth, grazing=False)
         pieces = [doubtful.rows[part] for part in parts]
         good = [
             one
-            for one in (_fitted(scan, surroundings, pieces, min_points) if len(parts) > 1 else [])
+            for one in (_fit_clusters(scan, surroundings, pieces, min_points) if len(parts) > 1 else [])
             if one.fit.deviation <= DOUBTFUL
         ]
-        whole += good or [doubtful]
-    return [one for one in _joined(scan, whole) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
+        merged += good or [doubtful]
+    return [one for one in _merge_parts(scan, merged) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
 
 
-def _fitted(scan: Scan, surroundings: MapContext, groups: list[Integers], min_points: int) -> list[FittedObject]:
+def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], min_points: int) -> list[FittedObject]:
     groups = [rows for rows in groups if len(rows) >= min_points]
     headings = np.full(len(groups), np.nan)
     few = [number for number, rows in enumerate(groups) if len(rows) < FEW]
@@ -70,39 +69,39 @@ def _fitted(scan: Scan, surroundings: MapContext, groups: list[Integers], min_po
         if fit is not None:
             found.append(FittedObject(rows, fit))
         elif len(rows) > min_points:
-            found += _taken_apart(scan, rows, min_points)
+            found += _split(scan, rows, min_points)
     return found
 
 
-def _taken_apart(scan: Scan, rows: Integers, min_points: int) -> list[FittedObject]:
-    """The pieces of what is larger than any road user."""
+def _split(scan: Scan, rows: Integers, min_points: int) -> list[FittedObject]:
+    """Return the parts of a cluster that is larger than any road user."""
     parts = [rows[part] for part in clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)]
     fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= min_points]
     return [FittedObject(part, fit) for part, fit in fits if fit is not None]
 
 
-def _joined(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
-    """The same objects, two boxes of which overlap put together where one box fits the points of both.
+def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
+    """Return the objects, with overlapping boxes merged if one box fits the points of both.
 
-    Two bodies cannot be in one place, and hardly ever touch: such boxes are pieces of one that something nearer cuts in
-    two, or that the rays graze so that its points lie far apart.
+    Two bodies cannot overlap, and hardly ever touch. Such boxes are parts of one object that something nearer divides,
+    or that the rays graze so that its points are far apart.
     """
-    whole = list(found)
+    merged = list(found)
     again = True
     while again:
         again = False
-        for one, other in combinations(whole, 2):
-            if overlap(_grown(one.fit.box), other.fit.box):
+        for one, other in combinations(merged, 2):
+            if overlap(_enlarged(one.fit.box), other.fit.box):
                 rows = np.concatenate([one.rows, other.rows])
                 fit = scan.fit(rows, tuple(PRIORS))
                 if fit is not None and fit.deviation <= DOUBTFUL:
-                    whole = [thing for thing in whole if thing is not one and thing is not other]
-                    whole.append(FittedObject(rows, fit))
+                    merged = [kept for kept in merged if kept is not one and kept is not other]
+                    merged.append(FittedObject(rows, fit))
                     again = True
                     break
-    return whole
+    return merged
 
 
-def _grown(box: Sequence[float]) -> Sequence[float]:
+def _enlarged(box: Sequence[float]) -> Sequence[float]:
     x, y, z, length, width, height, yaw = box
     return x, y, z, length + 2.0 * TOUCHING, width + 2.0 * TOUCHING, height, yaw

@@ -1,4 +1,4 @@
-"""What stands on the ground in one sweep of a LiDAR."""
+"""Points of objects above the ground in a lidar point cloud."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from eidrive_scenario.perception.lidar.ground import CLEARANCE, ground_height
 from eidrive_scenario.sensing.readings import LidarReading
 
 NEARER = 0.5
-"""What ends this much before an object, beside it as the sensor sees it, hides a part of it [m]."""
+"""Minimum difference in range of a neighboring object that hides a part of an object [m]."""
 BESIDE = 1.6
-"""How many columns of rays beside its outermost point are looked at for that."""
+"""Number of columns of rays beside the outermost point that are searched for it."""
 OVERHEAD = 0.5
-"""Points this much higher than the largest road user are above the road [m]."""
+"""Height above the tallest road user from which points are ignored [m]."""
 
 
 class Scan:
-    """The points of a sweep without the ground, in the level frame of the sensor.
+    """Points of a lidar reading without the ground, in the level frame of the sensor.
 
     foot   height of the ground below the sensor [m]
-    keep   which places (N, 2) in the world count; all where None
+    keep   function that selects positions (N, 2) in the world; None selects all
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Scan:
 
     @property
     def world(self) -> Array:
-        """(N, 3) the points in the world."""
+        """Points (N, 3) in the world."""
         return np.concatenate([self.frame.to_world(self.points[:, :2]), self.points[:, 2:3]], axis=1)
 
     def fit(
@@ -63,7 +63,7 @@ class Scan:
         heading: float | None = None,
         heading_cost: Callable[[float], float] | None = None,
     ) -> Fit | None:
-        """The box around these points, None where no road user is so large; headings as in `fit_box`."""
+        """Return the box around these points, or None if no road user is so large; headings as in `fit_box`."""
         points = self.points[rows]
         if math.hypot(*np.ptp(points[:, :2], axis=0).tolist()) > math.hypot(LARGEST[0], LARGEST[1]):
             return None
@@ -80,7 +80,7 @@ class Scan:
         )
 
     def _cut(self, rows: Integers) -> tuple[bool, bool]:
-        """Whether the left and the right end of these points lie at the border of the field of view."""
+        """Return whether the left and the right end of these points are at the border of the field of view."""
         border = self.pattern.half_field - BESIDE * self.pattern.azimuth
         if self.pattern.half_field >= math.pi:
             return False, False
@@ -88,7 +88,7 @@ class Scan:
         return bool(bearing.max() > border), bool(bearing.min() < -border)
 
     def _hidden(self, rows: Integers) -> tuple[bool, bool]:
-        """Whether something nearer stands right beside the left and the right end of these points."""
+        """Return whether something nearer is directly beside the left and the right end of these points."""
         turned = wrap_angle(self._bearing - float(self._bearing[rows[len(rows) // 2]]))
         own = turned[rows]
         flags = []

@@ -1,4 +1,4 @@
-"""From boxes in a picture to boxes on the ground, with nothing but the camera and the usual sizes."""
+"""Lifting of image boxes to boxes on the ground, from the camera and prior sizes."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from eidrive_scenario.perception.geometry.size_priors import prior_of
 from eidrive_scenario.sensing.readings import CameraReading
 
 HEADINGS = 12
-"""Headings that are tried, over half a turn."""
+"""Number of tested headings over half a turn."""
 LANE_DEVIATION = math.radians(25.0)
-"""How much vehicles turn away from their lane's direction [rad]."""
+"""Standard deviation between the headings of vehicles and of their lanes [rad]."""
 EDGE_DEVIATION = 1.5
-"""Of the edges of a box from those of the object, standard deviation [px]; a share of the box's size on top."""
+"""Standard deviation between the edges of a box and of the object [px]; EDGE_SHARE of the box size is added."""
 EDGE_SHARE = 0.02
 SHAPE_DEVIATION = 0.08
-"""How far bodies of one size differ in where their edges are: bumpers, mirrors, roofs [m]."""
+"""Standard deviation of the edges of bodies of one size: bumpers, mirrors, roofs [m]."""
 CUT_DEVIATION = 0.35
-"""Of the lower edge of an object that the picture's left or right border cuts: its wheels may be beyond it, and what is
-seen lowest is a bumper or a sill, up to 0.7 m above the ground [m]."""
+"""Standard deviation of the lower edge of an object that the left or right border of the image cuts [m]. Its wheels may
+be outside the image, and its lowest visible part is a bumper or a sill, up to 0.7 m above the ground."""
 AT_BORDER = 2.0
-"""An edge this near to the picture's border is where the picture ends, not the object [px]."""
+"""Distance from the border of the image within which an edge is that of the image, not of the object [px]."""
 HIDDEN_SHARE = 0.8
-"""An edge of which more lies in a nearer box is where that object begins, not where this one ends; else what is left
-of the edge shows where that is."""
+"""Share of an edge in a nearer box above which the edge is that of the nearer object. Below it, the rest of the edge
+shows the end of this object."""
 ROUNDS = 10
 FARTHEST = 300.0
 LEVEL = 0.1
-"""Roads that lie this much higher or lower at an object than was assumed call for another look [m]."""
+"""Change in road height at an object that requires another iteration [m]."""
 LOOKS = 4
 LARGEST_VARIANCE = 2500.0
 
@@ -44,13 +44,13 @@ _OUTWARDS = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
 def _hull(*quarter: tuple[float, float, float]) -> Array:
-    """(4 K, 3) points of a body that is the same to both sides and ends, from those of a quarter of it."""
+    """Return points (4 K, 3) of a symmetric body from those of a quarter of it."""
     signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
     return np.array([(a * x, b * y, z) for x, y, z in quarter for a, b in signs])
 
 
 def _sliced(hull: Array) -> Array:
-    """The points of a hull and those between its two ends: what is cut off has its own outline."""
+    """Return the points of a hull and points between its two ends, as a truncated body has its own outline."""
     rear = hull * (-1.0, 1.0, 1.0)
     return np.concatenate([hull + share * (rear - hull) for share in (0.0, 0.125, 0.25, 0.375, 0.5)])
 
@@ -61,16 +61,16 @@ _CAR = _hull(
 )
 _TALL = _hull((0.35, 0.47, 0.0), (0.5, 0.5, 0.12), (0.5, 0.5, 0.85), (0.47, 0.47, 1.0))
 _HULLS = {"car": _CAR, "van": _TALL, "truck": _TALL, "bus": _TALL}
-"""Outermost points of bodies, in shares of length, width and height. A picture's box ends at the tires, the bumpers and
+"""Outermost points of bodies, in shares of length, width and height. An image box ends at the tires, the bumpers and
 the roof, not at the corners of the box around the body: bumpers end well above the ground and roofs before the ends."""
 
 
 class ByGround(NamedTuple):
-    """What boxes of a picture are in the world.
+    """Image boxes lifted to the world.
 
     boxes       (N, 7) in the world frame [m, rad]
     covariance  (N, 2, 2) of their centers [m²]
-    headings    (N, HEADINGS) of the length, that were tried over half a turn [rad]
+    headings    (N, HEADINGS) tested headings of the length over half a turn [rad]
     costs       (N, HEADINGS) squared errors of the best fit with each, in standard deviations
     """
 
@@ -83,29 +83,29 @@ class ByGround(NamedTuple):
 def lift_by_ground(
     boxes: Array, classes: Sequence[str], camera: CameraReading, *, ground: float, surroundings: MapContext
 ) -> ByGround:
-    """The boxes in the world that fill boxes (N, 4) of a picture [px].
+    """Return boxes in the world whose projections fill image boxes (N, 4) [px].
 
-    Each stands on the ground, has the usual size of its class, and is moved until the outline of its projection has
-    the edges of the given box: least squares over the place (Levenberg and Marquardt) for some headings, of which the
-    one with the least error is taken; where the others lead counts as uncertainty. Of edges at the picture's border
-    only counts that the object goes on there. The front follows the lane where a map is at hand, else it leads away
-    from the camera. Roads' heights come from the map, else they are `ground` [m].
+    Each box stands on the ground and has the usual size of its class. Its position is fitted so that the outline of its
+    projection has the edges of the image box: least squares (Levenberg and Marquardt) for several headings. The heading
+    with the minimum error is selected; the spread over the others adds to the covariance. An edge at the border of the
+    image is only a bound: the object continues there. The front points along the lane if there is a map, else away from
+    the camera. The height of roads is that of the map, else `ground` [m].
     """
     if not len(boxes):
         return ByGround(np.empty((0, 7)), np.empty((0, 2, 2)), np.empty((0, HEADINGS)), np.empty((0, HEADINGS)))
     view = _View(np.asarray(boxes, dtype=float), classes, camera)
-    heights = surroundings.ground(view.far_as_tall(), ground)
+    heights = surroundings.ground(view.positions_by_height(), ground)
     for _ in range(LOOKS):
         found = view.place(heights, surroundings)
-        there = surroundings.ground(found.boxes[:, :2], ground)
-        if np.all(np.abs(there - heights) <= LEVEL):
+        new_heights = surroundings.ground(found.boxes[:, :2], ground)
+        if np.all(np.abs(new_heights - heights) <= LEVEL):
             break
-        heights = there
+        heights = new_heights
     return found
 
 
 class _View:
-    """The boxes of one picture, in the plane at distance 1 from the camera."""
+    """Boxes of one image, in the plane at distance 1 from the camera."""
 
     def __init__(self, boxes: Array, classes: Sequence[str], camera: CameraReading) -> None:
         self._frame, self._turn = level_frame(camera)
@@ -133,7 +133,7 @@ class _View:
         )
 
         self._cut = ~(self._known[:, 0] & self._known[:, 2])
-        """Whether the picture's left or right border cuts the object off."""
+        """Whether the left or right border of the image cuts the object."""
         self._borders = np.where(self._cut[:, None], self._edges[:, [0, 2]], (-np.inf, np.inf))
         self._borders[self._known[:, 0], 0] = -np.inf
         self._borders[self._known[:, 2], 1] = np.inf
@@ -141,7 +141,7 @@ class _View:
         self._lowest = np.where(self._cut, CUT_DEVIATION, 0.0)
 
     def place(self, ground: Array, surroundings: MapContext) -> ByGround:
-        """What the boxes are, for heights (N,) of the ground."""
+        """Return the boxes in the world for ground heights (N,)."""
         count = len(self._sizes)
         start = self._first_guess(ground)
         lane = surroundings.lane_heading(self._frame.to_world(start)) - self._frame.yaw
@@ -149,20 +149,20 @@ class _View:
         base = np.where(on_lane, np.nan_to_num(lane), np.arctan2(start[:, 1], start[:, 0]))
         step = np.pi / HEADINGS * np.arange(HEADINGS)
         headings = base[:, None] + step
-        aside = np.minimum(step, np.pi - step) / LANE_DEVIATION
-        places, errors, informations = self._fitted(start, headings, ground)
-        costs = errors + np.where(on_lane[:, None], aside**2, 0.0)
+        deviation = np.minimum(step, np.pi - step) / LANE_DEVIATION
+        places, errors, informations = self._fit(start, headings, ground)
+        costs = errors + np.where(on_lane[:, None], deviation**2, 0.0)
         best = np.argmin(costs, axis=1)
         rows = np.arange(count)
         weights = np.exp(-0.5 * (costs - costs[rows, best][:, None]))
         weights /= weights.sum(axis=1, keepdims=True)
         place, heading, information = places[rows, best], headings[rows, best], informations[rows, best]
-        apart = places - place[:, None]
-        doubt = np.einsum("nk,nki,nkj->nij", weights, apart, apart)
+        offsets = places - place[:, None]
+        heading_spread = np.einsum("nk,nki,nkj->nij", weights, offsets, offsets)
         along = np.where(on_lane, base, np.arctan2(place[:, 1], place[:, 0]))
         heading = np.where(np.cos(heading - along) < -1e-9, heading + np.pi, heading)
         boxes = np.column_stack([place, ground + self._sizes[:, 2] / 2.0, self._sizes, wrap_angle(heading)])
-        covariance = self._covariance(information, heading) + doubt
+        covariance = self._covariance(information, heading) + heading_spread
         return ByGround(
             self._frame.boxes_to_world(boxes),
             self._frame.covariance_to_world(covariance),
@@ -170,14 +170,14 @@ class _View:
             costs,
         )
 
-    def far_as_tall(self) -> Array:
-        """(N, 2) where the objects are in the world if they are as tall as usual, whatever the ground."""
+    def positions_by_height(self) -> Array:
+        """Return positions (N, 2) in the world for objects of usual height, independent of the ground."""
         left, top, right, bottom = self._edges.T
         rays = np.stack([(left + right) / 2.0, (top + bottom) / 2.0, np.ones(len(left))], axis=1) @ self._turn
         return self._frame.to_world(rays[:, :2] * (self._sizes[:, 2] / np.maximum(bottom - top, 1e-6))[:, None])
 
     def _first_guess(self, ground: Array) -> Array:
-        """(N, 2) where the ray through the lower edge meets the ground, else by the height of the box."""
+        """Return the intersections (N, 2) of the lower edges with the ground, or positions by height."""
         left, top, right, bottom = self._edges.T
         rays = np.stack([(left + right) / 2.0, bottom, np.ones(len(left))], axis=1) @ self._turn
         fall = np.maximum(-rays[:, 2], 1e-9)
@@ -190,19 +190,19 @@ class _View:
         guess: Array = np.stack([np.cos(bearing), np.sin(bearing)], axis=1) * (distance + depth)[:, None]
         return guess
 
-    def _fitted(self, start: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
-        """(N, K, 2) the best place for each heading (N, K), its squared error and (N, K, 2, 2) its information."""
+    def _fit(self, start: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
+        """Return the best position (N, K, 2) for each heading (N, K), its squared error and information matrix."""
         count, tried = headings.shape
         place = np.repeat(start[:, None], tried, axis=1)
         damping = np.full((count, tried), 1e-3)
-        error, gradient, information = self._linearized(place, headings, ground)
+        error, gradient, information = self._linearize(place, headings, ground)
         for _ in range(ROUNDS):
             scaled = information + damping[..., None, None] * _diagonal(information)
             step = np.linalg.solve(scaled, gradient[..., None])[..., 0]
             longest = 0.3 * np.linalg.norm(place, axis=-1) + 0.5
             length = np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
             moved = place + step * np.minimum(1.0, longest / length)[..., None]
-            new_error, new_gradient, new_information = self._linearized(moved, headings, ground)
+            new_error, new_gradient, new_information = self._linearize(moved, headings, ground)
             better = new_error < error
             place = np.where(better[..., None], moved, place)
             error = np.where(better, new_error, error)
@@ -211,11 +211,11 @@ class _View:
             damping = np.clip(np.where(better, damping * 0.2, damping * 8.0), 1e-9, 1e6)
         return place, error, information
 
-    def _linearized(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
-        """Squared error, its negative half gradient and its Gauss-Newton matrix at places (N, K, 2)."""
+    def _linearize(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
+        """Return squared error, its negative half gradient and its Gauss-Newton matrix at positions (N, K, 2)."""
         nudge = 0.01
         tried = place + nudge * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[:, None, None]
-        edges, depth = self._projected(tried, headings, ground)
+        edges, depth = self._project(tried, headings, ground)
         off = self._edges[:, None] - edges[0]
         beyond = ~self._known[:, None] & (off * _OUTWARDS < 0.0)
         weight = np.where(beyond, 0.0, self._weights(depth[0]))
@@ -225,8 +225,8 @@ class _View:
         information = np.einsum("anke,bnke->nkab", slope, slope)
         return np.einsum("nke,nke->nk", residual, residual), gradient, information
 
-    def _projected(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array]:
-        """(3, N, K, 4) edges of the projections, and (3, N, K) depths of the centers."""
+    def _project(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array]:
+        """Return edges (3, N, K, 4) of the projections, and depths (3, N, K) of the centers."""
         corners = self._hulls * self._sizes[:, None]
         cos, sin = np.cos(headings)[..., None], np.sin(headings)[..., None]
         x = cos * corners[:, None, :, 0] - sin * corners[:, None, :, 1] + place[..., 0:1]
@@ -239,16 +239,16 @@ class _View:
         u, v = across / ahead, down / ahead
         top, bottom = v.min(axis=-1), v.max(axis=-1)
         if self._cut.any():
-            # What the border cuts off shows neither top nor bottom: only points within the picture count.
-            shown = (u >= self._borders[:, None, None, 0]) & (u <= self._borders[:, None, None, 1])
-            some = shown.any(axis=-1)
-            top = np.where(some, np.where(shown, v, np.inf).min(axis=-1), top)
-            bottom = np.where(some, np.where(shown, v, -np.inf).max(axis=-1), bottom)
+            # Parts outside the border show neither top nor bottom: only points within the image count.
+            is_visible = (u >= self._borders[:, None, None, 0]) & (u <= self._borders[:, None, None, 1])
+            any_visible = is_visible.any(axis=-1)
+            top = np.where(any_visible, np.where(is_visible, v, np.inf).min(axis=-1), top)
+            bottom = np.where(any_visible, np.where(is_visible, v, -np.inf).max(axis=-1), bottom)
         edges = np.stack([u.min(axis=-1), top, u.max(axis=-1), bottom], axis=-1)
         return edges, ahead.mean(axis=-1)
 
     def _weights(self, depth: Array) -> Array:
-        """(N, K, 4) one over the standard deviation of each edge: of the box, and of the usual size."""
+        """Return the inverse standard deviation (N, K, 4) of each edge, from the box and the prior size."""
         across = self._deviations[:, 1, None] / 2.0 / depth
         upwards = self._deviations[:, 2, None] / depth
         blur = np.hypot(self._blur[:, None], SHAPE_DEVIATION / depth)
@@ -257,7 +257,8 @@ class _View:
         return np.stack([sides, 1.0 / np.hypot(blur, upwards), sides, 1.0 / lowest], axis=-1)
 
     def _covariance(self, information: Array, heading: Array) -> Array:
-        """(N, 2, 2) of the centers: of the fit, and of half the length and width that are not seen."""
+        """Return covariances (N, 2, 2) of the centers: of the fit, and of the half length and width that are not
+        visible."""
         values, vectors = np.linalg.eigh(information)
         variances = np.minimum(1.0 / np.maximum(values, 1.0 / LARGEST_VARIANCE), LARGEST_VARIANCE)
         fit = np.einsum("nij,nj,nkj->nik", vectors, variances, vectors)
@@ -268,8 +269,10 @@ class _View:
 
 
 def _behind_others(boxes: Array) -> NDArray[np.bool_]:
-    """(N, 4) which edges of boxes (N, 4) lie where another box hides the object: one that reaches lower in the picture,
-    so is nearer, and that the edge lies in along most of its length."""
+    """Return which edges (N, 4) of boxes (N, 4) are where another box hides the object.
+
+    The other box extends lower in the image, so it is nearer, and contains most of the length of the edge.
+    """
     low, high = boxes[:, :2], boxes[:, 2:]
     size = np.maximum(high - low, 1e-6)
     nearer = high[None, :, 1] > high[:, None, 1] + EDGE_DEVIATION
@@ -288,5 +291,5 @@ def _behind_others(boxes: Array) -> NDArray[np.bool_]:
 
 
 def _diagonal(matrices: Array) -> Array:
-    """The same matrices (..., 2, 2) without what is off the diagonal, and with at least a trace of it."""
+    """Return the diagonals of matrices (..., 2, 2) as matrices, with a positive lower bound."""
     return np.maximum(matrices, 1e-9) * np.eye(2)

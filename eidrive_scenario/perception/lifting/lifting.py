@@ -1,4 +1,4 @@
-"""From boxes in a picture to boxes in the world."""
+"""Lifting of image boxes to boxes in the world."""
 
 from __future__ import annotations
 
@@ -24,32 +24,33 @@ from eidrive_scenario.perception.lifting.ground import AT_BORDER, ByGround, lift
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
 LEAST_POINTS = 2
-"""Of a cluster that can be the object in a box."""
+"""Minimum number of points of a cluster that may be the object in a box."""
 MARGIN = 0.1
-"""Points this far beside a box may belong to its object, as a share of the box's size: so exact are detectors, and what
-a LiDAR's rays meet is not quite what a camera sees."""
+"""Margin around a box in which points may belong to its object, as a share of the box size. It covers errors of
+detectors and differences between lidar returns and the image."""
 MOST_TRIED = 3
-"""Clusters of which boxes are fitted, for each box of the picture."""
+"""Maximum number of clusters to which boxes are fitted, for each image box."""
 LEAST_DEVIATION, LARGEST_DEVIATION = 0.1, 0.4
-"""Of the logarithm of the distance that a box leads to expect."""
+"""Minimum and maximum standard deviation of the logarithm of the distance expected from a box."""
 LEAST_OVERLAP = 0.3
-"""Of a box from points, seen by the camera, with the box in the picture (intersection over union)."""
+"""Minimum overlap of the projected box from points with the image box (intersection over union)."""
 GATE = 3.0
-"""Clusters at a distance that differs by more deviations are not the object."""
+"""Maximum deviation of the distance of a cluster from the expected one, in standard deviations."""
 DOUBTFUL = 9.0
-"""Sum of squared deviations from the sizes of its class up to which points suit it."""
+"""Sum of squared size deviations up to which points fit the class."""
 BODY_DEVIATION = 0.15
-"""Of the center of a body from that of the rectangle around the points on it: bumpers, mirrors and wheel arches [m]."""
+"""Standard deviation between the centers of a body and of the rectangle around its points: bumpers, mirrors and wheel
+arches [m]."""
 UNLIKELY = 60.0
-"""Sum of squared deviations from the sizes of its class beyond which points are not believed to be the object."""
+"""Sum of squared size deviations above which points are not the object."""
 UNLIKELY_HEADING = 9.0
-"""Cost of a heading that the picture and the map rule out, as squared standard deviations."""
+"""Cost of a heading that image and map exclude, as squared standard deviations."""
 MAY_BE: Mapping[str, tuple[str, ...]] = {
     "car": ("car", "van"),
     "truck": ("truck", "van", "bus"),
     "bus": ("bus", "truck"),
 }
-"""Sizes that are looked for where a detector of pictures says a class: such detectors know few classes."""
+"""Classes whose sizes are tested for each class of an image detector: such detectors distinguish few classes."""
 
 
 def lift(
@@ -64,20 +65,20 @@ def lift(
     surroundings: MapContext | None = None,
     pattern: Pattern | None = None,
 ) -> Detections:
-    """The objects in the world that a detector of pictures saw, one for each box, in the order given.
+    """Return the objects in the world that an image detector detected, one for each box, in the given order.
 
     boxes    (N, 4) left, top, right, bottom [px]; classes  out of eidrive_scenario.detections.CLASSES
-    lidar    a sweep of the same tick; None: by the ground plane alone
-    time     when the picture was taken [s]
-    ground   height of the ground below the sensors [m]: that of the station's reference point
+    lidar    reading of the same tick; None: from the ground plane alone
+    time     of the image [s]
+    ground   height of the ground below the sensors [m]: that of the reference point of the station
     surroundings  the map, for the direction of lanes and the height of roads
-    pattern  of the LiDAR's rays; by its points where None
+    pattern  of the lidar rays; None: estimated from the points
 
-    With a LiDAR, its points without the ground are projected into the picture. Those in and close to a box, and beyond
-    the picture's border where that cuts the box off, are clustered. The object is the cluster with many points in the
-    box, about where `lift_by_ground` expects it, of which an L-shape fit makes a box that has the size of the class and
-    fills the picture's; pieces that lie in that box belong to it. A box without such points stands on the ground where
-    `lift_by_ground` puts it. Velocities are unknown.
+    With a lidar, its points without the ground are projected into the image. Points in and close to a box are
+    clustered; if the border of the image cuts the box, points beyond the border are included. The object is a cluster
+    with many points in the box, near the distance that `lift_by_ground` expects. Its L-shape fit has the size of the
+    class and fills the image box. Other clusters within the fitted box belong to the object. A box without such points
+    is placed by `lift_by_ground`. Velocities are unknown.
     """
     boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
     surroundings = surroundings or MapContext(None)
@@ -85,7 +86,7 @@ def lift(
     lifted, covariance = by_ground.boxes, by_ground.covariance
     if lidar is not None and len(boxes):
         scan = Scan(lidar, pattern or pattern_from_points(lidar.points), ground)
-        for row, fit in enumerate(_by_points(boxes, classes, camera, scan, by_ground)):
+        for row, fit in enumerate(_fit_points(boxes, classes, camera, scan, by_ground)):
             if fit is not None:
                 lifted[row] = scan.frame.boxes_to_world(np.array([fit.box]))[0]
                 covariance[row] = scan.frame.covariance_to_world(fit.covariance[None])[0]
@@ -100,10 +101,10 @@ def lift(
     )
 
 
-def _by_points(
+def _fit_points(
     boxes: Array, classes: Sequence[str], camera: CameraReading, scan: Scan, by_ground: ByGround
 ) -> list[Fit | None]:
-    """What the points in each box say of its object."""
+    """Return the fits to the points in each box, None for boxes without an object in the points."""
     places, _ = pixels(scan.world, camera)
     behind = np.isnan(places[:, 0])
     aside = (scan.world[behind] - camera.pose[:3, 3]) @ camera.pose[:3, 0]
@@ -130,17 +131,17 @@ def _by_points(
             bool(box[0] <= AT_BORDER or box[2] >= camera.rgb.shape[1] - AT_BORDER),
         )
         fit = _foreground(scan, camera, target, places, away)
-        found.append(None if fit is None else replace(fit, covariance=_honest(fit, scan, target, camera)))
+        found.append(None if fit is None else replace(fit, covariance=_total_covariance(fit, scan, target, camera)))
     return found
 
 
-def _honest(fit: Fit, scan: Scan, target: _Target, camera: CameraReading) -> Array:
-    """(2, 2) covariance of a fit with what it leaves unexplained [m²]: bodies are no boxes, and camera and points
-    disagree.
+def _total_covariance(fit: Fit, scan: Scan, target: _Target, camera: CameraReading) -> Array:
+    """Return the covariance (2, 2) of a fit including unmodeled errors [m²]: bodies are not boxes, and camera and
+    points differ.
 
-    Where sizes are unusual, it grows by the Birge ratio, the squared deviations over their number. Where the points
-    are not at the place that the picture leads to expect, they may be those of something else: two hypotheses, equally
-    likely at worst, spread by a quarter of the squared distance between them.
+    For unusual sizes it is scaled by the Birge ratio, the squared deviations over their number. If the points are not
+    at the position expected from the image, they may belong to another object: two hypotheses, equally likely at worst,
+    have a spread of a quarter of their squared distance.
     """
     box = target.box
     spread = fit.covariance * max(1.0, fit.deviation / 3.0) + BODY_DEVIATION**2 * np.eye(2)
@@ -165,15 +166,15 @@ def _honest(fit: Fit, scan: Scan, target: _Target, camera: CameraReading) -> Arr
 
 
 class _Target(NamedTuple):
-    """The object that is looked for.
+    """Object of an image box that is searched in the points.
 
-    box      in the picture [px];  classes  that it may be
-    distance from the camera at which it should be [m], and the deviation of the logarithm of that
-    depth    from the points that are seen of it to its middle, about [m]
-    heading  in the level frame, where the points are too few to show one [rad]
-    first    of the headings that were tried, evenly over half a turn [rad];  costs  of each, the least is 0
-    center   where its middle should be (2,) [m];  covariance  of that (2, 2) [m²]; both in the level frame
-    cut      whether the picture's border cuts its left or right side off
+    box      in the image [px];  classes  possible classes
+    distance expected from the camera [m], and the standard deviation of its logarithm
+    depth    from the visible points of the object to its center, approximately [m]
+    heading  in the level frame, used if there are too few points to determine one [rad]
+    first    first of the tested headings, evenly over half a turn [rad];  costs  of each, the minimum is 0
+    center   expected center (2,) [m];  covariance  of it (2, 2) [m²]; both in the level frame
+    cut      whether the border of the image cuts its left or right side
     """
 
     box: list[float]
@@ -189,14 +190,19 @@ class _Target(NamedTuple):
     cut: bool
 
     def agreement(self, fit: Fit) -> float:
-        """How well a box agrees with where the object should be, 1 at best: Cauchy's density of the squared distance
-        in units of both covariances, as either may be of something else."""
+        """Return the agreement of a box with the expected center, at most 1.
+
+        It is Cauchy's density of the squared distance in units of both covariances, as either may belong to another
+        object.
+        """
         off = np.array(fit.box[:2]) - self.center
         return 1.0 / (1.0 + 0.5 * float(off @ np.linalg.solve(self.covariance + fit.covariance, off)))
 
     def heading_cost(self, heading: float) -> float:
-        """What the picture and the map say against a heading, between those that were tried; UNLIKELY_HEADING at most:
-        shapes differ, and vehicles turn."""
+        """Return the cost of a heading by image and map, interpolated between tested headings.
+
+        The maximum is UNLIKELY_HEADING, because shapes differ and vehicles turn.
+        """
         count = len(self.costs)
         place = (heading - self.first) % math.pi / math.pi * count
         row, part = int(place), place - int(place)
@@ -204,8 +210,10 @@ class _Target(NamedTuple):
         return min(cost, UNLIKELY_HEADING)
 
     def likelihood(self, distance: float) -> float:
-        """How well something at this distance [m] agrees with what is expected, 1 at best; 0 beyond the gate, but where
-        so little of the object is in the picture that nothing certain can be expected."""
+        """Return the agreement of a distance [m] with the expected one, at most 1.
+
+        It is 0 outside the gate, except for objects that the border cuts, whose distance is not certain.
+        """
         off = math.log(max(distance + self.depth, 0.5) / self.distance) / self.deviation
         if abs(off) <= GATE:
             return math.exp(-0.5 * off * off)
@@ -213,8 +221,8 @@ class _Target(NamedTuple):
 
 
 class _Candidate(NamedTuple):
-    """Points that may be the object, as rows of the scan; how many of them are in its box, and that times the
-    likelihood of their distance."""
+    """Points that may be the object, as rows of the scan; their number in the box, and that times the distance
+    likelihood."""
 
     rows: Integers
     inside: int
@@ -222,10 +230,10 @@ class _Candidate(NamedTuple):
 
 
 def _foreground(scan: Scan, camera: CameraReading, target: _Target, places: Array, away: Array) -> Fit | None:
-    """The box of the object among the points in and about a box of the picture; None where there is none.
+    """Return the box of the object among the points in and around an image box, or None.
 
-    places   (N, 2) of all points of the scan in the picture, those behind the camera infinitely far beside it [px]
-    away     (N,) their distance from the camera [m]
+    places   (N, 2) image positions of all points of the scan [px]; infinitely far aside for points behind the camera
+    away     (N,) distances from the camera [m]
     """
     inside = _within(places, target.box)
     rows = np.flatnonzero(_within(places, _widened(target.box, camera)))
@@ -240,14 +248,14 @@ def _foreground(scan: Scan, camera: CameraReading, target: _Target, places: Arra
             fit = scan.fit(candidate.rows, target.classes, target.heading, target.heading_cost)
             if fit is None:
                 continue
-            fit = _with_pieces(scan, candidate, fit, candidates, target)
-            filled = _filled(fit, scan, target.box, camera)
+            fit = _merge_parts(scan, candidate, fit, candidates, target)
+            image_overlap = _image_overlap(fit, scan, target.box, camera)
             count = candidate.inside if target.cut else candidate.weight
-            score = count * target.agreement(fit) * filled / (1.0 + fit.deviation / DOUBTFUL)
+            score = count * target.agreement(fit) * image_overlap / (1.0 + fit.deviation / DOUBTFUL)
             if fit.deviation <= UNLIKELY and score > 0.0 and (best is None or score > best[0]):
                 best = score, fit
         if best is not None and best[1].deviation <= DOUBTFUL:
-            break  # else parts of what the rays graze may lie apart
+            break  # otherwise parts of a grazed surface may be separate clusters
         tried.update(group.tobytes() for group in groups)
     return None if best is None else best[1]
 
@@ -255,7 +263,7 @@ def _foreground(scan: Scan, camera: CameraReading, target: _Target, places: Arra
 def _candidates(
     groups: Sequence[Integers], inside: NDArray[np.bool_], away: Array, target: _Target
 ) -> list[_Candidate]:
-    """The groups of points that may be the object, the likeliest first."""
+    """Return the groups of points that may be the object, the likeliest first."""
     found = []
     for group in groups:
         count = int(inside[group].sum())
@@ -266,20 +274,22 @@ def _candidates(
     return sorted(found, key=lambda candidate: -candidate.weight)
 
 
-def _with_pieces(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_Candidate], target: _Target) -> Fit:
-    """The fit with those other clusters that lie in its box, where one box suits them all as well; and where the points
-    alone are no such object, with those that make one of them."""
+def _merge_parts(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_Candidate], target: _Target) -> Fit:
+    """Return the fit merged with other clusters in its box if one box fits all of them.
+
+    If the points alone fit no class, other clusters are merged that make a plausible object.
+    """
     for other in others:
         if not np.intersect1d(other.rows, candidate.rows).size:
-            piece = scan.fit(other.rows, target.classes, target.heading, target.heading_cost)
-            near = piece is not None and overlap(fit.box, piece.box)
+            part_fit = scan.fit(other.rows, target.classes, target.heading, target.heading_cost)
+            near = part_fit is not None and overlap(fit.box, part_fit.box)
             if near or fit.deviation > DOUBTFUL:
                 rows = np.concatenate([candidate.rows, other.rows])
-                whole = scan.fit(rows, target.classes, target.heading, target.heading_cost)
+                merged = scan.fit(rows, target.classes, target.heading, target.heading_cost)
                 limit = max(fit.deviation, DOUBTFUL) if near else DOUBTFUL
-                if whole is not None and whole.deviation <= limit:
+                if merged is not None and merged.deviation <= limit:
                     candidate = _Candidate(rows, candidate.inside + other.inside, candidate.weight)
-                    fit = whole
+                    fit = merged
     return fit
 
 
@@ -290,7 +300,7 @@ def _within(places: Array, box: Sequence[float]) -> NDArray[np.bool_]:
 
 
 def _widened(box: Sequence[float], camera: CameraReading) -> tuple[float, float, float, float]:
-    """A box with its margin; without an end where the picture ends."""
+    """Return a box with its margin; unbounded at edges on the border of the image."""
     left, top, right, bottom = box
     height, width = camera.rgb.shape[:2]
     across, down = MARGIN * (right - left), MARGIN * (bottom - top)
@@ -302,9 +312,11 @@ def _widened(box: Sequence[float], camera: CameraReading) -> tuple[float, float,
     )
 
 
-def _filled(fit: Fit, scan: Scan, box: Sequence[float], camera: CameraReading) -> float:
-    """How much of a box of the picture a box of the world fills, seen by the camera: intersection over union; 0 where
-    that is too little, 1 where it reaches behind the camera, and so out of the picture on several sides."""
+def _image_overlap(fit: Fit, scan: Scan, box: Sequence[float], camera: CameraReading) -> float:
+    """Return the intersection over union of a projected world box and an image box.
+
+    0 below LEAST_OVERLAP; 1 if the box extends behind the camera, so that it leaves the image on several sides.
+    """
     outline, _ = pixels(box_corners(scan.frame.boxes_to_world(np.array([fit.box])))[0], camera)
     if np.isnan(outline).any():
         return 1.0

@@ -40,7 +40,7 @@ class MotionModel(ABC):
 
     @abstractmethod
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
-        """Return initial estimates from boxes (N, 7), velocities (N, 2), NaN if unknown, and position noise (N, 2, 2)."""
+        """Return initial estimates from boxes (N, 7), velocities (N, 2) or NaN, and position noise (N, 2, 2)."""
 
     @abstractmethod
     def predict(self, tracks: Estimates, step: float) -> Estimates:

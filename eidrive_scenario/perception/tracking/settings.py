@@ -43,9 +43,8 @@ class TrackerSettings(Settings):
             n, m = self.confirm
             raise ValueError(f"confirm: n exceeds m (got [{n}, {m}]; expected [n, m] with n <= m)")
         if self.delete_existence > self.confirm_existence:
-            raise ValueError(
-                f"delete_existence exceeds confirm_existence (got {self.delete_existence:g} and {self.confirm_existence:g})"
-            )
+            delete, confirm = self.delete_existence, self.confirm_existence
+            raise ValueError(f"delete_existence exceeds confirm_existence (got {delete:g} and {confirm:g})")
         return self
 
 

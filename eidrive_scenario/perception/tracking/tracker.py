@@ -58,8 +58,8 @@ class Tracker:
     def update(self, detections: Detections, in_view: Callable[[Array], Array] | None = None) -> Detections:
         """Return the confirmed objects at the time of these detections, with velocities, covariances and track numbers.
 
-        in_view  returns the share (N,) in [0, 1] of boxes (N, 7) that the sensors can show; None: all of them. An object
-                 out of view is not expected to be detected.
+        in_view  returns the share (N,) in [0, 1] of boxes (N, 7) that the sensors can show; None: all of them.
+                 An object out of view is not expected to be detected.
 
         Raise ValueError if the detections are older than those of the last call.
         """
@@ -174,7 +174,7 @@ class Tracker:
             self._histories = [self._histories[row] for row in kept]
 
     def predict(self, time: float) -> Detections | None:
-        """Return the confirmed objects predict to a time [s] after the last detections.
+        """Return the confirmed objects predicted to a time [s] after the last detections.
 
         None before the first detections, and more than `coast` after the last ones.
         """

@@ -1,4 +1,4 @@
-"""Cars around a station in the world, from wherever and mirrored."""
+"""Scenes of vehicles around a station, with sensor readings of the simulated world."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class Thing:
         return np.array([self.x, self.y, self.size[2] / 2, *self.size, self.yaw])
 
     def turned(self, angle: float) -> Thing:
-        """The same in a scene turned about the origin."""
+        """Return the object in a scene rotated about the origin."""
         cos, sin = math.cos(angle), math.sin(angle)
         return Thing(self.name, cos * self.x - sin * self.y, sin * self.x + cos * self.y, self.yaw + angle, self.kind)
 
     def mirrored(self) -> Thing:
-        """The same in a scene mirrored at the x axis."""
+        """Return the object in a scene mirrored at the x axis."""
         return Thing(self.name, self.x, -self.y, -self.yaw, self.kind)
 
 
@@ -68,7 +68,7 @@ MAST = ActorSpec("Mast", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
 def readings(
     things: list[Thing], sensors: Mapping[str, SensorSettings], *, mast: tuple[float, float, float] | None = None
 ) -> Readings:
-    """What the first of the things sees at time 0, or a mast at x, y, yaw."""
+    """Return the readings of the first object at time 0, or of a mast at x, y, yaw."""
     with World(None, dt=0.05) as world:
         station = spec_of(things[0]) if mast is None else MAST
         if mast is not None:
@@ -80,7 +80,7 @@ def readings(
 
 @dataclass(frozen=True)
 class Street:
-    """The tools of this folder's tests."""
+    """Helpers for the tests of this folder."""
 
     thing = Thing
     readings = staticmethod(readings)

@@ -1,4 +1,4 @@
-"""L-shapes, sizes and what is not seen."""
+"""Fit of L-shapes and boxes, with completion of hidden parts."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ CLASSES = ("car", "van", "truck", "bus", "motorbike", "bicycle", "pedestrian")
 
 
 def outline(x: float, y: float, length: float, width: float, yaw: float, step: float = 0.1) -> np.ndarray:
-    """Points on the sides of a rectangle that face the origin."""
+    """Return points on the sides of a rectangle that face the origin."""
     along, across = (np.arange(-size / 2, size / 2 + 1e-9, step) for size in (length, width))
     sides = [(np.column_stack([along, np.full(len(along), s * width / 2)]), (0.0, s)) for s in (1.0, -1.0)] + [
         (np.column_stack([np.full(len(across), s * length / 2), across]), (s, 0.0)) for s in (1.0, -1.0)
     ]
     turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-    seen = []
+    visible = []
     for points, normal in sides:
         placed = points @ turn.T + (x, y)
         if (turn @ normal) @ placed.mean(axis=0) < 0.0:
-            seen.append(placed)
-    return np.concatenate(seen)
+            visible.append(placed)
+    return np.concatenate(visible)
 
 
 def standing(plan: np.ndarray, height: float) -> np.ndarray:
-    """The same points at several heights up to a top."""
+    """Return the points at several heights up to a top."""
     levels = np.linspace(0.3, height, 5)
     return np.concatenate([np.column_stack([plan, np.full(len(plan), level)]) for level in levels])
 
 
-def fitted(points: np.ndarray, **options: object) -> Fit:
+def fit(points: np.ndarray, **options: object) -> Fit:
     given = {"sensor_height": 1.9, "ground": 0.0, "pattern": PATTERN, "classes": CLASSES}
     return fit_box(points, **{**given, **options})  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("degrees", [0, 10, 25, 44, 46, 70, 89])
-def test_the_heading_of_an_l(degrees: int) -> None:
+def test_rectangles_of_l_shape_return_its_heading(degrees: int) -> None:
     shape = rectangles(outline(12, 4, 4.6, 1.8, math.radians(degrees)))[0]
     off = math.degrees(shape.yaw) - degrees
     assert (off + 45) % 90 - 45 == pytest.approx(0.0, abs=0.51)
 
 
-def test_noise_moves_the_heading_little() -> None:
+def test_rectangles_with_noise_have_small_heading_error() -> None:
     rng = np.random.default_rng(5)
     offs = []
     for degrees in range(5, 85, 5):
@@ -71,10 +71,12 @@ def test_noise_moves_the_heading_little() -> None:
     ],
 )
 @pytest.mark.parametrize("degrees", [20, 60])
-def test_classes_and_boxes_of_whole_objects(name: str, size: tuple[float, float, float], degrees: int) -> None:
+def test_fit_box_of_complete_object_returns_class_and_box(
+    name: str, size: tuple[float, float, float], degrees: int
+) -> None:
     length, width, height = size
     dense = Pattern(math.radians(0.1), math.radians(0.1), math.radians(15.0))
-    found = fitted(standing(outline(14, 3, length, width, math.radians(degrees)), height), pattern=dense)
+    found = fit(standing(outline(14, 3, length, width, math.radians(degrees)), height), pattern=dense)
     assert found.name == name
     assert math.dist(found.box[:2], (14, 3)) < 0.2
     assert found.box[3:6] == pytest.approx(size, abs=0.25)
@@ -83,10 +85,10 @@ def test_classes_and_boxes_of_whole_objects(name: str, size: tuple[float, float,
         assert (off + 90) % 180 - 90 == pytest.approx(0.0, abs=2.0)
 
 
-def test_a_rear_alone_is_completed_away_from_the_sensor() -> None:
-    """Only the rear of a car straight ahead, 1.85 m wide at x = 15: the center lies half a usual length behind it."""
+def test_fit_box_of_rear_is_completed_away_from_sensor() -> None:
+    """Only the rear of a car straight ahead, 1.85 m wide at x = 15: the center is half a usual length behind it."""
     rear = np.column_stack([np.full(19, 15.0), np.linspace(-0.925, 0.925, 19)])
-    found = fitted(standing(rear, 1.5))
+    found = fit(standing(rear, 1.5))
     assert found.name == "car"
     assert found.box[0] == pytest.approx(15.0 + 2.3, abs=0.05)
     assert found.box[1] == pytest.approx(0.0, abs=0.02)
@@ -95,11 +97,11 @@ def test_a_rear_alone_is_completed_away_from_the_sensor() -> None:
     assert found.covariance[1, 1] < 0.01
 
 
-def test_what_is_hidden_is_completed_behind_what_hides_it() -> None:
-    """The front 2 m of a car that crosses from the left, its rest behind a truck: the hidden end is the left one."""
+def test_fit_box_hidden_end_is_completed_behind_occluder() -> None:
+    """The front 2 m of a car that crosses from the left; a truck hides the rest, so the left end is hidden."""
     flank = np.column_stack([np.full(21, 20.0), np.linspace(-1.0, 1.0, 21)])
     left, right, none = (
-        fitted(standing(flank, 1.5), hidden=flags, classes=("car",))
+        fit(standing(flank, 1.5), hidden=flags, classes=("car",))
         for flags in ((True, False), (False, True), (False, False))
     )
     assert left.box[1] == pytest.approx(-1.0 + 2.3, abs=0.1)
@@ -107,65 +109,65 @@ def test_what_is_hidden_is_completed_behind_what_hides_it() -> None:
     assert none.box[1] == pytest.approx(0.0, abs=0.05)
 
 
-def test_body_cut_by_field_of_view_is_completed_beyond_it() -> None:
-    """The near end of a truck's flank, 3 m of 8.2 m, parallel to the sensor's heading on the left: the rest is behind.
+def test_fit_box_cut_by_field_of_view_is_completed_beyond_it() -> None:
+    """The near end of a truck's flank, 3 m of 8.2 m, parallel to the sensor heading on the left; the rest is behind.
 
-    The end that faces the sensor is where it is; only the other one goes on beyond the field of view.
+    The end that faces the sensor is fixed; only the other end extends beyond the field of view.
     """
     rear = np.column_stack([np.full(14, 6.0), np.linspace(3.0, 5.6, 14)])
     flank = np.column_stack([np.linspace(6.0, 9.0, 16), np.full(16, 3.0)])
-    # Seen from the origin the flank leads away to the right of the rear; the field of view ends at its right end.
+    # Viewed from the origin, the flank is to the right of the rear; the field of view ends at its right end.
     points = standing(np.concatenate([rear, flank]), 3.4)
-    whole = fitted(points, classes=("truck",), sensor_height=1.9)
-    cut = fitted(points, classes=("truck",), cut=(False, True), sensor_height=1.9)
+    whole = fit(points, classes=("truck",), sensor_height=1.9)
+    cut = fit(points, classes=("truck",), cut=(False, True), sensor_height=1.9)
     assert cut.box[3] == pytest.approx(8.2, abs=0.1)
     assert cut.box[0] == pytest.approx(6.0 + 4.1, abs=0.1)
     assert cut.box[4] == pytest.approx(2.6, abs=0.1)
     assert cut.box[0] > whole.box[0] + 1.5
     assert cut.covariance[0, 0] > (1.2 / 2.0) ** 2 * 0.9
-    other = fitted(points * (1, -1, 1), classes=("truck",), cut=(True, False), sensor_height=1.9)
+    other = fit(points * (1, -1, 1), classes=("truck",), cut=(True, False), sensor_height=1.9)
     np.testing.assert_allclose(np.array(other.box[:2]) * (1, -1), cut.box[:2], atol=1e-9)
 
 
-def test_headings_as_likely_as_each_other_widen_the_covariance() -> None:
-    """A rear of 2.5 m alone may be a truck seen from behind, or the cut end of its flank: centers 2.8 m apart."""
+def test_fit_box_with_ambiguous_heading_has_larger_covariance() -> None:
+    """A rear of 2.5 m alone may be a truck from behind, or the cut end of its flank: centers 2.8 m apart."""
     rear = np.column_stack([np.full(19, 15.0), np.linspace(-1.25, 1.25, 19)])
-    known = fitted(
+    known = fit(
         standing(rear, 3.4),
         classes=("truck",),
         hidden=(True, False),
         heading_cost=lambda yaw: 40.0 * math.sin(yaw) ** 2,
     )
-    open_ = fitted(standing(rear, 3.4), classes=("truck",), hidden=(True, False), heading_cost=lambda yaw: 0.0)
+    open_ = fit(standing(rear, 3.4), classes=("truck",), hidden=(True, False), heading_cost=lambda yaw: 0.0)
     assert np.trace(open_.covariance) > np.trace(known.covariance) + 1.0
 
 
-def test_few_points_take_the_heading_that_is_known() -> None:
-    """Three points above each other 40 m away, on a lane that leads north-east."""
+def test_fit_box_of_few_points_uses_given_heading() -> None:
+    """Three points above each other 40 m away, on a lane to the north-east."""
     column = np.array([[40.0, 0.0, z] for z in (0.4, 0.8, 1.2)])
-    known = fitted(column, heading=math.radians(45), classes=("car",))
-    unknown = fitted(column, classes=("car",))
+    known = fit(column, heading=math.radians(45), classes=("car",))
+    unknown = fit(column, classes=("car",))
     assert math.degrees(known.box[6]) == pytest.approx(45.0)
     assert unknown.box[6] == pytest.approx(0.0)
     assert unknown.covariance[0, 0] > known.covariance[0, 0]
 
 
-def test_two_things_that_no_body_spans_do_not_fit() -> None:
-    """Cars 6 m apart, side by side, taken for one cluster: 8 m wide and 1.5 m high is nothing."""
+def test_fit_box_of_two_objects_has_large_deviation() -> None:
+    """Two cars side by side, 6 m apart, in one cluster: no class is 8 m wide and 1.5 m high."""
     both = np.concatenate([outline(20, y, 4.6, 1.85, 0.0) for y in (-3, 3)])
-    assert fitted(standing(both, 1.5)).deviation > 16.0
-    assert fitted(standing(outline(20, 3, 4.6, 1.85, 0.0), 1.5)).deviation < 3.0
+    assert fit(standing(both, 1.5)).deviation > 16.0
+    assert fit(standing(outline(20, 3, 4.6, 1.85, 0.0), 1.5)).deviation < 3.0
 
 
-def test_a_mirrored_object_has_a_mirrored_box() -> None:
+def test_fit_box_of_mirrored_points_is_mirrored() -> None:
     points = standing(outline(14, 3, 4.6, 1.85, 0.6), 1.5)
-    one, other = fitted(points), fitted(points * (1, -1, 1))
+    one, other = fit(points), fit(points * (1, -1, 1))
     np.testing.assert_allclose(np.array(one.box) * (1, -1, 1, 1, 1, 1, -1), other.box, atol=1e-9)
     np.testing.assert_allclose(one.covariance * [[1, -1], [-1, 1]], other.covariance, atol=1e-9)
 
 
-def test_its_uncertainty_covers_its_errors() -> None:
-    """Cars of usual, varied sizes seen from all sides with sparse rays: their squared Mahalanobis distances."""
+def test_fit_box_covariance_is_consistent_with_errors() -> None:
+    """Squared Mahalanobis distances for cars of varied sizes from all sides with sparse rays."""
     rng = np.random.default_rng(8)
     distances = []
     for _ in range(150):
@@ -180,7 +182,7 @@ def test_its_uncertainty_covers_its_errors() -> None:
         if len(plan) < 3:
             continue
         points = standing(plan + rng.normal(0, 0.02, plan.shape), 1.5)
-        found = fitted(points, pattern=Pattern(step, math.radians(1.3), math.radians(10)), classes=("car",))
+        found = fit(points, pattern=Pattern(step, math.radians(1.3), math.radians(10)), classes=("car",))
         off = np.array(found.box[:2]) - (x, y)
         distances.append(float(off @ np.linalg.solve(found.covariance, off)))
     assert len(distances) > 100
@@ -191,21 +193,21 @@ def test_its_uncertainty_covers_its_errors() -> None:
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("hidden", [(False, False), (False, True), (True, False), (True, True)])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_fit_box_grazed_flank_lies_behind_the_seen_side(side: float, hidden: tuple[bool, bool], seed: int) -> None:
-    """A truck stands with its flank 0.6 m beside the line of sight ahead: nothing of it can be on the sensor's side."""
+def test_fit_box_of_grazed_flank_is_behind_visible_side(side: float, hidden: tuple[bool, bool], seed: int) -> None:
+    """A truck with its flank 0.6 m beside the line of sight: no part of it is on the side of the sensor."""
     rng = np.random.default_rng(seed)
     plan = np.column_stack([np.linspace(3.6, 5.0, 12), np.full(12, side * 0.6)]) + rng.normal(0.0, 0.004, (12, 2))
-    found = fitted(standing(plan, 3.0), hidden=hidden if side > 0.0 else hidden[::-1], classes=("truck",))
+    found = fit(standing(plan, 3.0), hidden=hidden if side > 0.0 else hidden[::-1], classes=("truck",))
     across = abs(math.sin(found.box[6])) * found.box[3] + abs(math.cos(found.box[6])) * found.box[4]
     assert side * found.box[1] - across / 2.0 == pytest.approx(0.6, abs=0.1)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_fit_box_single_column_beside_an_occluder_extends_behind_it(seed: int) -> None:
+def test_fit_box_of_single_column_beside_occluder_extends_behind_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     plan = np.array([[20.0, 0.0]] * 4) + rng.normal(0.0, 0.01, (4, 2))
     left, right = (
-        fitted(standing(plan, 1.5), hidden=flags, classes=("car",), heading=math.pi / 2.0)
+        fit(standing(plan, 1.5), hidden=flags, classes=("car",), heading=math.pi / 2.0)
         for flags in ((True, False), (False, True))
     )
     assert left.box[1] == pytest.approx(2.3, abs=0.1)

@@ -16,7 +16,7 @@ from eidrive_scenario.perception.tracking.tracker import Tracker
 @pytest.mark.parametrize("detection", [0.3, 0.9])
 @pytest.mark.parametrize("misses", [1, 2, 5])
 def test_missed_repeated_equals_bayes_in_one_step(detection: float, misses: int) -> None:
-    """k misses of an object that exists have the probability (1 - p)^k, of none 1: Bayes' rule in one go."""
+    """k misses have the probability (1 - p)^k if the object exists, else 1: Bayes' rule in one step."""
     prior = 0.7
     existence = np.array([prior])
     for _ in range(misses):
@@ -25,24 +25,24 @@ def test_missed_repeated_equals_bayes_in_one_step(detection: float, misses: int)
     assert existence[0] == pytest.approx(prior * unseen / (prior * unseen + 1.0 - prior))
 
 
-def test_missed_outside_the_view_changes_nothing() -> None:
+def test_missed_outside_view_returns_equal_existence() -> None:
     np.testing.assert_allclose(missed(np.array([0.0, 0.3, 1.0]), 0.0), [0.0, 0.3, 1.0])
 
 
-def test_detected_multiplies_the_odds() -> None:
+def test_detected_multiplies_odds_by_ratio() -> None:
     prior, ratio = np.array([0.2, 0.5]), np.array([6.0, 0.5])
     after = detected(prior, ratio)
     np.testing.assert_allclose(after / (1.0 - after), prior / (1.0 - prior) * ratio)
     np.testing.assert_allclose(detected(np.array([0.0, 1.0]), np.array([9.0, 0.1])), [0.0, 1.0])
 
 
-def test_detected_and_missed_do_not_depend_on_their_order() -> None:
+def test_detected_and_missed_commute() -> None:
     one = missed(detected(np.array([0.4]), np.array([5.0])))
     other = detected(missed(np.array([0.4])), np.array([5.0]))
     assert one[0] == pytest.approx(other[0])
 
 
-def test_survived_is_the_same_in_one_step_and_in_many() -> None:
+def test_survived_in_many_steps_equals_one_step() -> None:
     once = survived(np.array([0.8]), 0.6, 5.0)
     often = np.array([0.8])
     for _ in range(6):
@@ -51,8 +51,8 @@ def test_survived_is_the_same_in_one_step_and_in_many() -> None:
     assert often[0] == pytest.approx(once[0])
 
 
-def test_likelihood_ratio_is_that_of_ipda() -> None:
-    """1 - p + p g / c with g = 1 / (2 pi 0.25) at the center of a covariance of 0.25 I, and c by the birth odds."""
+def test_likelihood_ratio_equals_ipda_formula() -> None:
+    """1 - p + p g / c with g = 1 / (2 pi 0.25) at the center of a covariance of 0.25 I, and c from the birth odds."""
     detection, birth, score = 0.8, 0.02, 0.6
     clutter = birth * detection * (1.0 - score) / score
     density = 1.0 / (2.0 * math.pi * 0.25)
@@ -63,10 +63,10 @@ def test_likelihood_ratio_is_that_of_ipda() -> None:
 
 
 def test_existence_of_simulated_tracks_is_calibrated() -> None:
-    """Standing objects and false detections, drawn by the model that the tracker assumes, in cells of 4 m x 4 m.
+    """Stationary objects and false detections, drawn from the model that the tracker assumes.
 
-    Of all tracks with an existence in a bin, the share with a true object lies within 0.1 of the mean existence. Births
-    have density b, false detections c = b p (1 - s) / s, objects live 2 s on average, as the settings state.
+    Of all tracks with an existence in a bin, the share with a true object is within 0.1 of the mean existence. Births
+    have density b, false detections c = b p (1 - s) / s, and objects live 2 s on average, as the settings state.
     """
     rng = np.random.default_rng(3)
     detection, score, scans, birth, lifetime, step = 0.6, 0.3, 400, 2e-4, 2.0, 0.1

@@ -1,4 +1,4 @@
-"""The networks: shapes, encoding, assignment, folding, and that they can learn."""
+"""Networks: shapes, encoding, assignment, folding, and training."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from eidrive_scenario.perception.learned.networks.ssd import (  # noqa: E402
 )
 from eidrive_scenario.perception.learned.networks.ssd_loss import (  # noqa: E402
     BACKGROUND,
-    NOT_ASKED,
+    UNLABELED,
     SsdLoss,
     hardest,
     match,
@@ -61,16 +61,16 @@ def two_objects(boxes: list[list[float]], classes: list[int]) -> Targets:
     return Targets(torch.tensor([boxes]), torch.tensor([classes]))
 
 
-def test_shapes_and_sizes() -> None:
-    pictures = torch.zeros(2, 3, 128, 256)
-    outputs = yolo()(pictures)
+def test_networks_have_documented_output_shapes_and_sizes() -> None:
+    images = torch.zeros(2, 3, 128, 256)
+    outputs = yolo()(images)
     assert [tuple(output.shape) for output in outputs] == [
         (2, 3, 16, 32, 16),
         (2, 3, 8, 16, 16),
         (2, 3, 4, 8, 16),
     ]
     assert yolo().decode(outputs).shape == (2, 3 * (16 * 32 + 8 * 16 + 4 * 8), 16)
-    encoded, logits = ssd()(pictures)
+    encoded, logits = ssd()(images)
     count = BOXES_PER_CELL * sum((128 // stride) * (256 // stride) for stride in STRIDES)
     assert encoded.shape == (2, count, 4)
     assert logits.shape == (2, count, 12)
@@ -79,7 +79,7 @@ def test_shapes_and_sizes() -> None:
     assert sum(value.numel() for value in ssd().parameters()) < 1.2e6
 
 
-def test_overlap_measures_by_hand() -> None:
+def test_iou_and_ciou_equal_hand_calculation() -> None:
     a, b = torch.tensor([[5.0, 5.0, 10.0, 10.0]]), torch.tensor([[10.0, 5.0, 10.0, 10.0]])
     assert pairwise_iou(corners(a), corners(b)).item() == pytest.approx(1 / 3)
     # same shape, centers 5 apart, hull 15 x 10: CIoU = 1/3 - 25/325
@@ -93,7 +93,7 @@ def test_overlap_measures_by_hand() -> None:
     torch.testing.assert_close(centered(corners(other)), other)
 
 
-def test_encoding_and_decoding_of_boxes() -> None:
+def test_decode_inverts_encode() -> None:
     defaults = default_boxes(128, 256)
     boxes = defaults * torch.tensor([1.0, 1.0, 1.3, 0.7]) + torch.tensor([3.0, -2.0, 0.0, 0.0])
     torch.testing.assert_close(decode(encode(boxes, defaults), defaults), boxes)
@@ -101,7 +101,7 @@ def test_encoding_and_decoding_of_boxes() -> None:
     torch.testing.assert_close(by_hand, torch.tensor([[2.0, 0.0, math.log(2.0) / 0.2, 0.0]]))
 
 
-def test_a_cell_that_answers_can_say_the_box() -> None:
+def test_yolo_assigned_cells_can_represent_box() -> None:
     network = yolo()
     target = two_objects([[61.0, 45.0, 30.0, 20.0]], [2])
     for scale, stride in enumerate((8, 16, 32)):
@@ -122,72 +122,72 @@ def test_a_cell_that_answers_can_say_the_box() -> None:
             torch.testing.assert_close(boxes, corners(target.boxes[0]), atol=1e-3, rtol=0.0)
             assert scores.item() == pytest.approx(1.0, abs=1e-6)
             assert classes.item() == 2
-            whole = network.decode(raw)[0]
-            torch.testing.assert_close(whole[whole[:, 4] > 0.5][0, :4], target.boxes[0, 0], atol=1e-3, rtol=0.0)
-    # center 7.625, 5.625 in cells of 8: its own cell and the ones to the right and below, for both anchors of like size
+            decoded = network.decode(raw)[0]
+            torch.testing.assert_close(decoded[decoded[:, 4] > 0.5][0, :4], target.boxes[0, 0], atol=1e-3, rtol=0.0)
+    # Center 7.625, 5.625 in cells of 8: its cell and those to the right and below, for all anchors of similar size
     fine = assign(target, network.anchors[0], 8, 16, 32)
     cells = {(int(line), int(column)) for line, column in zip(fine.line, fine.column, strict=True)}
     assert cells == {(5, 7), (5, 8), (6, 7)}
     assert set(fine.anchor.tolist()) == {0, 1, 2}
 
 
-def test_anchors_of_unlike_size_do_not_answer() -> None:
+def test_yolo_assign_excludes_anchors_of_different_size() -> None:
     network = yolo()
     large = two_objects([[128.0, 64.0, 200.0, 110.0]], [1])
     assert len(assign(large, network.anchors[0], 8, 16, 32).classes) == 0
     assert len(assign(large, network.anchors[2], 32, 4, 8).classes) > 0
 
 
-def test_default_boxes_answer_by_overlap_and_the_best_one_always() -> None:
+def test_ssd_match_assigns_by_overlap_and_always_the_best_box() -> None:
     defaults = torch.tensor([[50.0, 50.0, 20.0, 20.0], [56.0, 50.0, 20.0, 20.0], [100.0, 50.0, 20.0, 20.0]])
     # overlaps of the object: 1, 14/26 = 0.54, 0; the second object overlaps nothing by half
     row, label = match(two_objects([[50.0, 50.0, 20.0, 20.0], [112.0, 50.0, 20.0, 20.0]], [3, 5]), defaults)
     assert label.tolist() == [[4, 4, 6]]
     assert row.tolist() == [[0, 0, 1]]
     _, label = match(two_objects([[50.0, 50.0, 20.0, 20.0], [100.0, 50.0, 60.0, 60.0]], [3, IGNORED]), defaults)
-    assert label.tolist() == [[4, 4, NOT_ASKED]]
+    assert label.tolist() == [[4, 4, UNLABELED]]
     _, label = match(two_objects([[0.0, 0.0, 0.0, 0.0]], [PADDING]), defaults)
     assert label.tolist() == [[BACKGROUND] * 3]
 
 
-def test_the_hardest_negatives_are_three_for_each_positive() -> None:
+def test_ssd_hardest_selects_three_negatives_per_positive() -> None:
     loss = torch.tensor([[9.0, 1.0, 5.0, 4.0, 3.0, 2.0]])
-    label = torch.tensor([[2, BACKGROUND, BACKGROUND, NOT_ASKED, BACKGROUND, BACKGROUND]])
+    label = torch.tensor([[2, BACKGROUND, BACKGROUND, UNLABELED, BACKGROUND, BACKGROUND]])
     assert hardest(loss, label).tolist() == [[False, False, True, False, True, True]]
 
 
-def test_ignored_objects_ask_nothing_of_their_cells() -> None:
+def test_yolo_loss_excludes_cells_of_ignored_objects() -> None:
     network = yolo()
     outputs = [torch.zeros(1, 3, 128 // s, 256 // s, 16) for s in (8, 16, 32)]
-    nothing = YoloLoss(network)(outputs, two_objects([[0.0, 0.0, 0.0, 0.0]], [PADDING]))[1]["object"]
-    whole = YoloLoss(network)(outputs, two_objects([[128.0, 64.0, 256.0, 128.0]], [IGNORED]))[1]["object"]
-    half = YoloLoss(network)(outputs, two_objects([[64.0, 64.0, 128.0, 128.0]], [IGNORED]))[1]["object"]
-    assert whole == 0.0
-    assert half == pytest.approx(nothing / 2, rel=1e-6)
+    none_ignored = YoloLoss(network)(outputs, two_objects([[0.0, 0.0, 0.0, 0.0]], [PADDING]))[1]["object"]
+    all_ignored = YoloLoss(network)(outputs, two_objects([[128.0, 64.0, 256.0, 128.0]], [IGNORED]))[1]["object"]
+    half_ignored = YoloLoss(network)(outputs, two_objects([[64.0, 64.0, 128.0, 128.0]], [IGNORED]))[1]["object"]
+    assert all_ignored == 0.0
+    assert half_ignored == pytest.approx(none_ignored / 2, rel=1e-6)
 
 
-def picture_and_targets() -> tuple[torch.Tensor, Targets]:
-    """Two colored rectangles on two noisy grounds."""
+def images_and_targets() -> tuple[torch.Tensor, Targets]:
+    """Return two images of two colored rectangles on noise, and their targets."""
     draws = torch.Generator().manual_seed(3)
-    picture = 0.2 * torch.rand(2, 3, 128, 256, generator=draws)
+    image = 0.2 * torch.rand(2, 3, 128, 256, generator=draws)
     for left, top, right, bottom, channel in ((20, 25, 60, 55, 0), (90, 65, 110, 115, 1)):
-        picture[:, channel, top:bottom, left:right] = 1.0
+        image[:, channel, top:bottom, left:right] = 1.0
     one = two_objects([[40.0, 40.0, 40.0, 30.0], [100.0, 90.0, 20.0, 50.0]], [0, 5])
-    return picture, Targets(one.boxes.repeat(2, 1, 1), one.classes.repeat(2, 1))
+    return image, Targets(one.boxes.repeat(2, 1, 1), one.classes.repeat(2, 1))
 
 
 @pytest.mark.parametrize("name", ["yolov5", "ssd"])
-def test_a_network_learns_a_picture_by_heart(name: str) -> None:
+def test_network_overfits_single_image_and_fold_preserves_outputs(name: str) -> None:
     network = yolo() if name == "yolov5" else ssd()
     loss_of = YoloLoss(network) if isinstance(network, YoloV5) else SsdLoss(default_boxes(128, 256))
     for module in network.modules():
         if isinstance(module, torch.nn.BatchNorm2d):
             module.momentum = 0.2
-    picture, targets = picture_and_targets()
+    image, targets = images_and_targets()
     optimizer = torch.optim.AdamW(network.parameters(), 2e-3)
     losses = []
     for _ in range(60):
-        loss, parts = loss_of(network(picture), targets)
+        loss, parts = loss_of(network(image), targets)
         assert loss.item() == pytest.approx(sum(parts.values()), rel=1e-4)
         optimizer.zero_grad()
         loss.backward()
@@ -196,9 +196,9 @@ def test_a_network_learns_a_picture_by_heart(name: str) -> None:
     assert losses[-1] < 0.35 * losses[0]
     network.eval()
     with torch.no_grad():
-        before = network(picture)
+        before = network(image)
         fold(network)
-        after = network(picture)
+        after = network(image)
         for first, second in zip(before, after, strict=True):
             torch.testing.assert_close(first, second, atol=2e-3, rtol=1e-3)
         found = (
@@ -208,7 +208,7 @@ def test_a_network_learns_a_picture_by_heart(name: str) -> None:
         )
     boxes, scores, classes = found
     for box, number in zip(corners(targets.boxes[0]), (0, 5), strict=True):
-        own = classes == number
-        assert own.any()
-        best = boxes[own][scores[own].argmax()]
+        of_class = classes == number
+        assert of_class.any()
+        best = boxes[of_class][scores[of_class].argmax()]
         assert pairwise_iou(best[None], box[None]).item() > 0.6

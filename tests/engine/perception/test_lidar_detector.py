@@ -1,4 +1,4 @@
-"""The detector from LiDAR alone, on sweeps of the simulated world."""
+"""Detector `lidar` on point clouds of the simulated world."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from eidrive_scenario.world.actor import Placement
 CLEAN = LidarSettings(range_noise=0.0)
 
 
-def detected(readings: Readings, **settings: Any) -> Detections:
+def detect(readings: Readings, **settings: Any) -> Detections:
     return LidarDetector(LidarDetectorSettings(**settings)).detect(readings)
 
 
@@ -37,9 +37,10 @@ def nearest(found: Detections, box: np.ndarray) -> int:
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_what_stands_around_is_found(street: Any, noise: float) -> None:
-    """A car ahead, an oncoming one, one that crosses, a truck, a pedestrian: all found where they are, nothing else."""
-    things = [
+def test_detect_mixed_scene_returns_all_objects(street: Any, noise: float) -> None:
+    """A car ahead, an oncoming one, a crossing one, a truck and a pedestrian are detected at their positions, and
+    nothing else."""
+    objects = [
         street.thing("Ego", 0, 0),
         street.thing("Ahead", 15, 0),
         street.thing("Oncoming", 16, 4.5, math.pi),
@@ -47,9 +48,9 @@ def test_what_stands_around_is_found(street: Any, noise: float) -> None:
         street.thing("Truck", -14, 5, 0.3, "truck"),
         street.thing("Walker", 7, 5, 0, "pedestrian"),
     ]
-    found = detected(street.readings(things, {"roof": LidarSettings(range_noise=noise)}))
+    found = detect(street.readings(objects, {"roof": LidarSettings(range_noise=noise)}))
     assert len(found) == 5
-    for thing in things[1:]:
+    for thing in objects[1:]:
         row = nearest(found, thing.box)
         assert found.classes[row] == thing.kind
         assert math.dist(found.boxes[row, :2], thing.box[:2]) < 0.5
@@ -64,20 +65,23 @@ def test_what_stands_around_is_found(street: Any, noise: float) -> None:
 
 @pytest.mark.parametrize("distance", [8.0, 16.0, 24.0, 32.0])
 @pytest.mark.parametrize("degrees", [0, 35, 90])
-def test_a_car_is_found_at_all_distances(street: Any, distance: float, degrees: float) -> None:
-    """The far side is not seen: the center is off by half of what the car is longer than the usual 4.6 m, of which
-    three standard deviations are 0.5 m."""
+def test_detect_car_at_distance_has_small_position_error(street: Any, distance: float, degrees: float) -> None:
+    """The far side is not visible.
+
+    The center error is half of the excess of the car over the usual 4.6 m, of which three standard deviations are 0.5
+    m.
+    """
     car = street.thing("Car", distance, 2.0, math.radians(degrees))
-    found = detected(street.readings([street.thing("Ego", 0, 0), car], {"roof": LidarSettings()}))
+    found = detect(street.readings([street.thing("Ego", 0, 0), car], {"roof": LidarSettings()}))
     row = nearest(found, car.box)
     assert math.dist(found.boxes[row, :2], car.box[:2]) < 0.5
 
 
-def test_an_empty_street_is_empty(street: Any) -> None:
-    assert len(detected(street.readings([street.thing("Ego", 0, 0)], {"roof": LidarSettings()}))) == 0
+def test_detect_empty_street_returns_no_objects(street: Any) -> None:
+    assert len(detect(street.readings([street.thing("Ego", 0, 0)], {"roof": LidarSettings()}))) == 0
 
 
-def test_a_mast_is_no_road_user(street: Any) -> None:
+def test_detect_ignores_mast(street: Any) -> None:
     """5 m high and 0.3 m wide, 12 m ahead."""
     ego = street.thing("Ego", 0, 0)
     with World(None, dt=0.05) as world:
@@ -85,33 +89,33 @@ def test_a_mast_is_no_road_user(street: Any) -> None:
         world.add(street.mast, Placement(12, 2))
         readings = Rig(street.spec(ego), {"roof": LidarSettings()}, seed=1).read(world, world.view())
     assert np.count_nonzero(readings.lidars["roof"].points[:, 2] > -1.0) > 5
-    assert len(detected(readings)) == 0
+    assert len(detect(readings)) == 0
 
 
-def test_a_mast_sees_the_ground_at_its_foot_and_cars_from_above(street: Any) -> None:
+def test_detect_from_mast_returns_cars(street: Any) -> None:
     cars = [street.thing("A", 12, 3, 0.4), street.thing("B", -8, -15, 2.0)]
     readings = street.readings(cars, {"roof": LidarSettings()}, mast=(0.0, 0.0, 1.0))
-    sweep = readings.lidars["roof"]
-    ground = (sweep.points @ sweep.pose[:3, :3].T + sweep.pose[:3, 3])[:, 2]
+    cloud = readings.lidars["roof"]
+    ground = (cloud.points @ cloud.pose[:3, :3].T + cloud.pose[:3, 3])[:, 2]
     assert np.count_nonzero(np.abs(ground) < 0.1) > 1000
-    found = detected(readings)
+    found = detect(readings)
     assert len(found) == 2
     for car in cars:
         row = nearest(found, car.box)
         assert iou_bev(found.boxes[row : row + 1], car.box[None])[0, 0] > 0.6
 
 
-def test_a_car_that_comes_out_from_behind_a_truck_is_completed_behind_it(street: Any) -> None:
-    """Only its front half is in sight: the box reaches behind the truck, and does not end where the sight ends."""
-    things = [
+def test_detect_partly_hidden_car_is_completed_behind_truck(street: Any) -> None:
+    """Only its front half is visible: the box extends behind the truck."""
+    objects = [
         street.thing("Ego", 0, 0),
         street.thing("Truck", 12, 6.0, math.pi / 2, "truck"),
         street.thing("Car", 20, 1.4, -math.pi / 2),
     ]
-    found = detected(street.readings(things, {"roof": CLEAN}))
-    row = nearest(found, things[2].box)
+    found = detect(street.readings(objects, {"roof": CLEAN}))
+    row = nearest(found, objects[2].box)
     assert found.classes[row] == "car"
-    assert math.dist(found.boxes[row, :2], things[2].box[:2]) < 0.8
+    assert math.dist(found.boxes[row, :2], objects[2].box[:2]) < 0.8
 
 
 SCENE = [
@@ -126,8 +130,8 @@ def sorted_rows(boxes: np.ndarray) -> np.ndarray:
     return boxes[np.lexsort(np.round(boxes[:, :2], 1).T)]
 
 
-def same_boxes(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
-    """Equal as rectangles, but for rounding; a heading may point either way."""
+def assert_same_boxes(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
+    """Assert that rectangles are equal except for rounding; headings may be opposite."""
     assert found.shape == expected.shape
     found, expected = sorted_rows(found), sorted_rows(expected)
     np.testing.assert_allclose(found[:, :6], expected[:, :6], atol=tolerance)
@@ -137,30 +141,30 @@ def same_boxes(found: np.ndarray, expected: np.ndarray, tolerance: float) -> Non
 
 @pytest.mark.parametrize("detector", [LidarDetector, OracleDetector])
 @pytest.mark.parametrize("degrees", [30.0, 137.0, -90.0])
-def test_a_turned_scene_has_turned_detections(street: Any, detector: Any, degrees: float) -> None:
-    """The whole scene turned about the origin, station and all."""
+def test_detect_rotated_scene_returns_rotated_boxes(street: Any, detector: Any, degrees: float) -> None:
+    """The whole scene is rotated about the origin, including the station."""
     angle = math.radians(degrees)
-    things = [street.thing("Ego", 1.0, 2.0, 0.1), *(street.thing(*entry) for entry in SCENE)]
+    objects = [street.thing("Ego", 1.0, 2.0, 0.1), *(street.thing(*entry) for entry in SCENE)]
     sensors = {"roof": CLEAN, "truth": TruthSettings()}
-    before = detector().detect(street.readings(things, sensors))
-    after = detector().detect(street.readings([thing.turned(angle) for thing in things], sensors))
+    before = detector().detect(street.readings(objects, sensors))
+    after = detector().detect(street.readings([thing.turned(angle) for thing in objects], sensors))
     assert len(before) == 4
     expected = before.boxes.copy()
     expected[:, 0] = math.cos(angle) * before.boxes[:, 0] - math.sin(angle) * before.boxes[:, 1]
     expected[:, 1] = math.sin(angle) * before.boxes[:, 0] + math.cos(angle) * before.boxes[:, 1]
     expected[:, 6] += angle
-    same_boxes(after.boxes, expected, 1e-9)
+    assert_same_boxes(after.boxes, expected, 1e-9)
     assert sorted(after.classes) == sorted(before.classes)
 
 
 @pytest.mark.parametrize("detector", [LidarDetector, OracleDetector])
-def test_a_mirrored_scene_has_mirrored_detections(street: Any, detector: Any) -> None:
-    things = [street.thing("Ego", 1.0, 2.0, 0.1), *(street.thing(*entry) for entry in SCENE)]
+def test_detect_mirrored_scene_returns_mirrored_boxes(street: Any, detector: Any) -> None:
+    objects = [street.thing("Ego", 1.0, 2.0, 0.1), *(street.thing(*entry) for entry in SCENE)]
     sensors = {"roof": CLEAN, "truth": TruthSettings()}
-    before = detector().detect(street.readings(things, sensors))
-    after = detector().detect(street.readings([thing.mirrored() for thing in things], sensors))
+    before = detector().detect(street.readings(objects, sensors))
+    after = detector().detect(street.readings([thing.mirrored() for thing in objects], sensors))
     assert len(before) == 4
-    same_boxes(after.boxes, before.boxes * (1, -1, 1, 1, 1, 1, -1), 1e-9)
+    assert_same_boxes(after.boxes, before.boxes * (1, -1, 1, 1, 1, 1, -1), 1e-9)
     assert sorted(after.classes) == sorted(before.classes)
 
 
@@ -172,56 +176,56 @@ ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="10
 </road></OpenDRIVE>"""
 
 
-def test_with_a_map_only_what_is_on_roads_counts_and_lanes_tell_front_from_back(street: Any) -> None:
-    """A road along x with a lane each way, a car on each, and one 10 m beside it."""
-    things = [
+def test_detect_with_map_uses_roads_and_lane_directions(street: Any) -> None:
+    """A road along x with a lane in each direction, a car on each, and one 10 m beside it."""
+    objects = [
         street.thing("Ego", -20, -1.75),
         street.thing("Lead", -2, -1.75),
         street.thing("Oncoming", 4, 1.75, math.pi),
         street.thing("Beside", -5, 11),
     ]
-    readings = street.readings(things, {"roof": CLEAN})
+    readings = street.readings(objects, {"roof": CLEAN})
     detector = LidarDetector()
-    detector.setup(DetectorContext(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
+    detector.setup(DetectorContext(street.spec(objects[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
     found = detector.detect(readings)
     assert len(found) == 2
-    assert math.cos(found.boxes[nearest(found, things[1].box), 6]) > 0.99
-    assert math.cos(found.boxes[nearest(found, things[2].box), 6]) < -0.99
+    assert math.cos(found.boxes[nearest(found, objects[1].box), 6]) > 0.99
+    assert math.cos(found.boxes[nearest(found, objects[2].box), 6]) < -0.99
     everywhere = LidarDetector(LidarDetectorSettings(off_road=None))
-    everywhere.setup(DetectorContext(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
+    everywhere.setup(DetectorContext(street.spec(objects[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
     assert len(everywhere.detect(readings)) == 3
 
 
-def test_two_sensors_of_one_station_do_not_count_twice(street: Any) -> None:
-    things = [street.thing("Ego", 0, 0), street.thing("Ahead", 15, 0)]
-    one = street.readings(things, {"roof": CLEAN})
-    both = street.readings(things, {"roof": CLEAN, "front": replace_mount(CLEAN)})
-    assert len(detected(one)) == len(detected(both)) == 1
+def test_detect_with_two_lidars_returns_each_object_once(street: Any) -> None:
+    objects = [street.thing("Ego", 0, 0), street.thing("Ahead", 15, 0)]
+    one = street.readings(objects, {"roof": CLEAN})
+    both = street.readings(objects, {"roof": CLEAN, "front": replace_mount(CLEAN)})
+    assert len(detect(one)) == len(detect(both)) == 1
 
 
 def replace_mount(settings: LidarSettings) -> LidarSettings:
     return settings.model_copy(update={"mount": "front"})
 
 
-def test_parts_of_a_revolution_are_put_together(street: Any) -> None:
-    """Half a revolution each tick: the car behind is seen in the other half, and known in both ticks."""
+def test_detect_accumulates_parts_of_revolution(street: Any) -> None:
+    """Half a revolution per tick: the car behind is in the other half, and is detected in both ticks."""
     half = LidarSettings(range_noise=0.0, rotation=10.0)
-    things = [street.thing("Ego", 0, 0), street.thing("Ahead", 12, 0), street.thing("Behind", -12, 0)]
-    readings = street.readings(things, {"roof": half})
-    sweep = readings.lidars["roof"]
-    ahead = sweep.points[:, 0] > 0
+    objects = [street.thing("Ego", 0, 0), street.thing("Ahead", 12, 0), street.thing("Behind", -12, 0)]
+    readings = street.readings(objects, {"roof": half})
+    cloud = readings.lidars["roof"]
+    ahead = cloud.points[:, 0] > 0
     halves = [
         replace(
-            sweep,
-            points=sweep.points[side],
-            intensity=sweep.intensity[side],
-            ring=sweep.ring[side],
-            azimuth=sweep.azimuth[side],
+            cloud,
+            points=cloud.points[side],
+            intensity=cloud.intensity[side],
+            ring=cloud.ring[side],
+            azimuth=cloud.azimuth[side],
         )
         for side in (ahead, ~ahead)
     ]
     detector = LidarDetector()
-    detector.setup(DetectorContext(street.spec(things[0]), {"roof": half}))
+    detector.setup(DetectorContext(street.spec(objects[0]), {"roof": half}))
     counts = [
         len(detector.detect(replace(readings, time=tick * 0.05, lidars={"roof": halves[tick % 2]})))
         for tick in range(4)
@@ -229,19 +233,19 @@ def test_parts_of_a_revolution_are_put_together(street: Any) -> None:
     assert counts == [1, 2, 2, 2]
 
 
-def test_the_pattern_can_be_read_from_the_points(street: Any) -> None:
+def test_pattern_from_points_equals_pattern_from_settings(street: Any) -> None:
     settings = LidarSettings(range_noise=0.0)
-    sweep = street.readings([street.thing("Ego", 0, 0), street.thing("Ahead", 15, 0)], {"roof": settings}).lidars[
+    cloud = street.readings([street.thing("Ego", 0, 0), street.thing("Ahead", 15, 0)], {"roof": settings}).lidars[
         "roof"
     ]
-    known, read = pattern_from_settings(settings), pattern_from_points(sweep.points)
+    known, read = pattern_from_settings(settings), pattern_from_points(cloud.points)
     assert read.azimuth == pytest.approx(known.azimuth, rel=0.01)
     assert read.elevation == pytest.approx(known.elevation, rel=0.01)
     assert known.azimuth == pytest.approx(2 * math.pi / 156)
     assert known.elevation == pytest.approx(math.radians(40 / 31))
 
 
-def test_level_frames_there_and_back() -> None:
+def test_level_frame_to_local_inverts_to_world() -> None:
     frame = LevelFrame(3.0, -2.0, 1.9, 0.7)
     plan = np.array([[5.0, 1.0], [-4.0, 8.0]])
     np.testing.assert_allclose(frame.to_local(frame.to_world(plan)), plan)

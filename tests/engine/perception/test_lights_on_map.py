@@ -1,4 +1,4 @@
-"""Which traffic light of the map a box in a picture shows, and what its lamps show."""
+"""Association of image boxes with traffic lights of the map, and lamp states."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ TRUCK = ActorSpec("Truck", "truck", "truck", (8.3, 2.5, 3.55), (2.5, 0.0, 1.78),
 
 
 def before(roads: RoadNetwork, signal: str, distance: float, aside: float = 0.0) -> np.ndarray:
-    """Pose of a camera so far before a signal, 1.5 m above its foot's road, that looks the way the signal faces."""
+    """Return the pose of a camera at a distance before a signal, 1.5 m above the road, that faces the signal."""
     head = next(head for head in signal_heads(roads) if head.signal.id == signal)
     heading, pose = head.pose.h + math.pi, np.eye(4)
     cos, sin = math.cos(heading), math.sin(heading)
@@ -46,7 +46,7 @@ def before(roads: RoadNetwork, signal: str, distance: float, aside: float = 0.0)
     return pose
 
 
-def photograph(
+def take_image(
     roads: RoadNetwork,
     pose: np.ndarray,
     states: dict[str, str],
@@ -54,8 +54,8 @@ def photograph(
     others: Sequence[tuple[ActorSpec, Placement]] = (),
 ) -> CameraReading:
     with World(roads) as world:
-        for spec, there in others:
-            world.add(spec, there)
+        for spec, placement in others:
+            world.add(spec, placement)
         if weather is not None:
             world.set_weather(weather)
         world.set_display_state(states, {})
@@ -79,48 +79,48 @@ NOTHING = found([], [], ())
 
 @pytest.mark.parametrize("weather", [None, NIGHT, RAIN], ids=["day", "night", "rain"])
 @pytest.mark.parametrize("state", ["red", "redYellow", "yellow", "green"])
-def test_lamps_are_read_where_the_map_has_the_light(state: str, weather: Weather | None) -> None:
-    """No box of a network says that there is a light. The library's roads are not among the pictures trained on."""
-    camera = photograph(CROSSING, before(CROSSING, "10", 18.0, aside=2.0), {"10": state}, weather)
+def test_read_without_boxes_returns_lamp_states_at_map_positions(state: str, weather: Weather | None) -> None:
+    """No network box indicates the light. The roads of the library are not in the training images."""
+    camera = take_image(CROSSING, before(CROSSING, "10", 18.0, aside=2.0), {"10": state}, weather)
     assert SignalReading("10", state) in LightsOnMap(CROSSING).read({"camera": NOTHING}, {"camera": camera})
 
 
-def test_a_light_that_shows_nothing_is_off_and_a_hidden_one_is_not_read() -> None:
+def test_read_dark_light_is_off_and_hidden_light_is_missing() -> None:
     pose = before(CROSSING, "10", 16.0)
-    free = photograph(CROSSING, pose, {"10": ""})
+    free = take_image(CROSSING, pose, {"10": ""})
     assert SignalReading("10", "off") in LightsOnMap(CROSSING).read({"camera": NOTHING}, {"camera": free})
     x, y = (pose[:2, 3] + 9.0 * pose[:2, 2]).tolist()
     across = Placement(x, y, yaw=math.atan2(pose[1, 0], pose[0, 0]))
     for state in ("red", "green"):
-        hidden = photograph(CROSSING, pose, {"10": state}, others=[(TRUCK, across)])
-        seen = LightsOnMap(CROSSING).read({"camera": NOTHING}, {"camera": hidden})
-        assert "10" not in {reading.id for reading in seen}
+        hidden = take_image(CROSSING, pose, {"10": state}, others=[(TRUCK, across)])
+        features = LightsOnMap(CROSSING).read({"camera": NOTHING}, {"camera": hidden})
+        assert "10" not in {reading.id for reading in features}
 
 
-def test_a_light_from_behind_or_out_of_the_picture_is_not_read() -> None:
+def test_in_view_excludes_lights_from_behind_and_outside_image() -> None:
     lights = LightsOnMap(CROSSING)
     pose = before(CROSSING, "10", 18.0)
-    assert "10" in {view.id for view in lights.in_view(photograph(CROSSING, pose, {}))}
+    assert "10" in {view.id for view in lights.in_view(take_image(CROSSING, pose, {}))}
     away = pose.copy()
     away[:3, 0], away[:3, 2] = -pose[:3, 0], -pose[:3, 2]
-    assert "10" not in {view.id for view in lights.in_view(photograph(CROSSING, away, {}))}
+    assert "10" not in {view.id for view in lights.in_view(take_image(CROSSING, away, {}))}
     past = before(CROSSING, "10", -18.0)
     past[:3, 0], past[:3, 2] = -past[:3, 0], -past[:3, 2]
-    assert "10" not in {view.id for view in lights.in_view(photograph(CROSSING, past, {}))}
+    assert "10" not in {view.id for view in lights.in_view(take_image(CROSSING, past, {}))}
 
 
-def test_in_a_box_lamps_count_more_than_the_class_of_the_network() -> None:
-    camera = photograph(CROSSING, before(CROSSING, "10", 15.0), {"10": "green"})
+def test_read_in_box_prefers_lamps_to_network_class() -> None:
+    camera = take_image(CROSSING, before(CROSSING, "10", 15.0), {"10": "green"})
     box = box_around(CROSSING, "10", camera)
     lights = LightsOnMap(CROSSING)
     for name in ("traffic light red", "traffic light off", "traffic light"):
-        seen = lights.read({"camera": found([box], [0.95], (name,))}, {"camera": camera})
-        assert SignalReading("10", "green") in seen
+        features = lights.read({"camera": found([box], [0.95], (name,))}, {"camera": camera})
+        assert SignalReading("10", "green") in features
 
 
-def test_where_lamps_are_too_small_the_class_of_the_network_counts() -> None:
+def test_read_small_light_uses_network_class() -> None:
     """At 95 m a light is 5 pixels high."""
-    camera = photograph(CROSSING, before(CROSSING, "10", 95.0), {"10": "red"})
+    camera = take_image(CROSSING, before(CROSSING, "10", 95.0), {"10": "red"})
     u = box_around(CROSSING, "10", camera)
     lights = LightsOnMap(CROSSING)
     assert "10" not in {view.id for view in lights.in_view(camera)}
@@ -136,14 +136,14 @@ def test_where_lamps_are_too_small_the_class_of_the_network_counts() -> None:
     assert LightsOnMap(None).read({"camera": boxes}, {"camera": camera}) == ()
 
 
-def test_a_stop_sign_is_matched_with_a_stop_sign() -> None:
-    camera = photograph(STOPPING, before(STOPPING, "10", 15.0), {})
+def test_read_stop_sign_box_returns_stop_sign_of_map() -> None:
+    camera = take_image(STOPPING, before(STOPPING, "10", 15.0), {})
     boxes = found([box_around(STOPPING, "10", camera)], [0.7], ("stop sign",))
     assert LightsOnMap(STOPPING).read({"camera": boxes}, {"camera": camera}) == (SignalReading("10", "stop"),)
     assert LightsOnMap(STOPPING).read({"camera": NOTHING}, {"camera": camera}) == ()
 
 
-def test_what_a_station_reads_itself_depends_on_the_classes_of_the_network() -> None:
+def test_detectable_signals_follow_network_classes() -> None:
     assert signal_kinds(("car", "stop sign")) == SIGNAL_KINDS
     assert signal_kinds(("car", "traffic light")) == {"light"}
     settings = LearnedSettings(weights=str(ONNX), classes=("truck", "car"), input_size=(96, 64))
@@ -151,37 +151,37 @@ def test_what_a_station_reads_itself_depends_on_the_classes_of_the_network() -> 
     detector.load_weights()
     assert detector.detectable_signals == {"light"}
     detector.setup(DetectorContext(TRUCK, {}, CROSSING))
-    camera = photograph(CROSSING, before(CROSSING, "10", 15.0), {"10": "red"})
+    camera = take_image(CROSSING, before(CROSSING, "10", 15.0), {"10": "red"})
     x, y, _ = camera.pose[:3, 3].tolist()
     detector.detect(Readings(0.0, EgoState(0.0, np.array([x, y, 0.0]), 0, 0, 0, 0, 0, 0), cameras={"camera": camera}))
     assert SignalReading("10", "red") in detector.signals()
 
 
-def test_the_network_of_lamps_in_numpy_is_that_of_torch() -> None:
+def test_lamp_network_equals_torch_implementation() -> None:
     torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
     with np.load(WEIGHTS) as stored:
         weights = {name: torch.from_numpy(stored[name].astype(np.float32)) for name in stored.files}
-    parts = np.random.default_rng(1).random((5, 3, 32, 16), dtype=np.float32)
-    seen = torch.from_numpy(parts)
+    regions = np.random.default_rng(1).random((5, 3, 32, 16), dtype=np.float32)
+    features = torch.from_numpy(regions)
     for number in range(3):
-        seen = torch.nn.functional.conv2d(seen, weights[f"w{number}"], weights[f"b{number}"], padding=1).relu()
-        seen = torch.nn.functional.max_pool2d(seen, 2) if number < 2 else seen
-    expected = torch.nn.functional.linear(seen.flatten(1), weights["w3"], weights["b3"]).softmax(dim=1)
-    np.testing.assert_allclose(lamp_network().probabilities(parts), expected.numpy(), atol=1e-5)
-    assert lamp_network().probabilities(parts[:0]).shape == (0, len(SHOWN))
-    card = json.loads(WEIGHTS.with_suffix(".json").read_text())
-    assert card["shown"] == list(SHOWN)
+        features = torch.nn.functional.conv2d(features, weights[f"w{number}"], weights[f"b{number}"], padding=1).relu()
+        features = torch.nn.functional.max_pool2d(features, 2) if number < 2 else features
+    expected = torch.nn.functional.linear(features.flatten(1), weights["w3"], weights["b3"]).softmax(dim=1)
+    np.testing.assert_allclose(lamp_network().probabilities(regions), expected.numpy(), atol=1e-5)
+    assert lamp_network().probabilities(regions[:0]).shape == (0, len(SHOWN))
+    metadata = json.loads(WEIGHTS.with_suffix(".json").read_text())
+    assert metadata["shown"] == list(SHOWN)
     assert SHOWN[-1] == NONE
 
 
-def test_parts_of_a_picture_keep_place_and_shape() -> None:
-    """A light of 32 pixels is seen with as much again above and below; beyond the border the last pixels go on."""
-    picture = np.zeros((100, 200, 3), dtype=np.uint8)
-    picture[40:72, 92:100] = (200, 0, 0)
-    part = crops(picture, np.array([[100.0, 56.0]]), np.array([32.0]))[0]
-    assert part.shape == (3, 32, 16)
-    np.testing.assert_allclose(part[0, 8:24, 4:8], 1.0)
-    assert part[0].sum() == pytest.approx(16 * 4)
-    assert not part[1:].any()
+def test_crops_keep_position_and_aspect_ratio() -> None:
+    """A light of 32 pixels has a margin of 16 pixels above and below; outside the image the border pixels repeat."""
+    image = np.zeros((100, 200, 3), dtype=np.uint8)
+    image[40:72, 92:100] = (200, 0, 0)
+    region = crops(image, np.array([[100.0, 56.0]]), np.array([32.0]))[0]
+    assert region.shape == (3, 32, 16)
+    np.testing.assert_allclose(region[0, 8:24, 4:8], 1.0)
+    assert region[0].sum() == pytest.approx(16 * 4)
+    assert not region[1:].any()
     corner = crops(np.full((20, 20, 3), 99, dtype=np.uint8), np.array([[0.0, 0.0]]), np.array([300.0]))
     np.testing.assert_allclose(corner, 1.0)

@@ -1,4 +1,4 @@
-"""The filter on GNSS and IMU: closed forms, consistency on simulated drives, and what follows for the readings."""
+"""Localization filter: closed forms, consistency on simulated drives, and effect on readings."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def still(*state: float) -> Estimate:
     return Estimate(np.array(state), 1e-12 * np.eye(6))
 
 
-def test_prediction_follows_the_circle() -> None:
+def test_predict_constant_turn_rate_follows_circle() -> None:
     """10 m/s and 0.5 rad/s for pi seconds: a quarter of a circle of 20 m."""
     filter_ = InertialFilter(still(0, 0, 0, 10, 0, 0), MotionNoise())
     for _ in range(1000):
@@ -55,16 +55,16 @@ def test_prediction_follows_the_circle() -> None:
     np.testing.assert_allclose(filter_.estimate.state[:4], [20, 20, math.pi / 2, 10], atol=1e-4)
 
 
-def test_known_biases_are_taken_off() -> None:
-    """An accelerometer that says 1.1 with a bias of 0.1, a gyroscope that says its bias: 2 s from rest, straight."""
+def test_predict_subtracts_biases() -> None:
+    """2 s from rest: the accelerometer reads 1.1 with a bias of 0.1, the gyroscope reads its bias."""
     filter_ = InertialFilter(still(0, 0, 0, 0, 0.02, 0.1), MotionNoise())
     for _ in range(40):
         filter_.predict(imu(1.1, 0.02), DT)
     np.testing.assert_allclose(filter_.estimate.state, [2.0, 0, 0, 2.0, 0.02, 0.1], atol=1e-9)
 
 
-def test_uncertainty_grows_by_the_stated_noise() -> None:
-    """Standing with white gyroscope noise n for 4 s: heading variance n² T; with acceleration noise, speed n² T."""
+def test_predict_covariance_grows_by_stated_noise() -> None:
+    """At standstill for 4 s with white noise of density n, the variances of heading and speed are n² T."""
     noise = MotionNoise(acceleration=0.05, turn_rate=0.003, turn_walk=0.0, slip=0.0, drift=0.0)
     filter_ = InertialFilter(still(0, 0, 0, 0, 0, 0), noise)
     for _ in range(80):
@@ -75,8 +75,8 @@ def test_uncertainty_grows_by_the_stated_noise() -> None:
     assert covariance[0, 0] == pytest.approx(0.05**2 * 4.0**3 / 3.0, rel=0.03)
 
 
-def test_prediction_spreads_as_differences_say() -> None:
-    """Noise-free, the covariance is that of the numerical Jacobian."""
+def test_predict_covariance_follows_numerical_jacobian() -> None:
+    """Without noise, the covariance follows the numerical Jacobian."""
     noise = MotionNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     middle = np.array([3.0, -2.0, 0.7, 9.0, 0.01, 0.05])
     before = np.diag([0.3, 0.2, 0.01, 0.4, 1e-4, 1e-3])
@@ -92,19 +92,19 @@ def test_prediction_spreads_as_differences_say() -> None:
     np.testing.assert_allclose(filter_.estimate.covariance, jacobian @ before @ jacobian.T, atol=1e-6)
 
 
-def test_a_fix_is_weighed_by_its_covariance() -> None:
-    """Prior variance 1, fix variance 3: a quarter of the way."""
+def test_correct_weights_fix_by_covariance() -> None:
+    """Prior variance 1, fix variance 3: a quarter of the innovation."""
     filter_ = InertialFilter(Estimate(np.zeros(6), np.eye(6)), MotionNoise())
     filter_.correct(GnssReading(np.array([4.0, -8.0, 99.0]), 3.0 * np.eye(3)))
     np.testing.assert_allclose(filter_.estimate.state[:2], [1.0, -2.0])
     np.testing.assert_allclose(np.diag(filter_.estimate.covariance)[:2], [0.75, 0.75])
 
 
-def test_it_knows_how_wrong_it_is_where_its_model_holds() -> None:
-    """Fifty drives with exactly the noise that the filter assumes: NEES of x, y, yaw, speed and bias, 5 degrees.
+def test_filter_nees_under_assumed_noise_is_within_chi_square_bounds() -> None:
+    """Fifty drives with the assumed noise: NEES of x, y, yaw, speed and bias, 5 degrees of freedom.
 
-    At each instant the mean over the runs lies within the 99 % bounds of chi-square(250)/50 nearly always, and its mean
-    over time does (Bar-Shalom, Li and Kirubarajan 2001, section 5.4.2).
+    At each instant the mean over the runs is nearly always within the 99 % bounds of chi-square(250)/50, and so is its
+    mean over time (Bar-Shalom, Li and Kirubarajan 2001, section 5.4.2).
     """
     runs, ticks = 50, 300
     noise, start = MotionNoise(slip=0.0, drift=0.05), StartNoise()
@@ -121,8 +121,10 @@ def test_it_knows_how_wrong_it_is_where_its_model_holds() -> None:
             push, turn = math.sin(0.03 * tick), 0.4 * math.sin(0.02 * tick + run)
             middle, mean = truth[2] + 0.5 * turn * DT, truth[3] + 0.5 * push * DT
             aside = noise.drift * math.sqrt(DT) * rng.standard_normal()
-            cos, sin, way = math.cos(middle), math.sin(middle), mean * DT
-            truth += np.array([way * cos - aside * sin, way * sin + aside * cos, turn * DT, push * DT + aside * turn])
+            cos, sin, distance = math.cos(middle), math.sin(middle), mean * DT
+            truth += np.array(
+                [distance * cos - aside * sin, distance * sin + aside * cos, turn * DT, push * DT + aside * turn]
+            )
             bias += noise.turn_walk * math.sqrt(DT) * rng.standard_normal()
             white = rng.standard_normal(2) / math.sqrt(DT)
             filter_.predict(imu(push + noise.acceleration * white[0], turn + bias + noise.turn_rate * white[1]), DT)
@@ -138,9 +140,12 @@ def test_it_knows_how_wrong_it_is_where_its_model_holds() -> None:
     assert low < nees.mean() < high
 
 
-def independent(series: np.ndarray) -> float:
-    """How many independent draws the mean of (runs, ticks) is worth: by the integrated correlation over time, up to
-    where it vanishes (Sokal, Monte Carlo methods in statistical mechanics, 1997)."""
+def effective_samples(series: np.ndarray) -> float:
+    """Return the effective number of independent samples of the mean of (runs, ticks).
+
+    It follows from the integrated correlation over time, up to its first zero (Sokal, Monte Carlo methods in
+    statistical mechanics, 1997).
+    """
     off = series - series.mean()
     ticks = series.shape[1]
     correlation = [float((off[:, lag:] * off[:, : ticks - lag]).mean()) for lag in range(ticks // 2)]
@@ -148,12 +153,12 @@ def independent(series: np.ndarray) -> float:
     return series.size / (1.0 + 2.0 * sum(correlation[1:vanishes]) / correlation[0])
 
 
-def test_it_knows_how_wrong_it_is_in_the_world() -> None:
-    """Twelve drives of 20 s of the single-track model with its slipping tires, through the simulated sensors.
+def test_localizer_nees_in_simulated_world_is_within_chi_square_bounds() -> None:
+    """Twelve drives of 20 s of the single-track model with tire slip, with simulated sensors.
 
-    NEES of x, y, yaw and speed, 4 degrees, after 2 s. Neighboring instants tell the same: the mean over runs and time
-    is worth as many draws as its correlation leaves, and has the 99 % bounds of chi-square for these. The position is
-    better than a fix.
+    NEES of x, y, yaw and speed, 4 degrees of freedom, after 2 s. Neighboring instants are correlated: the mean over
+    runs and time has the 99 % chi-square bounds of its effective number of samples. The position error is below that of
+    a fix.
     """
     nees, errors = [], []
     for seed in range(12):
@@ -175,14 +180,14 @@ def test_it_knows_how_wrong_it_is_in_the_world() -> None:
                     nees.append(off @ np.linalg.solve(covariance[:4, :4], off))
                     errors.append(float(np.hypot(off[0], off[1])))
                 world.step({}, {"Ego": Control(0.12, 0.0, sway * math.sin(0.03 * tick))})
-    draws = independent(np.array(nees).reshape(12, -1))
+    draws = effective_samples(np.array(nees).reshape(12, -1))
     low, high = chi2.ppf([0.005, 0.995], 4 * draws) / draws
-    assert 20 < draws < 500, "a drive of 18 s holds some, not one for each tick"
+    assert 20 < draws < 500, "a drive of 18 s has some independent samples, but not one per tick"
     assert low < np.mean(nees) < high
     assert np.sqrt(np.mean(np.square(errors))) < 0.6 * 0.3 * math.sqrt(2)
 
 
-def test_the_start_is_drawn_by_seed_and_station() -> None:
+def test_initial_estimate_depends_on_seed_and_station() -> None:
     truth = Readings(0.0, ego(5.0, 6.0, 1.0, 3.0))
     starts = {
         (seed, name): Localizer(name, seed).with_estimated_pose(truth).ego.position.tolist()
@@ -198,8 +203,8 @@ def test_the_start_is_drawn_by_seed_and_station() -> None:
     np.testing.assert_allclose(draws.std(axis=0), [0.5, 0.5], rtol=0.12)
 
 
-def test_readings_move_with_the_estimate() -> None:
-    """Sensors and objects keep their place relative to the station, height and levelling stay true."""
+def test_with_estimated_pose_moves_sensors_and_objects() -> None:
+    """Sensors and objects keep their pose relative to the station; height and tilt stay true."""
     localizer = Localizer("Ego", 3)
     pose = np.eye(4)
     pose[:3, 3] = 6.0, 6.0, 2.0
@@ -231,8 +236,8 @@ def test_readings_move_with_the_estimate() -> None:
     np.testing.assert_allclose(found.truth.velocity, [[2 * cos, 2 * sin]])
 
 
-def test_between_fixes_it_goes_by_the_inertial_unit() -> None:
-    """A fix each second, readings of the unit each tick: the estimate moves in every tick, at 10 m/s."""
+def test_localizer_between_fixes_follows_imu() -> None:
+    """One fix per second, IMU readings in each tick: the estimate moves in each tick, at 10 m/s."""
     localizer = Localizer("Ego", 1, start=StartNoise(0.01, 1e-4, 0.01))
     xs = []
     for tick in range(40):
@@ -245,6 +250,6 @@ def test_between_fixes_it_goes_by_the_inertial_unit() -> None:
     np.testing.assert_allclose(np.diff(xs), 0.5, atol=0.05)
 
 
-def test_without_a_reading_there_is_no_estimate() -> None:
+def test_estimate_before_first_reading_raises() -> None:
     with pytest.raises(ValueError, match="before the first reading"):
         Localizer("Ego", 1).estimate  # noqa: B018

@@ -1,4 +1,4 @@
-"""The motion of tracks: predictions by integration, Jacobians by differences, updates by hand."""
+"""Motion models of tracks: predictions by integration, Jacobians by differences, updates by hand."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ def noise(deviation: float = 0.1) -> np.ndarray:
 UNKNOWN = np.full((1, 2), np.nan)
 
 
-def test_constant_velocity_goes_straight_on() -> None:
-    """Two seconds at (3, -1) m/s; white acceleration q spreads the position by q T³/3 and the velocity by q T."""
+def test_constant_velocity_predict_moves_straight() -> None:
+    """Two seconds at (3, -1) m/s; white acceleration q adds q T³/3 to the position variance and q T to the velocity
+    variance."""
     start = Estimates(np.array([[1.0, 2.0, 3.0, -1.0]]), np.zeros((1, 4, 4)))
     state, covariance = ConstantVelocity().predict(start, 2.0)
     np.testing.assert_allclose(state, [[7.0, 0.0, 3.0, -1.0]])
@@ -38,7 +39,7 @@ def test_constant_velocity_goes_straight_on() -> None:
     assert covariance[0, 0, 1] == 0.0
 
 
-def test_many_small_steps_are_one_large_step() -> None:
+def test_constant_velocity_many_small_steps_equal_one_step() -> None:
     start = Estimates(np.array([[1.0, 2.0, 3.0, -1.0]]), np.eye(4)[None])
     once = ConstantVelocity().predict(start, 1.0)
     often = start
@@ -49,8 +50,8 @@ def test_many_small_steps_are_one_large_step() -> None:
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-7, 0.3, -0.8])
-def test_turn_rate_follows_the_circle(turn: float) -> None:
-    """Against integration in 20,000 steps: 10 m/s for 1.5 s."""
+def test_turn_rate_predict_follows_circle(turn: float) -> None:
+    """Comparison with integration in 20,000 steps: 10 m/s for 1.5 s."""
     start = Estimates(np.array([[2.0, -1.0, 0.5, 10.0, turn]]), np.zeros((1, 5, 5)))
     state, _ = TurnRate().predict(start, 1.5)
     x, y, heading, steps = 2.0, -1.0, 0.5, 20_000
@@ -62,8 +63,8 @@ def test_turn_rate_follows_the_circle(turn: float) -> None:
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-6, 0.4, -0.7])
-def test_turn_rate_spreads_as_differences_say(turn: float) -> None:
-    """The covariance of the prediction is that of the numerical Jacobian, plus noise on speed and turn rate."""
+def test_turn_rate_predict_covariance_follows_numerical_jacobian(turn: float) -> None:
+    """The predicted covariance follows the numerical Jacobian, plus noise on speed and turn rate."""
     model, step = TurnRate(), 0.3
     middle = np.array([2.0, -1.0, 0.5, 10.0, turn])
     before = np.diag([0.3, 0.2, 0.05, 1.0, 0.1])
@@ -80,8 +81,8 @@ def test_turn_rate_spreads_as_differences_say(turn: float) -> None:
     np.testing.assert_allclose(covariance[0], expected, atol=1e-6)
 
 
-def test_an_update_weighs_by_variance() -> None:
-    """Prior and measurement of equal variance meet in the middle, and half of the variance is left."""
+def test_update_weights_by_variance() -> None:
+    """Prior and measurement of equal variance average, and the variance halves."""
     before = Estimates(np.array([[0.0, 0.0, 0.0, 0.0]]), 0.01 * np.eye(4)[None])
     state, covariance = ConstantVelocity().update(before, box(1.0, -2.0), noise(0.1))
     np.testing.assert_allclose(state[0, :2], [0.5, -1.0])
@@ -89,20 +90,20 @@ def test_an_update_weighs_by_variance() -> None:
     assert covariance[0, 2, 2] == pytest.approx(0.01)
 
 
-def test_a_box_across_the_heading_says_nothing_of_it() -> None:
-    """A heading of 0 and a box at 80 degrees: the fit took the width for the length."""
+def test_turn_rate_update_ignores_box_across_heading() -> None:
+    """A heading of 0 and a box at 80 degrees: the fit mistook the width for the length."""
     model = TurnRate()
     before = Estimates(np.array([[0.0, 0.0, 0.0, 5.0, 0.0]]), np.diag([0.1, 0.1, 0.02, 1.0, 0.1])[None])
     across, _ = model.update(before, box(0.0, 0.0, math.radians(80)), noise())
-    aslant, _ = model.update(before, box(0.0, 0.0, math.radians(10)), noise())
+    oblique, _ = model.update(before, box(0.0, 0.0, math.radians(10)), noise())
     reverse, _ = model.update(before, box(0.0, 0.0, math.radians(190)), noise())
     assert across[0, 2] == pytest.approx(0.0, abs=1e-6)
-    assert 0.0 < aslant[0, 2] < math.radians(10)
-    assert reverse[0, 2] == pytest.approx(aslant[0, 2])
+    assert 0.0 < oblique[0, 2] < math.radians(10)
+    assert reverse[0, 2] == pytest.approx(oblique[0, 2])
 
 
-def test_what_seems_to_drive_backwards_is_turned_about() -> None:
-    """The box points west, the object moves east: after some updates it heads east with a positive speed."""
+def test_turn_rate_update_reverses_backward_motion() -> None:
+    """The box points west, the object moves east: after some updates it has heading east and positive speed."""
     model = TurnRate()
     tracks = model.begin(box(0.0, 0.0, math.pi), UNKNOWN, noise())
     for tick in range(1, 20):
@@ -113,7 +114,7 @@ def test_what_seems_to_drive_backwards_is_turned_about() -> None:
     assert np.all(np.linalg.eigvalsh(tracks.covariance[0]) > 0.0)
 
 
-def test_velocities_that_the_detector_knows_are_believed() -> None:
+def test_begin_uses_velocity_of_detector() -> None:
     for model in (ConstantVelocity(), TurnRate()):
         known = model.begin(box(0.0, 0.0, 0.1), np.array([[7.0, 0.0]]), noise())
         unknown = model.begin(box(0.0, 0.0, 0.1), UNKNOWN, noise())

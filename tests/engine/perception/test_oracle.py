@@ -1,4 +1,4 @@
-"""The oracle says exactly what its truth sensor has in sight."""
+"""Oracle: exact objects in the line of sight of its truth sensor."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 EGO = EgoState(1.5, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def test_boxes_classes_and_velocities_are_exact() -> None:
+def test_oracle_returns_exact_boxes_classes_and_velocities() -> None:
     boxes = np.arange(14.0).reshape(2, 7)
     truth = TruthReading(
         ("A", "B"), ("car", "pedestrian"), boxes, np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([1, 0.3])
@@ -25,10 +25,10 @@ def test_boxes_classes_and_velocities_are_exact() -> None:
     np.testing.assert_array_equal(found.covariance, np.zeros((2, 2, 2)))
 
 
-def test_without_a_reading_it_knows_nothing() -> None:
+def test_oracle_without_reading_returns_no_objects() -> None:
     assert len(OracleDetector().detect(Readings(1.5, EGO))) == 0
 
 
-def test_it_comes_through_its_entry_point() -> None:
+def test_registry_loads_oracle_by_entry_point() -> None:
     assert registry("detectors").load("oracle") is OracleDetector
     assert OracleDetector.needs == {"truth"}

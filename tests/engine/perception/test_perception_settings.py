@@ -1,4 +1,4 @@
-"""Properties of a controller about perception: what is wrong is told with file and line, before the run."""
+"""Perception properties of controllers: errors with file and line before the run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MODULE = '<Property name="module" value="eidrive"/>'
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    """Scenario 1 with more properties for the ego (or the roadside unit), each in a line of its own."""
+    """Write scenario 1 with further properties of the ego (or the roadside unit), each on a separate line."""
 
     def write(rsu: bool = False, **properties: str) -> Path:
         original = resolve_scenario("coop/scenario_1")
@@ -35,7 +35,7 @@ def write(tmp_path: Path) -> Write:
     return write
 
 
-def told(path: Path, **options: str) -> list[str]:
+def diagnostics_of(path: Path, **options: str) -> list[str]:
     with pytest.raises(InputError) as error:
         Simulation(load_for_seed(path, 1, {}), settings=RunSettings(**options))  # type: ignore[arg-type]
     return [str(diagnostic) for diagnostic in error.value.diagnostics]
@@ -49,7 +49,7 @@ def line_of(path: Path, word: str) -> int:
     ("name", "value", "words"),
     [
         ("tracker", "ukf", "'none', 'cv' or 'ctrv'"),
-        ("tracker", "{kind: cv, confirm: [3, 2]}", "3 of 2 detections can never be"),
+        ("tracker", "{kind: cv, confirm: [3, 2]}", "n exceeds m (got [3, 2]"),
         ("tracker", "{kind: cv, coasting: 1}", "did you mean 'coast'?"),
         ("localization", "slam", "'oracle' or 'ekf'"),
         ("detector_latency", "-0.1", "greater than or equal to 0"),
@@ -58,9 +58,9 @@ def line_of(path: Path, word: str) -> int:
         ("trackr", "cv", "did you mean 'tracker'?"),
     ],
 )
-def test_a_wrong_property_is_told_with_its_line(write: Write, name: str, value: str, words: str) -> None:
+def test_invalid_property_is_error_with_line(write: Write, name: str, value: str, words: str) -> None:
     path = write(**{name: value})
-    (diagnostic,) = told(path)
+    (diagnostic,) = diagnostics_of(path)
     assert diagnostic.startswith(f"{path}:{line_of(path, name)}: ")
     assert words in diagnostic
 
@@ -82,40 +82,40 @@ def test_a_wrong_property_is_told_with_its_line(write: Write, name: str, value: 
         ("{lidar: {}}", "needs a sensor of kind truth"),
     ],
 )
-def test_a_wrong_sensor_is_told_with_its_line(write: Write, value: str, words: str) -> None:
+def test_invalid_sensor_is_error_with_line(write: Write, value: str, words: str) -> None:
     path = write(sensors=value)
-    (diagnostic,) = told(path)
+    (diagnostic,) = diagnostics_of(path)
     assert diagnostic.startswith(f"{path}:{line_of(path, 'sensors')}: ")
     assert words in diagnostic
 
 
-def test_weights_that_do_not_fit_are_told_with_their_line_before_the_run(write: Write, tmp_path: Path) -> None:
-    """By the command: exit code 2, a line each, no traceback."""
-    junk = tmp_path / "junk.onnx"
-    junk.write_text("no model")
-    path = write(detector_settings=f"{{weights: {junk}, classes: [car], input_size: [320, 192]}}")
+def test_run_with_unsuitable_weights_is_error_with_line(write: Write, tmp_path: Path) -> None:
+    """Command line: exit code 2, one line per diagnostic, no traceback."""
+    invalid = tmp_path / "junk.onnx"
+    invalid.write_text("no model")
+    path = write(detector_settings=f"{{weights: {invalid}, classes: [car], input_size: [320, 192]}}")
     path.write_text(path.read_text().replace('name="detector" value="oracle"', 'name="detector" value="yolov5"', 1))
     done = CliRunner().invoke(app, ["run", str(path), "--no-record"])
     assert done.exit_code == 2
     place = f"{path}:{line_of(path, 'detector_settings')}: "
-    assert f"{place}weights {str(junk)!r} are not an ONNX model" in " ".join(done.stderr.split())
+    assert f"{place}weights {str(invalid)!r} are not an ONNX model" in " ".join(done.stderr.split())
     done = CliRunner().invoke(app, ["run", str(path), "--no-record", "--detector", "yolo5"])
     assert done.exit_code == 2
     assert "--detector: unknown detector 'yolo5'; did you mean 'yolov5'?" in " ".join(done.stderr.split())
 
 
-def test_a_latency_as_long_as_reports_live_makes_no_sense(write: Write) -> None:
-    (diagnostic,) = told(write(detector_latency="1.5"))
+def test_detector_latency_above_report_timeout_is_error(write: Write) -> None:
+    (diagnostic,) = diagnostics_of(write(detector_latency="1.5"))
     assert "report_timeout is 1 s" in diagnostic
 
 
-def test_settings_of_a_detector_are_checked_with_their_line(write: Write) -> None:
+def test_invalid_detector_settings_are_errors_with_line(write: Write) -> None:
     path = write(rsu=True, detector_settings="{min_points: 0, of_road: 3}")
     text = path.read_text().replace(
         '<Property name="detector" value="oracle"/>', '<Property name="detector" value="lidar"/>'
     )
     path.write_text(text)
-    diagnostics = told(path)
+    diagnostics = diagnostics_of(path)
     line = line_of(path, "detector_settings")
     assert all(
         diagnostic.startswith(f"{path}:{line}: ") for diagnostic in diagnostics if "detector_settings" not in diagnostic
@@ -124,28 +124,28 @@ def test_settings_of_a_detector_are_checked_with_their_line(write: Write) -> Non
     assert any("did you mean 'off_road'?" in diagnostic for diagnostic in diagnostics)
 
 
-def test_settings_of_the_detector_in_the_file_do_not_bother_one_by_option(write: Write) -> None:
-    """The file tunes `lidar`; the option asks for the oracle, which has nothing to tune."""
+def test_detector_option_ignores_detector_settings_of_file(write: Write) -> None:
+    """The file configures `lidar`; the option selects the oracle, which has no settings."""
     path = write(detector_settings="{min_points: 4}")
     path.write_text(path.read_text().replace('name="detector" value="oracle"', 'name="detector" value="lidar"'))
     Simulation(load_for_seed(path, 1, {}), settings=RunSettings(detector="oracle")).close()
 
 
-def test_a_sensor_that_the_detector_lacks_is_told_with_the_line_of_the_sensors(write: Write) -> None:
+def test_missing_sensor_of_detector_is_error_with_line_of_sensors(write: Write) -> None:
     path = write(sensors="[truth]")
-    (diagnostic,) = told(path, detector="lidar")
+    (diagnostic,) = diagnostics_of(path, detector="lidar")
     assert diagnostic.startswith(f"{path}:{line_of(path, 'sensors')}: ")
     assert "needs a sensor of kind lidar" in diagnostic
 
 
-def test_an_unknown_detector_by_option_names_the_option(write: Write) -> None:
-    (diagnostic,) = told(write(), detector="ldiar")
+def test_unknown_detector_option_is_error_with_suggestion(write: Write) -> None:
+    (diagnostic,) = diagnostics_of(write(), detector="ldiar")
     assert diagnostic.startswith("--detector: ")
     assert "did you mean 'lidar'?" in diagnostic
 
 
 class Collector:
-    """Keeps the frames of a run."""
+    """Observer that stores the frames of a run."""
 
     def __init__(self) -> None:
         self.frames: list[Frame] = []
@@ -164,15 +164,15 @@ def run(path: Path, **options: object) -> tuple[RunResult, list[Frame]]:
     return simulation.run(), collector.frames
 
 
-def test_the_defaults_spelled_out_change_nothing(write: Write) -> None:
-    plain, _ = run(write(), time_limit=4.0)
-    spelled, _ = run(
+def test_explicit_defaults_keep_trace_hash(write: Write) -> None:
+    default, _ = run(write(), time_limit=4.0)
+    explicit, _ = run(
         write(tracker="none", localization="oracle", detector_latency="0", obey_signals="false"), time_limit=4.0
     )
-    assert plain.trace_hash == spelled.trace_hash
+    assert default.trace_hash == explicit.trace_hash
 
 
-def test_runs_with_a_filter_tracker_and_latency_are_repeatable(write: Write) -> None:
+def test_runs_with_filter_tracker_and_latency_are_repeatable(write: Write) -> None:
     path = write(localization="ekf", tracker="ctrv", detector_latency="0.1")
     (one, frames), (other, _) = run(path, time_limit=3.0), run(path, time_limit=3.0)
     assert one.trace_hash == other.trace_hash
@@ -187,8 +187,8 @@ def test_runs_with_a_filter_tracker_and_latency_are_repeatable(write: Write) -> 
 
 
 @pytest.mark.parametrize(("scenario", "helper"), [("coop/scenario_1", "RSU"), ("coop/scenario_2", "Spectator")])
-def test_the_lidar_detector_sees_the_incoming_car_in_time(scenario: str, helper: str) -> None:
-    """LiDAR alone: no collision, and the helper has the hidden car no later than the ego can see it at the crossing."""
+def test_lidar_detector_finds_incoming_car_in_time(scenario: str, helper: str) -> None:
+    """Lidar only: no collision, and the helper detects the hidden car no later than the ego can at the crossing."""
     result, frames = run(resolve_scenario(scenario), detector="lidar", time_limit=6.5)
     assert {verdict.name: verdict.passed for verdict in result.criteria} == {"collision": True, "min_distance": True}
     first: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""Checks of what detectors and fusion methods return, and of what their classes declare."""
+"""Checks of the results and declarations of detectors and fusion methods."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from eidrive_scenario.sensing.readings import Readings
 BOX = np.array([[30.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]])
 
 
-class Given(Detector):
-    """Returns what it is given."""
+class Named(Detector):
+    """Detector for the name of errors."""
 
     def detect(self, readings: Readings) -> Detections:
         return Detections(readings.time)
@@ -51,8 +51,8 @@ def detections(time: Any = 1.0, **fields: Any) -> Detections:
     ],
     ids=["empty", "usual", "unknown velocity", "other types", "far points", "rounded score"],
 )
-def test_detections_of_finite_numbers_are_accepted(found: Detections) -> None:
-    check_detections(Given(), "detect", found)
+def test_check_detections_accepts_finite_numbers(found: Detections) -> None:
+    check_detections(Named(), "detect", found)
 
 
 @pytest.mark.parametrize(
@@ -86,13 +86,13 @@ def test_detections_of_finite_numbers_are_accepted(found: Detections) -> None:
         (lambda: (), "returned an object of type tuple"),
     ],
 )
-def test_detections_of_anything_else_are_refused(make: Callable[[], Any], diagnostic: str) -> None:
+def test_check_detections_refuses_invalid_results(make: Callable[[], Any], diagnostic: str) -> None:
     with pytest.raises(InvalidResult) as caught:
-        check_detections(Given(), "detect", make())
+        check_detections(Named(), "detect", make())
     assert str(caught.value).startswith(f"detect {diagnostic}")
 
 
-def test_results_of_derived_classes_of_others_are_checked() -> None:
+def test_is_checked_for_derived_classes_of_third_parties() -> None:
     class Derived(OracleDetector):
         pass
 
@@ -108,7 +108,7 @@ def test_results_of_derived_classes_of_others_are_checked() -> None:
         ("settings_type", dict, "settings_type is <class 'dict'>"),
     ],
 )
-def test_detector_class_that_declares_nonsense_is_named(
+def test_detector_class_with_invalid_declaration_is_error(
     name: str, value: object, diagnostic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(OracleDetector, name, value)

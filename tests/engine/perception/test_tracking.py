@@ -1,4 +1,4 @@
-"""Association, the life of tracks, velocities, and whether the filters know how wrong they are."""
+"""Tracker: association, track management, velocities, and consistency of the filters."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from eidrive_scenario.perception.tracking.tracker import Tracker
 DT = 0.1
 
 
-def seen(time: float, *places: tuple[float, ...], deviation: float = 0.1, names: tuple[str, ...] = ()) -> Detections:
-    """Cars at x, y and, where given, a yaw."""
+def cars(time: float, *places: tuple[float, ...], deviation: float = 0.1, names: tuple[str, ...] = ()) -> Detections:
+    """Return cars at x, y and, optionally, a yaw."""
     number = len(places)
     boxes = np.array([(x, y, 0.75, 4.6, 1.8, 1.5, *(yaw or (0.0,))) for x, y, *yaw in places]).reshape(number, 7)
     return Detections(
@@ -38,34 +38,35 @@ def tracker(kind: str = "cv", **settings: Any) -> Tracker:
     return Tracker(TrackerSettings(kind=kind, **settings))
 
 
-def test_an_object_is_reported_after_n_of_m() -> None:
-    """2 of 3: seen, missed, seen is enough; seen once in three times is not."""
+def test_track_is_confirmed_after_n_of_m_detections() -> None:
+    """2 of 3: detected, missed, detected is sufficient; once in three scans is not."""
     track = tracker(confirm=(2, 3))
-    assert len(track.update(seen(0.0, (0, 0)))) == 0
-    assert len(track.update(seen(0.1))) == 0
-    assert len(track.update(seen(0.2, (0, 0)))) == 1
+    assert len(track.update(cars(0.0, (0, 0)))) == 0
+    assert len(track.update(cars(0.1))) == 0
+    assert len(track.update(cars(0.2, (0, 0)))) == 1
     track = tracker(confirm=(2, 3))
-    reported = [len(track.update(seen(t * DT, *([(0, 0)] if t % 3 == 0 else [])))) for t in range(12)]
+    reported = [len(track.update(cars(t * DT, *([(0, 0)] if t % 3 == 0 else [])))) for t in range(12)]
     assert reported == [0] * 12
 
 
-def test_one_of_one_reports_at_once() -> None:
-    assert len(tracker(confirm=(1, 1)).update(seen(0.0, (0, 0)))) == 1
+def test_track_with_confirm_one_of_one_is_reported_at_once() -> None:
+    assert len(tracker(confirm=(1, 1)).update(cars(0.0, (0, 0)))) == 1
 
 
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
 def test_coasting_track_out_of_view_keeps_existence_until_coast_ends(kind: str) -> None:
-    """10 m/s eastwards, last seen at 2.0 s, then out of view: half a second later it is 5 m on, then it is deleted.
+    """10 m/s eastwards, last detected at 2.0 s, then out of view: half a second later it is 5 m ahead, then it is
+    deleted.
 
-    Its existence falls by survival alone, exp(-t / 10 s), and its score with it.
+    Its existence falls by survival alone, exp(-t / 10 s), and so does its score.
     """
     track = tracker(kind, coast=0.5)
     for tick in range(21):
-        found = track.update(seen(tick * DT, (tick * 1.0, 0.0)))
+        found = track.update(cars(tick * DT, (tick * 1.0, 0.0)))
     assert found.scores.tolist() == pytest.approx([0.8], abs=1e-4)
     places, spread, existence = [], [], []
     for tick in range(21, 26):
-        found = track.update(seen(tick * DT), lambda boxes: np.zeros(len(boxes)))
+        found = track.update(cars(tick * DT), lambda boxes: np.zeros(len(boxes)))
         existence.append(float(found.existence[0]))
         places.append(float(found.boxes[0, 0]))
         spread.append(float(found.covariance[0, 0, 0]))
@@ -73,7 +74,7 @@ def test_coasting_track_out_of_view_keeps_existence_until_coast_ends(kind: str) 
     np.testing.assert_allclose(places, [21, 22, 23, 24, 25], atol=0.3)
     np.testing.assert_allclose(existence, np.exp(-0.01 * np.arange(1, 6)), atol=1e-4)
     assert spread == sorted(spread)
-    assert len(track.update(seen(2.6), lambda boxes: np.zeros(len(boxes)))) == 0
+    assert len(track.update(cars(2.6), lambda boxes: np.zeros(len(boxes)))) == 0
 
 
 def test_missed_track_in_view_follows_bernoulli_recursion_until_deleted() -> None:
@@ -83,12 +84,12 @@ def test_missed_track_in_view_follows_bernoulli_recursion_until_deleted() -> Non
     """
     track = tracker(lifetime=-0.1 / math.log(0.99))
     for tick in range(30):
-        track.update(seen(tick * DT, (0.0, 0.0)))
+        track.update(cars(tick * DT, (0.0, 0.0)))
     existence = []
     for tick in range(30, 33):
-        existence += track.update(seen(tick * DT)).existence.tolist()
+        existence += track.update(cars(tick * DT)).existence.tolist()
     np.testing.assert_allclose(existence, [0.9083, 0.4716, 0.0805], atol=2e-3)
-    assert len(track.update(seen(33 * DT))) == 0
+    assert len(track.update(cars(33 * DT))) == 0
 
 
 def test_track_half_in_view_loses_less_existence() -> None:
@@ -96,31 +97,31 @@ def test_track_half_in_view_loses_less_existence() -> None:
     for share in (0.0, 0.5, 1.0):
         track = tracker()
         for tick in range(10):
-            track.update(seen(tick * DT, (0.0, 0.0)))
-        existence.append(float(track.update(seen(1.0), lambda boxes, s=share: np.full(len(boxes), s)).existence[0]))
+            track.update(cars(tick * DT, (0.0, 0.0)))
+        existence.append(float(track.update(cars(1.0), lambda boxes, s=share: np.full(len(boxes), s)).existence[0]))
     assert existence[0] > existence[1] > existence[2] > 0.5
 
 
 def test_existence_below_confirmation_is_not_reported() -> None:
-    """Two detections of confidence 0.02 at places 1.5 m apart do not make an object; two of 0.8 do."""
+    """Two detections of confidence 0.02 at a distance of 1.5 m are not reported; two of 0.8 are."""
     for score, reported in ((0.02, 0), (0.8, 1)):
         track = tracker(confirm_existence=0.9)
-        first, second = seen(0.0, (0.0, 0.0)), seen(DT, (1.5, 0.0))
+        first, second = cars(0.0, (0.0, 0.0)), cars(DT, (1.5, 0.0))
         track.update(replace(first, scores=np.array([score])))
         assert len(track.update(replace(second, scores=np.array([score])))) == reported
 
 
-def test_predicted_tracks_move_on_without_changing_the_tracker() -> None:
+def test_predict_leaves_tracker_unchanged() -> None:
     track, other = tracker(), tracker()
     for tick in range(20):
-        track.update(seen(tick * DT, (tick * 1.0, 0.0)))
-        other.update(seen(tick * DT, (tick * 1.0, 0.0)))
+        track.update(cars(tick * DT, (tick * 1.0, 0.0)))
+        other.update(cars(tick * DT, (tick * 1.0, 0.0)))
     later = track.predict(1.95)
     assert later is not None
     assert later.time == 1.95
     assert float(later.boxes[0, 0]) == pytest.approx(19.5, abs=0.1)
     assert later.tracks == (1,)
-    one, same = track.update(seen(2.0, (20.0, 0.0))), other.update(seen(2.0, (20.0, 0.0)))
+    one, same = track.update(cars(2.0, (20.0, 0.0))), other.update(cars(2.0, (20.0, 0.0)))
     np.testing.assert_array_equal(one.boxes, same.boxes)
     np.testing.assert_array_equal(one.existence, same.existence)
     assert track.predict(1.9) is None
@@ -128,13 +129,13 @@ def test_predicted_tracks_move_on_without_changing_the_tracker() -> None:
     assert tracker().predict(0.0) is None
 
 
-def test_numbers_stay_with_objects_that_pass_each_other() -> None:
-    """Two cars pass 3 m apart in opposite directions; their order in the list changes at every tick."""
+def test_track_numbers_persist_when_objects_pass() -> None:
+    """Two cars pass at a distance of 3 m in opposite directions; their order in the list changes at every tick."""
     track = tracker()
     side_of: dict[int, float] = {}
     for tick in range(60):
         east, west = (-15.0 + tick * 0.5, 0.0), (15.0 - tick * 0.5, 3.0)
-        found = track.update(seen(tick * DT, *((east, west) if tick % 2 else (west, east))))
+        found = track.update(cars(tick * DT, *((east, west) if tick % 2 else (west, east))))
         if tick > 2:
             sides = dict(zip(found.tracks, found.boxes[:, 1].tolist(), strict=True))
             side_of = side_of or sides
@@ -142,34 +143,34 @@ def test_numbers_stay_with_objects_that_pass_each_other() -> None:
     assert len(side_of) == 2
 
 
-def test_the_sum_of_distances_decides_not_the_nearest_pair() -> None:
-    """Tracks at 0 and 2.4, boxes at 2.2 and 4.0: greedy pairing would take (2.4, 2.2) and leave (0, 4.0) apart."""
+def test_association_minimizes_total_cost() -> None:
+    """Tracks at 0 and 2.4, boxes at 2.2 and 4.0: greedy assignment would pair (2.4, 2.2) and leave (0, 4.0)."""
     track = tracker(confirm=(1, 1))
-    track.update(seen(0.0, (0.0, 0.0), (2.4, 0.0), deviation=1.0))
-    found = track.update(seen(DT, (4.0, 0.0), (2.2, 0.0), deviation=1.0))
+    track.update(cars(0.0, (0.0, 0.0), (2.4, 0.0), deviation=1.0))
+    found = track.update(cars(DT, (4.0, 0.0), (2.2, 0.0), deviation=1.0))
     assert sorted(found.tracks) == [1, 2]
     assert dict(zip(found.tracks, (found.boxes[:, 0] > 2.3).tolist(), strict=True)) == {1: False, 2: True}
 
 
-def test_a_box_beyond_the_gate_begins_a_track() -> None:
-    """0.5 m off is within the gate of a standing object known to 0.1 m; 10 m off is a new object."""
+def test_box_outside_gate_initiates_track() -> None:
+    """0.3 m is within the gate of a stationary object with 0.1 m of noise; 10 m is a new object."""
     track = tracker(confirm=(1, 1))
     for tick in range(20):
-        track.update(seen(tick * DT, (0.0, 0.0)))
-    assert track.update(seen(2.0, (0.3, 0.0))).tracks == (1,)
-    assert track.update(seen(2.1, (10.0, 0.0))).tracks == (1, 2)
+        track.update(cars(tick * DT, (0.0, 0.0)))
+    assert track.update(cars(2.0, (0.3, 0.0))).tracks == (1,)
+    assert track.update(cars(2.1, (10.0, 0.0))).tracks == (1, 2)
 
 
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
-def test_velocities_come_from_motion(kind: str) -> None:
-    """A circle of 20 m at 8 m/s, noise 0.1 m, boxes whose front is now here, now there."""
+def test_velocity_and_heading_are_estimated_from_motion(kind: str) -> None:
+    """A circle of 20 m at 8 m/s, noise 0.1 m, boxes with random front and rear."""
     rng = np.random.default_rng(4)
     track, errors, headings = tracker(kind), [], []
     for tick in range(100):
         angle = 0.4 * tick * DT
         place = 20.0 * math.cos(angle) + rng.normal(0, 0.1), 20.0 * math.sin(angle) + rng.normal(0, 0.1)
         yaw = angle + math.pi / 2 + math.pi * int(rng.integers(2)) + rng.normal(0, 0.03)
-        found = track.update(seen(tick * DT, (*place, yaw)))
+        found = track.update(cars(tick * DT, (*place, yaw)))
         if tick > 20:
             true = 8.0 * np.array([-math.sin(angle), math.cos(angle)])
             errors.append(float(np.linalg.norm(found.velocity[0] - true)))
@@ -179,15 +180,15 @@ def test_velocities_come_from_motion(kind: str) -> None:
     assert max(headings) < 0.25
 
 
-def test_the_turn_model_knows_curves_better() -> None:
-    """The same circle, seen at 2 Hz, where constant velocity cuts the curve."""
+def test_ctrv_has_smaller_error_than_cv_in_curve() -> None:
+    """The same circle, measured at 2 Hz, where constant velocity cuts the curve."""
     means = {}
     for kind in ("cv", "ctrv"):
         track, errors = tracker(kind), []
         for tick in range(60):
             angle = 0.4 * tick * 0.5
             found = track.update(
-                seen(tick * 0.5, (20 * math.cos(angle), 20 * math.sin(angle), angle + math.pi / 2), deviation=0.3)
+                cars(tick * 0.5, (20 * math.cos(angle), 20 * math.sin(angle), angle + math.pi / 2), deviation=0.3)
             )
             if tick > 10:
                 place = np.array([20 * math.cos(angle), 20 * math.sin(angle)])
@@ -197,11 +198,11 @@ def test_the_turn_model_knows_curves_better() -> None:
 
 
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
-def test_the_filter_is_consistent(kind: str) -> None:
-    """NEES of the position over 60 simulated drives with the model's own noise, from the second second on.
+def test_track_nees_is_within_chi_square_bounds(kind: str) -> None:
+    """NEES of the position over 60 simulated drives with the assumed noise, from the second second on.
 
-    Two degrees of freedom: the mean over 60 runs lies within the two-sided 99 % bounds of chi-square(120)/60
-    (Bar-Shalom, Li and Kirubarajan 2001, section 5.4.2); averaged over the instants too, well within them.
+    Two degrees of freedom: the mean over 60 runs is within the two-sided 99 % bounds of chi-square(120)/60 (Bar-Shalom,
+    Li and Kirubarajan 2001, section 5.4.2), and so is its average over time.
     """
     runs, ticks, deviation = 60, 40, 0.2
     nees = np.zeros(ticks)
@@ -212,7 +213,7 @@ def test_the_filter_is_consistent(kind: str) -> None:
         track = tracker(kind, confirm=(1, 1), gate=0.999999)
         for tick in range(ticks):
             measured = (x + rng.normal(0, deviation), y + rng.normal(0, deviation), heading + rng.normal(0, 0.1))
-            found = track.update(seen(tick * DT, measured, deviation=deviation))
+            found = track.update(cars(tick * DT, measured, deviation=deviation))
             off = found.boxes[0, :2] - (x, y)
             nees[tick] += off @ np.linalg.solve(found.covariance[0], off) / runs
             for _ in range(10):
@@ -232,54 +233,54 @@ def test_the_filter_is_consistent(kind: str) -> None:
     assert low < settled.mean() < high
 
 
-def test_the_class_of_most_trust_wins() -> None:
+def test_track_class_has_largest_sum_of_scores() -> None:
     track = tracker()
-    words = ("car", "truck", "car", "car", "truck", "car")
-    for tick, word in zip(count(), words, strict=False):
-        found = track.update(seen(tick * DT, (0.0, 0.0), names=(word,)))
+    expected = ("car", "truck", "car", "car", "truck", "car")
+    for tick, name in zip(count(), expected, strict=False):
+        found = track.update(cars(tick * DT, (0.0, 0.0), names=(name,)))
     assert found.classes == ("car",)
 
 
-def test_a_mirrored_scene_has_mirrored_tracks() -> None:
+def test_tracks_of_mirrored_scene_are_mirrored() -> None:
     rng = np.random.default_rng(2)
     path = [(tick * 0.7, 3.0 + 0.02 * tick**1.5 + rng.normal(0, 0.05), 0.1) for tick in range(30)]
     one, other = tracker("ctrv"), tracker("ctrv")
     for tick, (x, y, yaw) in enumerate(path):
-        left = one.update(seen(tick * DT, (x, y, yaw)))
-        right = other.update(seen(tick * DT, (x, -y, -yaw)))
+        left = one.update(cars(tick * DT, (x, y, yaw)))
+        right = other.update(cars(tick * DT, (x, -y, -yaw)))
     np.testing.assert_allclose(left.boxes * (1, -1, 1, 1, 1, 1, -1), right.boxes, atol=1e-9)
     np.testing.assert_allclose(left.velocity * (1, -1), right.velocity, atol=1e-9)
 
 
-def test_detections_without_covariance_are_tracked_too() -> None:
+def test_detections_without_covariance_are_tracked() -> None:
     track = tracker()
     for tick in range(5):
-        found = seen(tick * DT, (tick * 1.0, 0.0))
+        found = cars(tick * DT, (tick * 1.0, 0.0))
         tracked = track.update(replace(found, covariance=np.full((1, 2, 2), np.nan)))
     assert np.isfinite(tracked.covariance).all()
     assert float(tracked.velocity[0, 0]) == pytest.approx(10.0, abs=1.0)
 
 
-def test_time_does_not_run_backwards() -> None:
+def test_update_with_older_detections_raises() -> None:
     track = tracker()
-    track.update(seen(1.0, (0, 0)))
-    with pytest.raises(ValueError, match=r"0\.5 s after those of 1\.0 s"):
-        track.update(seen(0.5, (0, 0)))
+    track.update(cars(1.0, (0, 0)))
+    with pytest.raises(ValueError, match=r"out of sequence \(got 0\.5 s; expected at least 1\.0 s\)"):
+        track.update(cars(0.5, (0, 0)))
 
 
 @pytest.mark.parametrize(
-    ("wrong", "words"),
+    ("settings", "expected"),
     [
         ({"kind": "ukf"}, "'none', 'cv' or 'ctrv'"),
-        ({"confirm": [3, 2]}, "3 of 2 detections can never be"),
+        ({"confirm": [3, 2]}, r"n exceeds m \(got \[3, 2\]"),
         ({"confirm": [0, 2]}, "greater than 0"),
         ({"gate": 1.0}, "less than 1"),
         ({"coast": -1}, "greater than or equal to 0"),
         ({"detection_probability": 1.0}, "less than 1"),
         ({"birth_density": 0.0}, "greater than 0"),
-        ({"delete_existence": 0.6}, "delete_existence 0.6 is above confirm_existence 0.5"),
+        ({"delete_existence": 0.6}, r"delete_existence exceeds confirm_existence \(got 0.6 and 0.5\)"),
     ],
 )
-def test_wrong_settings_are_told(wrong: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValidationError, match=words):
-        TrackerSettings.model_validate(wrong)
+def test_invalid_tracker_settings_are_errors(settings: dict[str, Any], expected: str) -> None:
+    with pytest.raises(ValidationError, match=expected):
+        TrackerSettings.model_validate(settings)

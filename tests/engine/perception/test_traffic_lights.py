@@ -1,4 +1,4 @@
-"""Stop lines on the way, what signals show from where they can be seen, and vehicles that stop for them."""
+"""Stop lines on the path, states of visible signals, and vehicles that stop for them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def stop_sign(name: str, s: float) -> str:
 
 
 def street(*signals: str) -> RoadNetwork:
-    """A straight road of 200 m along x, a lane each way."""
+    """Return a straight road of 200 m along x with a lane in each direction."""
     return RoadNetwork.parse(
         '<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="200" id="1" junction="-1"><planView>'
         f'<geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>{LANES}'
@@ -63,7 +63,7 @@ def names(roads: RoadNetwork, path: np.ndarray, progress: float = 0.0) -> list[t
     return [(one.signal, round(one.distance, 3)) for one in signals.ahead(progress)]
 
 
-def test_a_signal_stops_the_lanes_of_its_direction() -> None:
+def test_stop_lines_apply_to_lanes_of_signal_direction() -> None:
     roads = street(light("east", 120.0), light("west", 60.0, orientation="-"), light("both", 150.0, orientation="none"))
     assert names(roads, EAST) == [("east", 120.0), ("both", 150.0)]
     assert names(roads, WEST) == [("both", 49.0), ("west", 139.0)]
@@ -71,7 +71,7 @@ def test_a_signal_stops_the_lanes_of_its_direction() -> None:
     assert names(roads, EAST + np.array([0.0, 8.0])) == []
 
 
-def test_signs_that_do_not_stop_are_left_out() -> None:
+def test_stop_lines_exclude_other_signs() -> None:
     roads = street(stop_sign("stop", 80.0), SIGNAL.format(
         s=50, t=-4.5, id="limit", dynamic="no", orientation="+", z=2.0, type="274"
     ))  # fmt: skip
@@ -96,8 +96,8 @@ JUNCTION = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
 <laneLink from="-1" to="-1"/></connection></junction></OpenDRIVE>"""
 
 
-def test_lights_on_connecting_roads_hold_before_the_junction_and_only_those_who_go_there() -> None:
-    """Straight on and left begin at the same place, each with its own light."""
+def test_stop_lines_of_connecting_roads_apply_before_junction() -> None:
+    """Straight on and left begin at the same point, each with a separate light."""
     one = LANES[: LANES.index("<left>")] + LANES[LANES.index("<center>") :]
     roads = RoadNetwork.parse(
         JUNCTION.format(lanes=LANES, one=one, straight=light("straight", 10.0), left=light("left", 8.0))
@@ -110,7 +110,7 @@ def test_lights_on_connecting_roads_hold_before_the_junction_and_only_those_who_
     assert [name for name, _ in names(roads, np.concatenate([before, turn]))] == ["left"]
 
 
-def test_only_what_was_seen_stops() -> None:
+def test_signals_ahead_require_stop_only_after_sight() -> None:
     signals = SignalsAhead(street(light("east", 120.0), stop_sign("stop", 150.0)))
     signals.follow(EAST)
     assert [one.must_stop for one in signals.ahead(0.0)] == [False, False]
@@ -123,7 +123,7 @@ CAR = ActorSpec("Ego", "car", "car", (4.892, 1.837, 1.49), (1.4, 0.0, 0.745), wh
 TRUCK = ActorSpec("Truck", "firetruck", "truck", (8.5, 2.9, 3.8), (0.0, 0.0, 1.9), wheelbase=5.0)
 
 
-def seen(
+def visible_signals(
     roads: RoadNetwork,
     states: Mapping[str, str],
     x: float,
@@ -140,20 +140,20 @@ def seen(
     return {f"{reading.id} {reading.state}".strip() for reading in readings}
 
 
-def test_a_light_is_seen_from_its_front_within_range_and_if_nothing_hides_it() -> None:
+def test_signal_sensor_requires_front_range_and_line_of_sight() -> None:
     roads = street(light("east", 120.0), light("west", 100.0, orientation="-"), stop_sign("stop", 130.0))
     states = {"east": "red", "west": "green"}
-    assert seen(roads, states, 60.0) == {"east red", "stop"}
-    assert seen(roads, states, 60.0, kinds=frozenset({"light"})) == {"east red"}
-    assert seen(roads, states, 60.0, kinds=frozenset({"stop sign"})) == {"stop"}
-    assert seen(roads, states, 10.0) == set()
-    assert seen(roads, states, 125.0) == {"stop"}
-    assert "east red" not in seen(roads, states, 90.0, truck=True)
-    assert seen(roads, {}, 60.0) == {"east", "stop"}
+    assert visible_signals(roads, states, 60.0) == {"east red", "stop"}
+    assert visible_signals(roads, states, 60.0, kinds=frozenset({"light"})) == {"east red"}
+    assert visible_signals(roads, states, 60.0, kinds=frozenset({"stop sign"})) == {"stop"}
+    assert visible_signals(roads, states, 10.0) == set()
+    assert visible_signals(roads, states, 125.0) == {"stop"}
+    assert "east red" not in visible_signals(roads, states, 90.0, truck=True)
+    assert visible_signals(roads, {}, 60.0) == {"east", "stop"}
 
 
 class Drive:
-    """A car that follows its lane from x = 20 m at 10 m/s and sees what the lookout sees."""
+    """Car that follows its lane from x = 20 m at 10 m/s with the readings of a signal sensor."""
 
     def __init__(self, roads: RoadNetwork, *, obeys: bool = True) -> None:
         self.world = World(roads, dt=0.05)
@@ -161,16 +161,16 @@ class Drive:
         settings = AgentSettings.model_validate({"obey_signals": obeys, "target_speed": 10.0})
         self.planner = RoutePlanner(settings, CAR, roads, dt=0.05, seed=0)
         self.controller = VehicleController(CAR, 0.05)
-        self.lookout = SignalSensor(CAR, roads)
+        self.sensor = SignalSensor(CAR, roads)
         self.rig = Rig(CAR, {})
         self.reasons: list[str] = []
 
     def run(self, seconds: float, states: Mapping[str, str]) -> tuple[float, float]:
-        """Where its front is [m], and its speed [m/s], after so long."""
+        """Run for a duration [s]; return the position of its front [m] and its speed [m/s]."""
         for _ in range(round(seconds / 0.05)):
             view = self.world.view()
             ego = self.rig.read(self.world, view).ego
-            self.planner.observe_signals(self.lookout.read(self.world, view, 0, states))
+            self.planner.observe_signals(self.sensor.read(self.world, view, 0, states))
             plan = self.planner.plan(ego, Detections(view.time), Goal(), view.time)
             self.reasons.append(plan.reason)
             self.world.step({}, {"Ego": self.controller.control(ego, plan)})
@@ -178,8 +178,8 @@ class Drive:
         return float(view.position[0, 0]) + 1.4 + 2.446, float(view.speed[0])
 
 
-def test_a_car_stops_at_red_and_goes_on_at_green() -> None:
-    """The light stands at 120 m: the front comes to a stand within two meters before it, and passes it at green."""
+def test_car_stops_at_red_and_continues_at_green() -> None:
+    """The light is at 120 m: the front stops within two meters before it, and passes it at green."""
     drive = Drive(street(light("east", 120.0)))
     front, speed = drive.run(18.0, {"east": "red"})
     assert 118.0 < front < 120.0
@@ -190,7 +190,7 @@ def test_a_car_stops_at_red_and_goes_on_at_green() -> None:
     drive.world.close()
 
 
-def test_a_car_that_does_not_obey_drives_on() -> None:
+def test_car_without_obey_signals_passes_red() -> None:
     drive = Drive(street(light("east", 120.0)), obeys=False)
     front, speed = drive.run(12.0, {"east": "red"})
     assert front > 130.0
@@ -198,8 +198,8 @@ def test_a_car_that_does_not_obey_drives_on() -> None:
     drive.world.close()
 
 
-def test_a_light_that_turns_too_late_is_passed() -> None:
-    """Green until the front is 6 m before the line: at 10 m/s that would take 8 m/s²."""
+def test_car_passes_light_that_turns_too_late() -> None:
+    """Green until the front is 6 m before the line: stopping from 10 m/s would require 8 m/s²."""
     drive = Drive(street(light("east", 120.0)))
     front = 0.0
     while front < 114.0:
@@ -210,7 +210,7 @@ def test_a_light_that_turns_too_late_is_passed() -> None:
     drive.world.close()
 
 
-def test_a_car_stops_at_a_stop_sign_waits_and_goes_on() -> None:
+def test_car_stops_and_waits_at_stop_sign() -> None:
     drive = Drive(street(stop_sign("stop", 100.0)))
     fronts, speeds = [], []
     for _ in range(440):
@@ -224,7 +224,7 @@ def test_a_car_stops_at_a_stop_sign_waits_and_goes_on() -> None:
     drive.world.close()
 
 
-def test_a_wait_that_was_cut_short_does_not_count_at_the_next_visit() -> None:
+def test_interrupted_wait_at_stop_sign_restarts() -> None:
     stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
     stops.follow(EAST)
     stops.signals.see([SignalReading("stop", "")])
@@ -244,18 +244,18 @@ ROUND = np.concatenate(
         np.column_stack([np.full(41, 40.0), np.arange(-41.75, -0.75)]),
     ]
 )
-"""A lap of 320 m that takes the street from x = 40 m to 160 m."""
+"""Lap of 320 m that uses the street from x = 40 m to 160 m."""
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.37, 0.77])
-def test_a_signal_is_ahead_on_every_lap(offset: float) -> None:
+def test_signal_is_ahead_on_every_lap(offset: float) -> None:
     path = np.concatenate([[[40.0 - offset, -1.75]], ROUND[1:], ROUND[1:]])
     assert [place for _, place in names(street(light("east", 120.0)), path)] == pytest.approx(
         [80.0 + offset, 400.0 + offset], abs=0.01
     )
 
 
-def test_a_stop_sign_holds_on_every_lap() -> None:
+def test_stop_sign_applies_on_every_lap() -> None:
     """The wait of the first lap does not count on the second."""
     stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
     stops.follow(np.concatenate([ROUND, ROUND[1:]]))
@@ -299,7 +299,7 @@ SCENARIO = """<OpenSCENARIO>
 
 
 class Track:
-    """Where the ego's front was, by time."""
+    """Observer of the position of the ego's front, by time."""
 
     def __init__(self) -> None:
         self.fronts: dict[float, float] = {}
@@ -313,8 +313,8 @@ class Track:
 
 
 @pytest.mark.parametrize("obeys", [True, False])
-def test_in_a_scenario_the_light_holds_who_obeys_until_it_turns(tmp_path: Path, obeys: bool) -> None:
-    """The storyboard's light, at 80 m: red from the start, green from 18 s on."""
+def test_scenario_with_light_stops_obeying_car_until_green(tmp_path: Path, obeys: bool) -> None:
+    """Light of the storyboard at 80 m: red from the start, green from 18 s on."""
     road = (
         '<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="400" id="1" junction="-1"><planView>'
         f'<geometry s="0" x="0" y="0" hdg="0" length="400"><line/></geometry></planView>{LANES}'

@@ -1,4 +1,4 @@
-"""Shares of objects that sensors can show, against angles and shadows worked out by hand."""
+"""Visible shares of objects, against angles and shadows calculated by hand."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NONE = np.empty((0, 7))
 
 
 def camera(width: int = 800, height: int = 600, focal: float = 400.0) -> CameraReading:
-    """A camera 1.5 m above the origin that looks along x: 90 degrees wide."""
+    """Return a camera 1.5 m above the origin that points along x: 90 degrees wide."""
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = (0, -1, 0), (0, 0, -1), (1, 0, 0), (0, 0, 1.5)
     intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1.0]])
@@ -42,8 +42,8 @@ def test_in_camera_object_beside_or_behind_is_out_of_view() -> None:
     assert in_camera(np.concatenate([box(5, 12), box(-10, 0)]), camera(), NONE).tolist() == [0.0, 0.0]
 
 
-def test_in_camera_object_cut_by_the_border_is_half_in_view() -> None:
-    """The border is the line y = x: of a car across it at (10, 10) about half of the points are in view."""
+def test_in_camera_object_cut_by_border_is_half_in_view() -> None:
+    """The border is the line y = x: about half of the points of a car across it at (10, 10) are in view."""
     assert 0.3 <= in_camera(box(10, 10, yaw=math.pi / 2), camera(), NONE)[0] <= 0.7
 
 
@@ -51,10 +51,10 @@ def test_in_camera_object_behind_a_truck_is_hidden() -> None:
     truck = box(12, 0, (8.2, 2.6, 3.5), math.pi / 2)
     assert in_camera(box(25, 0), camera(), truck)[0] == 0.0
     assert in_camera(box(25, 14), camera(), truck)[0] == 1.0
-    assert in_camera(truck, camera(), truck)[0] == 1.0, "it does not hide itself"
+    assert in_camera(truck, camera(), truck)[0] == 1.0, "an object does not hide itself"
 
 
-def test_in_camera_object_too_small_to_be_seen_is_out_of_view() -> None:
+def test_in_camera_small_object_is_out_of_view() -> None:
     """1.55 m at focal length 400 px: 8 px high at 77 m, 20 px at 31 m."""
     shares = in_camera(np.concatenate([box(100, 0), box(50, 0), box(25, 0)]), camera(), NONE)
     assert shares[0] == 0.0
@@ -71,7 +71,7 @@ def test_in_lidar_follows_field_of_view_range_and_shadow() -> None:
 
 
 @pytest.mark.parametrize("angle", [0.4, 2.5])
-def test_in_lidar_turned_scene_has_equal_shares(angle: float) -> None:
+def test_in_lidar_rotated_scene_has_equal_shares(angle: float) -> None:
     cos, sin = math.cos(angle), math.sin(angle)
     turn = np.array([[cos, -sin], [sin, cos]])
     scene, others = np.concatenate([box(12, 6), box(20, -2, yaw=0.7)]), box(14, -1.2, (4.0, 1.8, 2.5), 0.3)
@@ -85,6 +85,6 @@ def test_in_lidar_turned_scene_has_equal_shares(angle: float) -> None:
     np.testing.assert_allclose(in_lidar(turned[0], sensor, 0.5, 50.0, turned[1]), straight)
 
 
-def test_no_boxes_have_no_shares() -> None:
+def test_shares_without_boxes_are_empty() -> None:
     assert in_camera(NONE, camera(), box(5, 0)).shape == (0,)
     assert in_lidar(NONE, lidar(), 1.0, 50.0, NONE).shape == (0,)

@@ -31,16 +31,16 @@ class ConvUnit(nn.Module):
         return out
 
     def fold(self) -> None:
-        """Take the normalization into the convolution's weights; for inference only."""
+        """Fold the normalization into the weights of the convolution; for inference only."""
         if isinstance(self.norm, nn.BatchNorm2d):
             self.conv = fuse_conv_bn_eval(self.conv, self.norm.eval())
             self.norm = nn.Identity()
 
 
 class FastConvolution(nn.Module):
-    """A convolution by oneDNN, for inference on a CPU.
+    """Convolution by oneDNN, for inference on a CPU.
 
-    On one thread PyTorch takes another way for 1x1 kernels; this one was measured to take half the time there.
+    With one thread, PyTorch uses another implementation for 1x1 kernels; this one took half the time in measurements.
     """
 
     def __init__(self, conv: nn.Conv2d) -> None:
@@ -56,9 +56,9 @@ class FastConvolution(nn.Module):
 
 
 def fold(network: nn.Module) -> None:
-    """Make the network ready for inference: normalizations folded into convolutions, and these the fastest there are.
+    """Prepare the network for inference: fold normalizations into convolutions, and use the fastest convolutions.
 
-    It cannot be trained any more.
+    The network cannot be trained afterwards.
     """
     network.eval()
     network.requires_grad_(False)
@@ -67,19 +67,19 @@ def fold(network: nn.Module) -> None:
             module.fold()
     network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     if torch.backends.mkldnn.is_available():  # type: ignore[no-untyped-call]
-        _quicken(network)
+        _use_fast_convolutions(network)
 
 
-def _quicken(module: nn.Module) -> None:
+def _use_fast_convolutions(module: nn.Module) -> None:
     for name, child in module.named_children():
         if isinstance(child, nn.Conv2d):
             setattr(module, name, FastConvolution(child))
         else:
-            _quicken(child)
+            _use_fast_convolutions(child)
 
 
 class Bottleneck(nn.Module):
-    """1x1, then 3x3, with the input added where asked (He et al. 2016)."""
+    """1x1, then 3x3 convolution, with an optional residual connection (He et al. 2016)."""
 
     def __init__(self, channels: int, *, shortcut: bool) -> None:
         super().__init__()
@@ -93,13 +93,15 @@ class Bottleneck(nn.Module):
 
 
 class CrossStage(nn.Module):
-    """One half goes through bottlenecks, the other around them (Wang et al., CSPNet 2020)."""
+    """Cross-stage partial block: half of the channels bypass the bottlenecks (Wang et al., CSPNet 2020)."""
+
+    around: ConvUnit
 
     def __init__(self, inputs: int, outputs: int, depth: int, *, shortcut: bool = True) -> None:
         super().__init__()
         half = outputs // 2
         self.through = ConvUnit(inputs, half)
-        self.around = ConvUnit(inputs, half)
+        self.add_module("around", ConvUnit(inputs, half))  # a key of the weight files
         self.stages = nn.Sequential(*(Bottleneck(half, shortcut=shortcut) for _ in range(depth)))
         self.merge = ConvUnit(2 * half, outputs)
 
@@ -109,7 +111,7 @@ class CrossStage(nn.Module):
 
 
 class PyramidPooling(nn.Module):
-    """Spatial pyramid pooling (He et al. 2015) as three 5x5 poolings in a row, which see 5, 9 and 13 cells."""
+    """Spatial pyramid pooling (He et al. 2015) as three successive 5x5 poolings, which cover 5, 9 and 13 cells."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -126,7 +128,7 @@ class PyramidPooling(nn.Module):
 
 
 class SeparableUnit(nn.Module):
-    """Depthwise 3x3, then pointwise 1x1 (Howard et al., MobileNets 2017); the input is added where shapes allow."""
+    """Depthwise 3x3, then pointwise 1x1 (Howard et al., MobileNets 2017); residual connection if the shapes permit."""
 
     def __init__(self, inputs: int, outputs: int, stride: int = 1) -> None:
         super().__init__()

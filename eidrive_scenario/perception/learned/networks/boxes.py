@@ -9,19 +9,19 @@ from torch import Tensor
 
 
 def corners(boxes: Tensor) -> Tensor:
-    """(…, 4) cx cy w h to x1 y1 x2 y2."""
+    """Convert (…, 4) cx cy w h to x1 y1 x2 y2."""
     center, half = boxes[..., :2], boxes[..., 2:] / 2.0
     return torch.cat([center - half, center + half], dim=-1)
 
 
 def centered(boxes: Tensor) -> Tensor:
-    """(…, 4) x1 y1 x2 y2 to cx cy w h."""
+    """Convert (…, 4) x1 y1 x2 y2 to cx cy w h."""
     low, high = boxes[..., :2], boxes[..., 2:]
     return torch.cat([(low + high) / 2.0, high - low], dim=-1)
 
 
 def pairwise_iou(first: Tensor, second: Tensor) -> Tensor:
-    """(…, N, M) intersection over union of corners (…, N, 4) and (…, M, 4)."""
+    """Return the intersection over union (…, N, M) of corners (…, N, 4) and (…, M, 4)."""
     low = torch.maximum(first[..., :, None, :2], second[..., None, :, :2])
     high = torch.minimum(first[..., :, None, 2:], second[..., None, :, 2:])
     shared = (high - low).clamp(min=0.0).prod(dim=-1)
@@ -31,10 +31,10 @@ def pairwise_iou(first: Tensor, second: Tensor) -> Tensor:
 
 
 def complete_iou(first: Tensor, second: Tensor) -> Tensor:
-    """(N,) CIoU of boxes (N, 4) in center form, row by row.
+    """Return the CIoU (N,) of boxes (N, 4) in center form, row by row.
 
-    Overlap less the squared distance of the centers over the diagonal of the hull, less a term for unlike shapes
-    (Zheng et al., Distance-IoU loss, AAAI 2020, eq. 6, 10 and 11).
+    Overlap minus the squared distance of the centers over the diagonal of the hull, minus a term for different aspect
+    ratios (Zheng et al., Distance-IoU loss, AAAI 2020, eq. 6, 10 and 11).
     """
     a, b = corners(first), corners(second)
     shared = (torch.minimum(a[:, 2:], b[:, 2:]) - torch.maximum(a[:, :2], b[:, :2])).clamp(min=0.0).prod(dim=1)

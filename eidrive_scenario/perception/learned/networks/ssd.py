@@ -1,7 +1,7 @@
-"""The network `ssd`: default boxes on five scales over a light backbone.
+"""Network `ssd`: default boxes on five scales with a light backbone.
 
-Liu et al., SSD: Single shot multibox detector, ECCV 2016; the backbone is of depthwise separable convolutions
-(Howard et al., MobileNets 2017), the heads too (Sandler et al., MobileNetV2 2018, section 6.2).
+Liu et al., SSD: Single shot multibox detector, ECCV 2016. The backbone has depthwise separable convolutions (Howard et
+al., MobileNets 2017), and so do the heads (Sandler et al., MobileNetV2 2018, section 6.2).
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from eidrive_scenario.perception.learned.networks.boxes import corners
 
 STRIDES = (8, 16, 32, 64, 128)
 SIDES = (14.0, 34.0, 76.0, 150.0, 270.0, 420.0)
-"""Side of the square default box at each stride, and of one beyond the last [px of the network's input]."""
+"""Side of the square default box at each stride, and of one beyond the last [px of the network input]."""
 ASPECTS = (1.0, 2.0, 3.0, 0.5, 1.0 / 3.0)
 BOXES_PER_CELL = len(ASPECTS) + 1
-"""One of each aspect, and a square one between this stride's side and the next."""
+"""One box of each aspect ratio, and a square one between the sides of this and the next stride."""
 VARIANCES = (0.1, 0.2)
-"""Scale of encoded centers and sizes, as in the paper's code."""
+"""Scale of encoded centers and sizes, as in the code of the paper."""
 
 
 class Ssd(nn.Module):
-    """Pictures (B, 3, H, W) in [0, 1] to encoded boxes (B, N, 4) and class logits (B, N, 1 + C), background first.
+    """Network from images (B, 3, H, W) in [0, 1] to encoded boxes (B, N, 4) and class logits (B, N, 1 + C), background
+    first.
 
-    H and W are multiples of 128. `default_boxes(H, W)` has the N boxes.
+    H and W are multiples of 128. `default_boxes(H, W)` returns the N boxes.
     """
 
     def __init__(self, classes: int) -> None:
@@ -49,8 +50,8 @@ class Ssd(nn.Module):
         self.box_heads = nn.ModuleList(_head(width, 4) for width in widths)
         self.class_heads = nn.ModuleList(_head(width, 1 + classes) for width in widths)
 
-    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        features = [self.fine(pictures)]
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        features = [self.fine(images)]
         for stage in (self.middle, self.coarse, self.extra, self.last):
             features.append(stage(features[-1]))
         encoded, logits = [], []
@@ -61,7 +62,7 @@ class Ssd(nn.Module):
         return torch.cat(encoded, dim=1), torch.cat(logits, dim=1)
 
     def decode(self, outputs: tuple[Tensor, Tensor], defaults: Tensor) -> tuple[Tensor, Tensor]:
-        """Boxes (B, N, 4) x1 y1 x2 y2 [px] and the probability of each class (B, N, C), background left out."""
+        """Return boxes (B, N, 4) x1 y1 x2 y2 [px] and class probabilities (B, N, C) without background."""
         encoded, logits = outputs
         return corners(decode(encoded, defaults)), logits.softmax(dim=-1)[..., 1:]
 
@@ -71,7 +72,7 @@ def _head(inputs: int, each: int) -> nn.Module:
 
 
 def default_boxes(height: int, width: int) -> Tensor:
-    """(N, 4) cx cy w h [px] of the default boxes of a picture, in the order of the network's outputs."""
+    """Return cx cy w h (N, 4) [px] of the default boxes of an image, in the order of the network outputs."""
     boxes = []
     for level, stride in enumerate(STRIDES):
         side = SIDES[level]
@@ -88,14 +89,14 @@ def default_boxes(height: int, width: int) -> Tensor:
 
 
 def encode(boxes: Tensor, defaults: Tensor) -> Tensor:
-    """Boxes (…, N, 4) in center form as offsets from the default boxes (N, 4)."""
+    """Return boxes (…, N, 4) in center form as offsets from the default boxes (N, 4)."""
     center = (boxes[..., :2] - defaults[..., :2]) / (defaults[..., 2:] * VARIANCES[0])
     size = torch.log(boxes[..., 2:].clamp(min=1e-3) / defaults[..., 2:]) / VARIANCES[1]
     return torch.cat([center, size], dim=-1)
 
 
 def decode(encoded: Tensor, defaults: Tensor) -> Tensor:
-    """The inverse of `encode`: boxes (…, N, 4) in center form."""
+    """Return boxes (…, N, 4) in center form: the inverse of `encode`."""
     center = encoded[..., :2] * VARIANCES[0] * defaults[..., 2:] + defaults[..., :2]
     size = torch.exp((encoded[..., 2:] * VARIANCES[1]).clamp(max=8.0)) * defaults[..., 2:]
     return torch.cat([center, size], dim=-1)

@@ -1,7 +1,7 @@
-"""The network `yolov5`: CSP backbone, pyramid pooling, path aggregation neck, three scales with anchors; nano size.
+"""Network `yolov5`: CSP backbone, pyramid pooling, path aggregation neck, three scales with anchors; nano size.
 
-Written from the published architecture: CSPNet (Wang et al. 2020), PANet (Liu et al. 2018), YOLOv3's anchors on three
-scales (Redmon and Farhadi 2018), YOLOv4's widened center offsets (Bochkovskiy et al. 2020).
+Implemented from the published architecture: CSPNet (Wang et al. 2020), PANet (Liu et al. 2018), anchors of YOLOv3 on
+three scales (Redmon and Farhadi 2018), extended center offsets of YOLOv4 (Bochkovskiy et al. 2020).
 """
 
 from __future__ import annotations
@@ -16,17 +16,19 @@ from eidrive_scenario.perception.learned.networks.blocks import ConvUnit, CrossS
 STRIDES = (8, 16, 32)
 ANCHORS_PER_SCALE = 3
 WIDTHS = (16, 32, 64, 128, 256)
-"""Channels at strides 2, 4, 8, 16, 32: a quarter of the large network's."""
+"""Channels at strides 2, 4, 8, 16, 32: a quarter of the large network."""
 DEPTHS = (1, 2, 3, 1)
-"""Bottlenecks at strides 4, 8, 16, 32: a third of the large network's."""
+"""Bottlenecks at strides 4, 8, 16, 32: a third of the large network."""
 
 Anchors = tuple[tuple[tuple[float, float], ...], ...]
 
 
 class YoloV5(nn.Module):
-    """Pictures (B, 3, H, W) in [0, 1], H and W multiples of 32, to raw outputs (B, A, H/s, W/s, 5 + C) of each scale.
+    """Network from images (B, 3, H, W) in [0, 1] to raw outputs (B, A, H/s, W/s, 5 + C) of each scale.
 
-    anchors  width and height [px of the network's input] of three boxes for each of the strides 8, 16 and 32
+    H and W are multiples of 32.
+
+    anchors  width and height [px of the network input] of three boxes for each of the strides 8, 16 and 32
     """
 
     def __init__(self, classes: int, anchors: Anchors) -> None:
@@ -35,7 +37,7 @@ class YoloV5(nn.Module):
         self.anchors: Tensor
         self.register_buffer("anchors", torch.tensor(anchors, dtype=torch.float32))
         if self.anchors.shape != (len(STRIDES), ANCHORS_PER_SCALE, 2):
-            raise ValueError(f"anchors have shape {tuple(self.anchors.shape)}, expected (3, 3, 2)")
+            raise ValueError(f"anchors: invalid shape (got {tuple(self.anchors.shape)}; expected (3, 3, 2))")
         w1, w2, w3, w4, w5 = WIDTHS
         d2, d3, d4, d5 = DEPTHS
         self.fine = nn.Sequential(
@@ -57,10 +59,10 @@ class YoloV5(nn.Module):
         self.down_middle = ConvUnit(w4, w4, 3, 2)
         self.out_coarse = CrossStage(2 * w4, w5, 1, shortcut=False)
         self.heads = nn.ModuleList(nn.Conv2d(width, ANCHORS_PER_SCALE * (5 + classes), 1) for width in (w3, w4, w5))
-        self._start_rare()
+        self._initialize_biases()
 
-    def forward(self, pictures: Tensor) -> list[Tensor]:
-        fine = self.fine(pictures)
+    def forward(self, images: Tensor) -> list[Tensor]:
+        fine = self.fine(images)
         middle = self.middle(fine)
         coarse = self.lateral_coarse(self.coarse(middle))
         middle = self.lateral_middle(self.merge_middle(torch.cat([self.up(coarse), middle], dim=1)))
@@ -77,7 +79,7 @@ class YoloV5(nn.Module):
         return outputs
 
     def decode(self, outputs: list[Tensor]) -> Tensor:
-        """(B, N, 5 + C): cx cy w h [px], objectness, probability of each class."""
+        """Return (B, N, 5 + C): cx cy w h [px], objectness, probability of each class."""
         found = []
         for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
             share = raw.sigmoid()
@@ -87,8 +89,9 @@ class YoloV5(nn.Module):
             found.append(torch.cat([center, size, share[..., 4:]], dim=-1).flatten(1, 3))
         return torch.cat(found, dim=1)
 
-    def _start_rare(self) -> None:
-        """Biases by which the first guess is that objects are rare (Lin et al., Focal loss 2017, section 4.1)."""
+    def _initialize_biases(self) -> None:
+        """Initialize biases so that the first outputs state that objects are rare (Lin et al., Focal loss 2017, section
+        4.1)."""
         for head, stride in zip(self.heads, STRIDES, strict=True):
             assert isinstance(head, nn.Conv2d)
             assert head.bias is not None
@@ -98,7 +101,7 @@ class YoloV5(nn.Module):
 
 
 def cell_corners(height: int, width: int, device: torch.device) -> Tensor:
-    """(H, W, 2) column and line of each cell."""
+    """Return column and row of each cell as (H, W, 2)."""
     lines, columns = torch.meshgrid(
         torch.arange(height, device=device), torch.arange(width, device=device), indexing="ij"
     )

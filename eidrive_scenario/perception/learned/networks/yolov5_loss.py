@@ -1,4 +1,4 @@
-"""Which cell and anchor answers for which object, and the loss of `yolov5`."""
+"""Assignment of cells and anchors to objects, and the loss of `yolov5`."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from eidrive_scenario.perception.learned.networks.targets import Targets
 from eidrive_scenario.perception.learned.networks.yolov5 import ANCHORS_PER_SCALE, STRIDES, YoloV5, cell_corners
 
 LARGEST_RATIO = 4.0
-"""An anchor answers for a box if neither side of one is more than this many times that of the other: sizes decode to at
-most (2·1)² = 4 times the anchor."""
+"""Maximum ratio between the sides of an anchor and of its object: decoded sizes are at most (2·1)² = 4 times the
+anchor."""
 SCALE_WEIGHTS = (4.0, 1.0, 0.4)
-"""Of the objectness at strides 8, 16, 32: small objects are many and hard."""
+"""Weights of the objectness at strides 8, 16, 32: small objects are frequent and hard."""
 BOX_WEIGHT, OBJECT_WEIGHT, CLASS_WEIGHT = 2.5, 25.0, 0.6
 
 
 class Assignment(NamedTuple):
-    """The K answers of one scale: picture, anchor, line and column (K,), box (K, 4) [px], class (K,)."""
+    """K assignments of one scale: image, anchor, row and column (K,), box (K, 4) [px], class (K,)."""
 
-    picture: Tensor
+    image: Tensor
     anchor: Tensor
     line: Tensor
     column: Tensor
@@ -32,12 +32,12 @@ class Assignment(NamedTuple):
 
 
 def assign(targets: Targets, anchors: Tensor, stride: int, height: int, width: int) -> Assignment:
-    """The answers of one scale of height x width cells; anchors (A, 2) [px].
+    """Return the assignments of one scale of height x width cells; anchors (A, 2) [px].
 
-    An object is answered for by all anchors of like size, in the cell of its center and in the two next cells whose
-    widened offsets, -0.5 to 1.5, still reach it.
+    An object is assigned to all anchors of similar size, in the cell of its center and in the two neighboring cells
+    whose extended offsets, -0.5 to 1.5, reach it.
     """
-    picture, boxes, classes = targets.objects()
+    image, boxes, classes = targets.objects()
     ratio = boxes[:, None, 2:] / anchors[None]
     fits = torch.maximum(ratio, 1.0 / ratio.clamp(min=1e-9)).amax(dim=2) < LARGEST_RATIO
     row, anchor = torch.nonzero(fits, as_tuple=True)
@@ -57,13 +57,13 @@ def assign(targets: Targets, anchors: Tensor, stride: int, height: int, width: i
     column, line = cells.unbind(dim=1)
     inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
     row, anchor, column, line = row[inside], anchor[inside], column[inside], line[inside]
-    return Assignment(picture[row], anchor, line, column, boxes[row], classes[row])
+    return Assignment(image[row], anchor, line, column, boxes[row], classes[row])
 
 
 class YoloLoss:
-    """CIoU of boxes, binary cross entropy of objectness and classes, each a mean over what it is about.
+    """CIoU of boxes, binary cross entropy of objectness and classes, each averaged.
 
-    The objectness asked of an answering cell is the CIoU of its box. Cells in ignored objects are asked nothing.
+    The target objectness of an assigned cell is the CIoU of its box. Cells in ignored objects are excluded.
     """
 
     def __init__(self, network: YoloV5) -> None:
@@ -71,42 +71,42 @@ class YoloLoss:
         self._classes = network.classes
 
     def __call__(self, outputs: list[Tensor], targets: Targets) -> tuple[Tensor, dict[str, float]]:
-        """The loss of outputs as `YoloV5` gives them, and its parts."""
+        """Return the loss of outputs of `YoloV5`, and its terms."""
         device = outputs[0].device
         box_loss, object_loss, class_loss = (torch.zeros((), device=device) for _ in range(3))
-        answers = 0
+        assigned = 0
         for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
             raw = raw.float()
             height, width = raw.shape[2:4]
             found = assign(targets, self._anchors[scale], stride, height, width)
-            wanted = torch.zeros(raw.shape[:4], device=device)
+            expected = torch.zeros(raw.shape[:4], device=device)
             count = len(found.classes)
             if count:
-                answers += count
-                chosen = raw[found.picture, found.anchor, found.line, found.column]
-                share = chosen[:, :4].sigmoid()
+                assigned += count
+                predictions = raw[found.image, found.anchor, found.line, found.column]
+                share = predictions[:, :4].sigmoid()
                 cells = torch.stack([found.column, found.line], dim=1)
                 center = (2.0 * share[:, :2] - 0.5 + cells) * stride
                 size = (2.0 * share[:, 2:]).square() * self._anchors[scale][found.anchor]
                 fit = complete_iou(torch.cat([center, size], dim=1), found.boxes)
                 box_loss = box_loss + (1.0 - fit).sum()
-                wanted.index_put_((found.picture, found.anchor, found.line, found.column), fit.detach().clamp(min=0.0))
+                expected.index_put_((found.image, found.anchor, found.line, found.column), fit.detach().clamp(min=0.0))
                 one_hot = torch.zeros((count, self._classes), device=device)
                 one_hot[torch.arange(count, device=device), found.classes] = 1.0
-                class_loss = class_loss + binary_cross_entropy_with_logits(chosen[:, 5:], one_hot, reduction="sum")
-            asked = self._asked(targets, height, width, stride, device) | (wanted > 0.0)
-            each = binary_cross_entropy_with_logits(raw[..., 4], wanted, reduction="none")
-            object_loss = object_loss + SCALE_WEIGHTS[scale] * (each * asked).mean()
-        share_of_answers = 1.0 / max(answers, 1)
+                class_loss = class_loss + binary_cross_entropy_with_logits(predictions[:, 5:], one_hot, reduction="sum")
+            considered = self._considered(targets, height, width, stride, device) | (expected > 0.0)
+            each = binary_cross_entropy_with_logits(raw[..., 4], expected, reduction="none")
+            object_loss = object_loss + SCALE_WEIGHTS[scale] * (each * considered).mean()
+        inverse_count = 1.0 / max(assigned, 1)
         parts = {
-            "box": BOX_WEIGHT * share_of_answers * box_loss,
+            "box": BOX_WEIGHT * inverse_count * box_loss,
             "object": OBJECT_WEIGHT * object_loss,
-            "class": CLASS_WEIGHT * share_of_answers * class_loss,
+            "class": CLASS_WEIGHT * inverse_count * class_loss,
         }
         return sum(parts.values(), torch.zeros((), device=device)), {k: float(v.detach()) for k, v in parts.items()}
 
-    def _asked(self, targets: Targets, height: int, width: int, stride: int, device: torch.device) -> Tensor:
-        """(B, A, H, W) cells that are not in an ignored object."""
+    def _considered(self, targets: Targets, height: int, width: int, stride: int, device: torch.device) -> Tensor:
+        """Return the cells (B, A, H, W) that are not in an ignored object."""
         centers = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
         free = ~targets.in_ignored(centers).view(-1, 1, height, width)
         return free.expand(-1, ANCHORS_PER_SCALE, -1, -1)

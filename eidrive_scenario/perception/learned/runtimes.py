@@ -1,0 +1,176 @@
+"""Runtimes that execute networks of third parties: ONNX Runtime, OpenCV and TorchScript, on the CPU."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import logging
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from eidrive_scenario.arrays import Floats
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
+from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, read_weights
+
+LAYOUTS = (
+    "yolov5 (1, N, 5 + C): cx cy w h objectness, probability of each class; "
+    "yolov8 (1, 4 + C, N): cx cy w h, probability of each class; "
+    "boxes_scores: (1, N, 4) x1 y1 x2 y2 and (1, N, C); detections (N, 6): x1 y1 x2 y2 score class"
+)
+
+Compute = Callable[[Floats], list[Floats]]
+"""Function from an image (1, 3, H, W) in [0, 1] to all outputs of a network."""
+
+ONNX_SUFFIX = ".onnx"
+_ONNXRUNTIME = "onnxruntime"
+_LAYER = re.compile(r"Node \[([\w.]{1,60})@")
+_LOG = logging.getLogger(__name__)
+_FATAL_ONLY = 4
+"""Log level of ONNX Runtime: its errors are raised as exceptions as well."""
+
+
+def runtime_versions(path: Path) -> Mapping[str, str]:
+    """Return name and version of the library that executes these weights. No library is imported."""
+    if path.suffix != ONNX_SUFFIX:
+        return {"torch": version("torch")} if _is_installed("torch") else {}
+    if _is_installed(_ONNXRUNTIME):
+        return {_ONNXRUNTIME: version(_ONNXRUNTIME)}
+    return {"opencv": cv2.__version__}
+
+
+def load_network(path: Path, threads: int) -> Compute:
+    """Return the function of a network in an ONNX or TorchScript file.
+
+    ONNX Runtime executes ONNX models if it is installed, OpenCV otherwise. Raise SettingError if the file is not a
+    readable model.
+    """
+    if path.suffix == TORCHSCRIPT_SUFFIX:
+        return torchscript_network(path, threads)
+    return onnxruntime_network(path, threads) if _is_installed(_ONNXRUNTIME) else opencv_network(path, threads)
+
+
+def onnxruntime_network(path: Path, threads: int) -> Compute:
+    """Return the function of an ONNX model, executed by ONNX Runtime with its deterministic kernels."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.use_deterministic_compute = True
+    options.log_severity_level = _FATAL_ONLY
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.add_session_config_entry("session.load_model_format", "ONNX")
+    # A model may name further files with its tensors. Below a path that is a file there are none.
+    options.add_session_config_entry("session.model_external_initializers_file_folder_path", str(path.resolve()))
+    content = read_weights(path)
+    try:
+        session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # the exceptions of ONNX Runtime have no common base class
+        raise _unreadable(path, "an ONNX model", error) from error
+    inputs = [entry.name for entry in session.get_inputs()]
+    if len(inputs) != 1:
+        message = f"weights {quoted(str(path))} have {len(inputs)} inputs (expected 1, the image)"
+        raise SettingError(Diagnostic(message, "export the model with the image as its only input"))
+
+    def compute(pixels: Floats) -> list[Floats]:
+        try:
+            outputs = session.run(None, {inputs[0]: pixels})
+        except Exception as error:  # as above
+            raise RuntimeError(str(error)) from error
+        if not all(isinstance(output, np.ndarray) and output.dtype.kind in "fiu" for output in outputs):
+            raise _unexpected_outputs(path, outputs)
+        return [np.atleast_1d(np.asarray(output, dtype=np.float32)) for output in outputs]
+
+    return compute
+
+
+def opencv_network(path: Path, threads: int) -> Compute:
+    """Return the function of an ONNX model, executed by OpenCV, which supports common layers only."""
+    cv2.setNumThreads(threads)
+    # From memory: a model that is read by its path may name further files with its tensors.
+    content = np.frombuffer(read_weights(path), dtype=np.uint8)
+    try:
+        with _silent_opencv():
+            network = cv2.dnn.readNetFromONNX(content)
+        names = network.getUnconnectedOutLayersNames()
+    except (cv2.error, MemoryError) as error:
+        raise _unreadable(path, "an ONNX model", error) from error
+
+    def compute(pixels: Floats) -> list[Floats]:
+        network.setInput(pixels)
+        try:
+            with _silent_opencv():
+                outputs = network.forward(names)
+        except cv2.error as error:
+            raise RuntimeError(str(error)) from error
+        return [np.asarray(output, dtype=np.float32) for output in outputs]
+
+    return compute
+
+
+def torchscript_network(path: Path, threads: int) -> Compute:
+    """Return the function of a TorchScript model, executed by torch. Loading can execute any code."""
+    import torch
+
+    torch.set_num_threads(threads)
+    content = read_weights(path)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # torch recommends torch.export
+            network: Any = torch.jit.load(io.BytesIO(content), map_location="cpu").eval()  # type: ignore[no-untyped-call]
+    except (RuntimeError, ValueError, OSError) as error:
+        raise _unreadable(path, "a TorchScript model", error) from error
+
+    def compute(pixels: Floats) -> list[Floats]:
+        with torch.inference_mode():
+            returned = network(torch.from_numpy(pixels))
+        outputs = returned if isinstance(returned, (list, tuple)) else [returned]
+        if not all(isinstance(output, torch.Tensor) for output in outputs):
+            raise _unexpected_outputs(path, outputs)
+        return [np.atleast_1d(output.float().numpy()) for output in outputs]
+
+    return compute
+
+
+@contextmanager
+def _silent_opencv() -> Iterator[None]:
+    """Suppress the log of OpenCV, which prints its exceptions as well."""
+    before = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(before)
+
+
+def _is_installed(module: str) -> bool:
+    return importlib.util.find_spec(module) is not None
+
+
+def _unexpected_outputs(path: Path, outputs: list[Any] | tuple[Any, ...]) -> SettingError:
+    """Return the error for outputs that are not tensors of numbers."""
+    kinds = ", ".join(dict.fromkeys(type(output).__name__ for output in outputs))
+    message = f"weights {quoted(str(path))} return {shortened(kinds, 100)} (expected tensors of numbers)"
+    return SettingError(Diagnostic(message, f"export the model with one of the layouts: {LAYOUTS}"))
+
+
+def _unreadable(path: Path, kind: str, error: Exception) -> SettingError:
+    """Return the error for a file that cannot be read as a model.
+
+    Its reason may quote the file, so the message names only an unsupported layer.
+    """
+    _LOG.debug("%s: %s", path, error)
+    message, hint = f"weights {quoted(str(path))} are not {kind} that can be read", "export the model again"
+    if isinstance(error, cv2.error):
+        layer = _LAYER.search(str(error))
+        message += f": OpenCV does not support layer {layer[1]}" if layer else ""
+        hint += ", or install ONNX Runtime: pip install eidrive-scenario[onnx]"
+    return SettingError(Diagnostic(message, hint))
