@@ -1,4 +1,4 @@
-"""`python -m eidrive_scenario` is `eidrive`."""
+"""Entry point of `python -m eidrive_scenario`, equal to `eidrive`."""
 
 from eidrive_scenario.cli import main
 

@@ -1,6 +1,6 @@
-"""The command `eidrive`. Each command imports what it needs when it runs, so that `--help` is quick.
+"""Command `eidrive`. Each command imports its modules when it is executed, so that `--help` is fast.
 
-Exit codes: 0 passed, 1 a criterion failed, 2 the input is wrong, 3 the run broke or ran out of its time limit.
+Exit codes: 0 passed, 1 a criterion failed, 2 invalid input, 3 the run was aborted or reached its time limit.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.check import check
-from eidrive_scenario.cli.error_output import BROKEN, Guarded, print_error
+from eidrive_scenario.cli.error_output import ABORTED, Guarded, print_error
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
 from eidrive_scenario.cli.streams import make_writable
@@ -19,7 +19,7 @@ from eidrive_scenario.cli.supervision import allow
 app = typer.Typer(
     name="eidrive",
     cls=Guarded,
-    help="Play OpenSCENARIO files with cooperative perception, and judge them.",
+    help="Run OpenSCENARIO files with cooperative perception, and evaluate them.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -32,8 +32,8 @@ app.command()(view)
 app.command()(report)
 
 
-def _show_version(asked: bool) -> None:
-    if asked:
+def _show_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         typer.echo(f"eidrive-scenario {version('eidrive-scenario')}")
@@ -43,17 +43,17 @@ def _show_version(asked: bool) -> None:
 @app.callback()
 def _options(
     traceback: Annotated[
-        bool, typer.Option("--traceback", envvar="EIDRIVE_TRACEBACK", help="Show where an internal error arose.")
+        bool, typer.Option("--traceback", envvar="EIDRIVE_TRACEBACK", help="Show the traceback of an internal error.")
     ] = False,
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Options before the command; `Guarded` and `_show_version` act on them."""
+    """Define the options before the command, which `Guarded` and `_show_version` evaluate."""
 
 
 def main() -> None:
-    """Entry point; ends the process with the command's exit code."""
+    """Run the command line and end the process with its exit code."""
     make_writable()
     allow()
     try:
@@ -61,4 +61,4 @@ def main() -> None:
     except OSError as error:
         # Help and usage errors are printed before a command runs.
         print_error(error)
-        raise SystemExit(BROKEN) from error
+        raise SystemExit(ABORTED) from error

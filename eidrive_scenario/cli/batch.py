@@ -1,4 +1,4 @@
-"""`eidrive run` on a parameter value distribution: its runs one after the other."""
+"""`eidrive run` of a parameter value distribution: its runs in sequence."""
 
 from __future__ import annotations
 
@@ -7,67 +7,68 @@ from pathlib import Path
 
 import typer
 
-from eidrive_scenario.cli.error_output import WRONG_INPUT
+from eidrive_scenario.cli.error_output import INVALID_INPUT
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution
 
-Play = Callable[[ConcreteRun], int]
-"""Plays a run and gives its exit code."""
+RunOne = Callable[[ConcreteRun], int]
+"""Function that executes a run and returns its exit code."""
 
 
-def run_distribution(path: Path, play: Play, *, seed: int, most: int | None, parameters: Mapping[str, object]) -> int:
-    """Play the runs of a distribution and tell on stderr what was left out; the highest exit code is that of all.
+def run_distribution(
+    path: Path, run_one: RunOne, *, seed: int, max_runs: int | None, parameters: Mapping[str, object]
+) -> int:
+    """Execute the runs of a distribution, report skipped runs on stderr, and return the highest exit code.
 
-    seed        for a stochastic distribution that names no randomSeed
-    most        number of runs, spread over all values; None: all runs
-    parameters  given for all runs: none of those that the distribution varies
+    seed        seed of a stochastic distribution without randomSeed
+    max_runs    number of runs, spread over all values; None: all runs
+    parameters  values for all runs; parameters that the distribution varies are excluded
 
-    A run whose parameters the scenario's constraints rule out is left out, as the standard wants. A run with a wrong
-    value does not keep the others from being played, unless it is the first.
-    Raise InputError if the distribution is wrong, its first run is, or no run is left.
+    A run that violates the constraints of its parameters is skipped, as the standard requires. An invalid value in the
+    first run is an error; in a later run it is reported, and the other runs are executed.
+    Raise InputError if the distribution or its first run is invalid, or if all runs are skipped.
     """
-    unfolding = load_distribution(path, seed=seed)
-    _refuse_varied(unfolding, parameters)
-    numbers = range(len(unfolding)) if most is None else unfolding.spread(most)
-    for warning in unfolding.warnings:
+    expansion = load_distribution(path, seed=seed)
+    _check_not_varied(expansion, parameters)
+    numbers = range(len(expansion)) if max_runs is None else expansion.spread(max_runs)
+    for warning in expansion.warnings:
         typer.secho(f"warning: {warning}", fg="yellow", err=True)
-    counts = {"passed": 0, "not passed": 0, "ruled out by constraints": 0}
+    counts = {"passed": 0, "not passed": 0, "excluded by constraints": 0}
     code = 0
     last: ConstraintError | None = None
-    for run in _runs(unfolding, numbers):
+    for run in _runs(expansion, numbers):
         try:
-            result = play(run)
+            result = run_one(run)
         except ConstraintError as error:
             last = error
-            counts["ruled out by constraints"] += 1
-            typer.secho(f"run {run.number} ({run}) is left out: {error}", fg="yellow", err=True)
+            counts["excluded by constraints"] += 1
+            typer.secho(f"run {run.number} ({run}) is skipped: {error}", fg="yellow", err=True)
             continue
         except InputError as error:
             if not counts["passed"] + counts["not passed"]:
                 raise
             typer.echo(f"run {run.number} ({run}): {error}", err=True)
-            result = WRONG_INPUT
+            result = INVALID_INPUT
         counts["not passed" if result else "passed"] += 1
         code = max(code, result)
-    if last is not None and counts["ruled out by constraints"] == len(numbers):
+    if last is not None and counts["excluded by constraints"] == len(numbers):
         raise ScenarioError(last.diagnostics)
-    counts["not asked for"] = len(unfolding) - len(numbers)
-    told = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
-    typer.echo(f"{len(unfolding)} runs in {path}: {told}", err=True)
+    counts["not selected"] = len(expansion) - len(numbers)
+    summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
+    typer.echo(f"{len(expansion)} runs in {path}: {summary}", err=True)
     return code
 
 
-def _runs(unfolding: DistributionExpansion, numbers: Sequence[int]) -> Iterator[ConcreteRun]:
-    return (unfolding[number] for number in numbers)
+def _runs(expansion: DistributionExpansion, numbers: Sequence[int]) -> Iterator[ConcreteRun]:
+    return (expansion[number] for number in numbers)
 
 
-def _refuse_varied(unfolding: DistributionExpansion, parameters: Mapping[str, object]) -> None:
-    varied = unfolding.varied.names
+def _check_not_varied(expansion: DistributionExpansion, parameters: Mapping[str, object]) -> None:
     diagnostics = [
         Diagnostic(
-            f"--param {name!r} would undo what the distribution varies", "leave it out", origin.source, origin.line
+            f"--param: the distribution varies parameter {name!r}", "remove the option", origin.source, origin.line
         )
-        for name, origin in varied.items()
+        for name, origin in expansion.varied.names.items()
         if name in parameters
     ]
     if diagnostics:

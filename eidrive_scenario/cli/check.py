@@ -1,4 +1,4 @@
-"""`eidrive check`."""
+"""Command `eidrive check`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.error_output import BROKEN, WRONG_INPUT, print_error
+from eidrive_scenario.cli.error_output import ABORTED, INVALID_INPUT, print_error
 from eidrive_scenario.cli.hung_check import HungCheck
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, InputError
@@ -26,19 +26,19 @@ _ROADS = ".xodr"
 
 def check(
     context: typer.Context,
-    paths: Annotated[list[str], typer.Argument(metavar="PATH…", help="Files, folders, or names of the library.")],
-    strict: Annotated[bool, typer.Option("--strict", help="Let warnings count as problems.")] = False,
+    paths: Annotated[list[str], typer.Argument(metavar="PATH…", help="Files, folders, or library names.")],
+    strict: Annotated[bool, typer.Option("--strict", help="Treat warnings as errors.")] = False,
     ignore: Annotated[
-        list[str] | None, typer.Option(metavar="RULE", help="A rule to leave out; repeatable.", show_default="none")
+        list[str] | None, typer.Option(metavar="RULE", help="Rule to ignore; repeatable.", show_default="none")
     ] = None,
     wall_limit: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Maximum wall time of each file.", show_default="none"),
     ] = None,
 ) -> None:
-    """Print every mistake in scenarios, distributions and roads as `file:line: what is wrong; what would be right`.
+    """Print all diagnostics of scenarios, distributions and roads as `file:line: problem; hint`.
 
-    Findings end with the rule that made them: `eidrive list rules` names all rules.
+    A diagnostic of a rule ends with the name of the rule; `eidrive list rules` lists all rules.
     """
     from eidrive_scenario.checks.distribution_checks import DistributionCheckReport
 
@@ -47,39 +47,39 @@ def check(
         check_wall_limit(wall_limit, "--wall-limit")
         supervise(hung.end, partial(hung.report_dump, wall_limit), "check")
     missing: list[Diagnostic] = []
-    broken: list[BaseException] = []
+    aborted: list[BaseException] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
-    told: dict[str, dict[Diagnostic, None]] = {"problem": dict.fromkeys(missing), "warning": {}, "note": {}}
+    printed: dict[str, dict[Diagnostic, None]] = {"error": dict.fromkeys(missing), "warning": {}, "note": {}}
     for diagnostic in missing:
         typer.echo(str(diagnostic))
     for path in files:
         hung.file = path
         try:
-            collector = _inspect(path, ignored, wall_limit)
+            report = _check_file(path, ignored, wall_limit)
         except InputError:
             raise
         except (Exception, SystemExit) as error:
             if context.find_root().params.get("traceback"):
                 raise
             print_error(error, path)
-            broken.append(error)
+            aborted.append(error)
             continue
-        for level, found in zip(told, (collector.errors, collector.warnings, collector.notes), strict=True):
+        for level, found in zip(printed, (report.errors, report.warnings, report.notes), strict=True):
             for diagnostic in found:
-                if diagnostic not in told[level]:
-                    typer.echo(f"{diagnostic}{_mark(level, diagnostic.rule)}")
-            told[level].update(dict.fromkeys(found))
-        if isinstance(collector, DistributionCheckReport) and collector.runs:
-            typer.echo(f"{path}: {_count(collector.runs, 'run')}")
-    counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in told.items())]
-    typer.echo(", ".join(counts if told["note"] else counts[:-1]))
-    if broken:
-        raise typer.Exit(BROKEN)
-    raise typer.Exit(WRONG_INPUT if told["problem"] or (strict and told["warning"]) else 0)
+                if diagnostic not in printed[level]:
+                    typer.echo(f"{diagnostic}{_suffix(level, diagnostic.rule)}")
+            printed[level].update(dict.fromkeys(found))
+        if isinstance(report, DistributionCheckReport) and report.runs:
+            typer.echo(f"{path}: {_count(report.runs, 'run')}")
+    counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in printed.items())]
+    typer.echo(", ".join(counts if printed["note"] else counts[:-1]))
+    if aborted:
+        raise typer.Exit(ABORTED)
+    raise typer.Exit(INVALID_INPUT if printed["error"] or (strict and printed["warning"]) else 0)
 
 
-def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> CheckReport:
-    """What is wrong with a file of any kind. Raises WallLimitError if that takes longer than the limit [s]."""
+def _check_file(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> CheckReport:
+    """Return the diagnostics of a file of any kind. Raise WallLimitError if the limit [s] is exceeded."""
     from eidrive_scenario.checks.catalog_checks import check_catalog
     from eidrive_scenario.checks.distribution_checks import check_distribution
     from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
@@ -94,22 +94,21 @@ def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> 
                 return check_road_file(path, ignored)
             return (check_distribution if kind == "distribution" else check_scenario)(path, ignored)
         except LimitReached as error:
-            report_extension(error)  # names the extension that was running, if one was
+            report_extension(error)  # raises an error that names a running extension
             raise
 
 
-def _mark(level: str, rule: str) -> str:
-    """What stands behind a finding: how grave it is, and its rule."""
-    word = "error" if level == "problem" else level
+def _suffix(level: str, rule: str) -> str:
+    """Return level and rule of a diagnostic in brackets; empty for an error without a rule."""
     if rule:
-        return f" ({word}: {rule})"
-    return "" if level == "problem" else f" ({word})"
+        return f" ({level}: {rule})"
+    return "" if level == "error" else f" ({level})"
 
 
 def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
-    """The files that are meant; what is not there goes to `missing` and keeps no other from being checked.
+    """Yield the selected files, and append a diagnostic to `missing` for each path without a file.
 
-    A folder stands for its scenarios, which are checked with their roads; one without any for its road files.
+    A folder selects its scenarios, which are checked with their roads, or its road files if it has no scenarios.
     """
     for given in paths:
         if not given or not os.path.isdir(given):
@@ -118,17 +117,17 @@ def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
             except InputError as error:
                 missing += error.diagnostics
             continue
-        inside = _below(given, _SUFFIX) or _below(given, _ROADS)
-        if not inside:
+        found = _files_below(given, _SUFFIX) or _files_below(given, _ROADS)
+        if not found:
             missing.append(Diagnostic(f"no {_SUFFIX} or {_ROADS} file in {given!r}", "give another folder"))
-        yield from inside
+        yield from found
 
 
-def _below(folder: str, suffix: str) -> list[Path]:
-    """The files with a suffix in a folder and in those inside it, sorted; folders that cannot be read are left out."""
-    files = (Path(place, name) for place, _, names in os.walk(folder) for name in names if name.endswith(suffix))
+def _files_below(folder: str, suffix: str) -> list[Path]:
+    """Return the files with a suffix in a folder and its subfolders, sorted, without unreadable folders."""
+    files = (Path(parent, name) for parent, _, names in os.walk(folder) for name in names if name.endswith(suffix))
     return sorted(files)
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -8,14 +8,14 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.cli.error_output import BROKEN, print_error
+from eidrive_scenario.cli.error_output import ABORTED, print_error
 
 if TYPE_CHECKING:
     from eidrive_scenario.wall_limit import Limit
 
 
 class HungCheck:
-    """Reports of `eidrive check` for `supervise`; `file` is the one that is being checked."""
+    """Reports of `eidrive check` for `supervise`; `file` is the file of the check in progress."""
 
     def __init__(self) -> None:
         self.file: Path | None = None
@@ -29,12 +29,12 @@ class HungCheck:
             sys.stdout.flush()
             sys.stderr.flush()
         finally:
-            os._exit(BROKEN)
+            os._exit(ABORTED)
 
     def report_dump(self, limit: float, dump: str) -> None:
         """Report a check whose process ended with this dump of its stack.
 
-        The file is not known here: it was read in the child process.
+        The report omits the file, which only the child process has.
         """
         from eidrive_scenario.hung_runs import describe_dump
 

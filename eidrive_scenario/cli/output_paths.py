@@ -1,4 +1,4 @@
-"""Where a command writes: never over what it reads, and never twice into one file."""
+"""Check of the output paths of a command."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 
 
 def check_output_paths(written: Mapping[str, str | Path | None], read: Iterable[str | Path | None]) -> None:
-    """Refuse to write over a file that is read, or two things into one file.
+    """Raise SettingError if an output path is an input file, or if two options name the same file.
 
-    written  files by the option that names them; None where the option is not given
-    read     files, or anything else that an option may be, such as the name of a profile
-
-    Raise SettingError.
+    written  output paths by option; None for an omitted option
+    read     input files; other values of options, such as the name of a profile, are ignored
     """
-    inputs = {os.path.realpath(place) for place in read if place is not None and os.path.isfile(place)}
+    inputs = {os.path.realpath(path) for path in read if path is not None and os.path.isfile(path)}
     taken: dict[str, str] = {}
-    for option, place in written.items():
-        if place is None or (os.path.exists(place) and not os.path.isfile(place)):
+    for option, path in written.items():
+        if path is None or (os.path.exists(path) and not os.path.isfile(path)):
             continue
-        real = os.path.realpath(place)
+        real = os.path.realpath(path)
         if real in inputs:
-            raise SettingError(Diagnostic(f"{option} would overwrite what is read", "choose another place", str(place)))
+            raise SettingError(Diagnostic(f"{option} would overwrite an input file", "choose another path", str(path)))
         if real in taken:
-            raise SettingError(Diagnostic(f"{taken[real]} and {option} name one file", "give each its own", str(place)))
+            message = f"{taken[real]} and {option} name the same file"
+            raise SettingError(Diagnostic(message, "give two different files", str(path)))
         taken[real] = option

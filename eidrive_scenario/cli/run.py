@@ -1,4 +1,4 @@
-"""`eidrive run`."""
+"""Command `eidrive run`."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.error_output import BROKEN
+from eidrive_scenario.cli.error_output import ABORTED
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
-from eidrive_scenario.cli.streams import has_all_letters
+from eidrive_scenario.cli.streams import has_all_characters
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError
 
 PRINTED = "-"
-"""Instead of a file: standard output."""
+"""Value of a file option that selects standard output."""
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
@@ -27,22 +27,23 @@ def run(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="An .xosc file, or a name of the library such as coop/scenario_1. A distribution is played run by run."
+            help="An .xosc file, or a library name such as coop/scenario_1. All runs of a distribution are executed."
         ),
     ],
     channel: Annotated[
         str | None,
         typer.Option(
-            help="Channel profile, by name or file, or a YAML mapping; none: no cooperation.",
+            help="Channel profile: name, file or YAML mapping; none: no cooperation.",
             show_default="the file's",
         ),
     ] = None,
     detector: Annotated[str | None, typer.Option(help="Detector of all stations.", show_default="the file's")] = None,
     weather: Annotated[
-        str | None, typer.Option(help="Weather preset, by name or file.", show_default="the file's")
+        str | None, typer.Option(help="Weather preset: name or file.", show_default="the file's")
     ] = None,
     cooperate: Annotated[
-        str | None, typer.Option(metavar="A,B|none", help="The senders that are heard.", show_default="the file's")
+        str | None,
+        typer.Option(metavar="A,B|none", help="Senders whose messages are used.", show_default="the file's"),
     ] = None,
     param: Annotated[
         list[str] | None, typer.Option(metavar="K=V", help="Value of a parameter of the scenario; repeatable.")
@@ -52,43 +53,44 @@ def run(
     ] = None,
     controller: Annotated[
         list[str] | None,
-        typer.Option(metavar="K=V", help="Who plays the controller K of another tool, such as alks; repeatable."),
+        typer.Option(metavar="K=V", help="Model V, such as alks, of controller K of another tool; repeatable."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of all randomness.")] = 1,
-    repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with seeds from --seed on.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
+    repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with consecutive seeds from --seed.")] = 1,
     max_runs: Annotated[
-        int | None, typer.Option(min=1, help="Most runs of a distribution, spread over its values.", show_default="all")
+        int | None,
+        typer.Option(min=1, help="Maximum runs of a distribution, spread over its values.", show_default="all"),
     ] = None,
-    dt: Annotated[float, typer.Option(help="Step, in seconds.")] = 0.05,
+    dt: Annotated[float, typer.Option(help="Time step [s].")] = 0.05,
     wall_limit: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Longest wall time of each run, loading included.", show_default="none"),
+        typer.Option(metavar="SECONDS", help="Maximum wall time of each run with loading.", show_default="none"),
     ] = None,
-    time_limit: Annotated[float, typer.Option(help="Longest simulated time, in seconds.")] = 120.0,
+    time_limit: Annotated[float, typer.Option(help="Maximum simulated time [s].")] = 120.0,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder in which each run gets one of its own: recording, pictures, result.json."),
+        typer.Option(help="Folder for one subfolder per run: recording, camera images, result.json."),
     ] = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Leave out recording.mcap and pictures.")] = False,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Omit recording.mcap and camera images.")] = False,
     csv: Annotated[Path | None, typer.Option(help="File for one row per actor and tick.")] = None,
     log: Annotated[
-        str | None, typer.Option(metavar="FILE|-", help="File for what the storyboard does, and why; -: print it.")
+        str | None, typer.Option(metavar="FILE|-", help="File for storyboard transitions and reasons; -: stdout.")
     ] = None,
     explain: Annotated[
         list[str] | None,
-        typer.Option(metavar="EVENT", help="Say why an event or act started, or why not; repeatable."),
+        typer.Option(metavar="EVENT", help="Explain the start of an event or act, or its absence; repeatable."),
     ] = None,
     allow_torchscript: Annotated[
         bool,
         typer.Option(
             "--allow-torchscript",
             envvar="EIDRIVE_ALLOW_TORCHSCRIPT",
-            help="Load TorchScript weights, which can execute any code with your rights.",
+            help="Load TorchScript weights, which can execute any code with your permissions.",
         ),
     ] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run, nothing else.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run and nothing else.")] = False,
 ) -> None:
-    """Play a scenario and judge it, or every run of a distribution of parameter values."""
+    """Run and evaluate a scenario, or all runs of a parameter value distribution."""
     from eidrive_scenario.cli.batch import run_distribution
     from eidrive_scenario.cli.verdicts import show, show_warnings
     from eidrive_scenario.experiments.reproduction import reproduction_lines
@@ -98,31 +100,31 @@ def run(
     from eidrive_scenario.simulation import RunSettings
 
     if json and log == PRINTED:
-        raise SettingError(Diagnostic("--log - and --json would both print", "give the log a file"))
+        raise SettingError(Diagnostic("--log - and --json both write to standard output", "give a file to --log"))
 
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
     if wall_limit is not None:
         report = partial(failures.report_dump, _positive("--wall-limit", wall_limit))
         supervise(failures.end_hung_run, report, publish=failures.share)
-    parameters = _assigned("--param", param or [])
+    parameters = _parse_assignments("--param", param or [])
     settings = RunSettings(
         channel=channel,
         detector=detector,
         cooperate=_senders(cooperate),
         weather=weather,
         parameters=parameters,
-        user_values=_assigned("--user-value", user_value or []),
-        controllers=_assigned("--controller", controller or []),
+        user_values=_parse_assignments("--user-value", user_value or []),
+        controllers=_parse_assignments("--controller", controller or []),
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),
         allow_torchscript=allow_torchscript,
     )
 
-    def play_seeds(source: Path | ConcreteRun) -> int:
+    def run_seeds(source: Path | ConcreteRun) -> int:
         code = 0
-        marks = [] if isinstance(source, Path) else [f"run-{source.number}"]
+        parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
         for each in range(seed, seed + repeat):
-            mark = [*marks, f"seed-{each}"] if repeat > 1 else marks
+            suffixes = [*parts, f"seed-{each}"] if repeat > 1 else parts
             explanations = [Explanation(name) for name in explain or ()]
             failures.begin(each, None if isinstance(source, Path) else source.number)
             try:
@@ -132,8 +134,8 @@ def run(
                     settings=settings,
                     below=out,
                     record=not no_record,
-                    csv=_marked(csv, mark) if csv is not None else None,
-                    log=_marked(Path(log), mark) if log is not None and log != PRINTED else log,
+                    csv=_with_suffixes(csv, suffixes) if csv is not None else None,
+                    log=_with_suffixes(Path(log), suffixes) if log is not None and log != PRINTED else log,
                     explanations=explanations,
                     wall_limit=wall_limit,
                 )
@@ -141,10 +143,10 @@ def run(
                 raise
             except EidriveError as error:
                 failures.report(error)
-                code = max(code, BROKEN)
+                code = max(code, ABORTED)
                 continue
             if json:
-                typer.echo(as_json_text(result, ascii_only=not has_all_letters()))
+                typer.echo(as_json_text(result, ascii_only=not has_all_characters()))
                 show_warnings(result)
                 for line in reproduction_lines(result):
                     typer.echo(line, err=True)
@@ -160,19 +162,19 @@ def run(
     path = resolve_scenario(scenario)
     check_output_paths({"--csv": csv, "--log": None if log == PRINTED else log}, (path, channel, weather))
     if definition(path) == "distribution":
-        raise typer.Exit(run_distribution(path, play_seeds, seed=seed, most=max_runs, parameters=parameters))
+        raise typer.Exit(run_distribution(path, run_seeds, seed=seed, max_runs=max_runs, parameters=parameters))
     if max_runs is not None:
         raise SettingError(
-            Diagnostic(f"--max-runs {max_runs} means nothing here", "it is for distributions", str(path))
+            Diagnostic(f"--max-runs has no effect for a scenario (got {max_runs})", "remove the option", str(path))
         )
-    raise typer.Exit(play_seeds(path))
+    raise typer.Exit(run_seeds(path))
 
 
-def _marked(path: Path, mark: list[str]) -> Path:
-    """The file of one run among several. A device takes them all, and `atomic_output` refuses a folder."""
-    if not mark or (path.exists() and not path.is_file()):
+def _with_suffixes(path: Path, suffixes: list[str]) -> Path:
+    """Return the file of one run among several. All runs write to one device; `atomic_output` refuses a folder."""
+    if not suffixes or (path.exists() and not path.is_file()):
         return path
-    return path.with_stem("-".join([path.stem, *mark]))
+    return path.with_stem("-".join([path.stem, *suffixes]))
 
 
 def _senders(text: str | None) -> tuple[str, ...] | None:
@@ -180,21 +182,21 @@ def _senders(text: str | None) -> tuple[str, ...] | None:
         return None
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     if not names:
-        raise SettingError(Diagnostic(f"--cooperate {text!r} names nobody", "write none for no cooperation"))
+        raise SettingError(Diagnostic(f"--cooperate: no station is listed (got {text!r}; expected A,B or none)"))
     return () if names == ("none",) else names
 
 
-def _assigned(option: str, assignments: list[str]) -> dict[str, str]:
+def _parse_assignments(option: str, assignments: list[str]) -> dict[str, str]:
     values: dict[str, str] = {}
     for assignment in assignments:
         name, equals, value = assignment.partition("=")
         if not equals or not name:
-            raise SettingError(Diagnostic(f"{option} {assignment!r} assigns nothing", f"write {option} NAME=VALUE"))
+            raise SettingError(Diagnostic(f"{option}: no value is assigned (got {assignment!r}; expected NAME=VALUE)"))
         values[name] = value
     return values
 
 
 def _positive(option: str, value: float) -> float:
     if not 0 < value < float("inf"):
-        raise SettingError(Diagnostic(f"{option} is {value}", "give a positive number of seconds"))
+        raise SettingError(Diagnostic(f"{option}: not a positive number of seconds (got {value})"))
     return value

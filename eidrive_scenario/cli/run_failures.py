@@ -1,4 +1,4 @@
-"""How `eidrive run` reports a run that was aborted, on standard error and as a line of `--json`."""
+"""Reports of aborted runs of `eidrive run`, on standard error and as a line of `--json`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from eidrive_scenario.cli.error_output import BROKEN, print_error, show_traceback
-from eidrive_scenario.cli.streams import has_all_letters
+from eidrive_scenario.cli.error_output import ABORTED, print_error, show_traceback
+from eidrive_scenario.cli.streams import has_all_characters
 from eidrive_scenario.errors import EidriveError, SimulationError
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ _LENGTH = struct.Struct("<I")
 class RunFailures:
     """Reports of the runs of one command.
 
-    scenario   as it was given
-    traceback  whether errors are shown with their traceback
+    scenario   argument of the command
+    traceback  whether errors are printed with their traceback
     """
 
     def __init__(self, scenario: str, *, json: bool, traceback: bool) -> None:
@@ -42,16 +42,16 @@ class RunFailures:
         """The run in progress, for the process that waits for it: length and JSON."""
 
     def begin(self, seed: int, run: int | None) -> None:
-        """Name the run that begins: its seed, and its number in a distribution."""
+        """Set seed and distribution number of the run in progress."""
         self._seed, self._run = seed, run
 
     def report(self, error: EidriveError) -> None:
-        """Report the error of the present run, with its traceback where that is wanted."""
+        """Report the error of the run in progress, with its traceback on request."""
         self._print_json(error)
         (show_traceback if self._traceback else print_error)(error)
 
     def end_hung_run(self, limit: Limit, frame: FrameType | None) -> None:
-        """Report a run that executes this frame and cannot be interrupted, and end the process."""
+        """Report an uninterruptible run that executes this frame, and end the process."""
         from eidrive_scenario.hung_runs import describe_hung_run
 
         error = describe_hung_run(limit, frame)
@@ -63,10 +63,10 @@ class RunFailures:
             sys.stdout.flush()
             sys.stderr.flush()
         finally:
-            os._exit(BROKEN)
+            os._exit(ABORTED)
 
     def share(self, limit: Limit) -> None:
-        """Save seed, number and notes of the present run for `report_dump` in another process."""
+        """Save seed, number and notes of the run in progress for `report_dump` in another process."""
         data = json.dumps([self._seed, self._run, limit.notes]).encode()
         if _LENGTH.size + len(data) > _SHARED:
             data = json.dumps([self._seed, self._run, []]).encode()
@@ -86,13 +86,20 @@ class RunFailures:
         print_error(error)
 
     def _print_json(self, error: EidriveError) -> None:
-        """Print the run's object, where results are printed as such."""
+        """Print the JSON object of the run if `--json` is set."""
         if not self._json:
             return
-        told = error.as_json() if isinstance(error, SimulationError) else {"kind": "run", "message": str(error)}
+        description = error.as_json() if isinstance(error, SimulationError) else {"kind": "run", "message": str(error)}
         run = {} if self._run is None else {"run": self._run}
         seed = {} if self._seed is None else {"seed": self._seed}
-        entry = {"scenario": self._scenario, **run, **seed, "passed": False, "end_reason": "error", "error": told}
+        entry = {
+            "scenario": self._scenario,
+            **run,
+            **seed,
+            "passed": False,
+            "end_reason": "error",
+            "error": description,
+        }
         if notes := getattr(error, "__notes__", None):
             entry["notes"] = notes
-        typer.echo(json.dumps(entry, ensure_ascii=not has_all_letters()))
+        typer.echo(json.dumps(entry, ensure_ascii=not has_all_characters()))

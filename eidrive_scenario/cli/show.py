@@ -1,4 +1,4 @@
-"""Commands that show something: `list`, `tree`, `view`, `report`."""
+"""Commands that display data: `list`, `tree`, `view`, `report`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 
 
 class Names(StrEnum):
-    """What `eidrive list` can list."""
+    """Kinds of names that `eidrive list` prints."""
 
     scenarios = "scenarios"
     catalogs = "catalogs"
@@ -29,7 +29,7 @@ class Names(StrEnum):
     rules = "rules"
 
 
-def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = Names.scenarios) -> None:
+def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")] = Names.scenarios) -> None:
     """List names of the library or of installed extensions."""
     from eidrive_scenario import library
     from eidrive_scenario.registry import registry
@@ -56,7 +56,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
 
 
 def _catalog_lines() -> list[str]:
-    """One line per entry, and at the end how a scenario refers to them."""
+    """Return one line per entry, and two lines about references from scenarios."""
     from eidrive_scenario.library import LIBRARY_FOLDER, library_path
     from eidrive_scenario.openscenario.library_catalogs import CATALOGS, library_catalog_entries
 
@@ -67,19 +67,19 @@ def _catalog_lines() -> list[str]:
         rows.append((entry.catalog, entry.name, kind, size, f"{entry.mass:g} kg" if entry.mass is not None else ""))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    place = f"{LIBRARY_FOLDER}/{CATALOGS}"
+    folder = f"{LIBRARY_FOLDER}/{CATALOGS}"
     return [
         *lines,
-        f'From any folder: <VehicleCatalog><Directory path="{place}"/></VehicleCatalog>',
-        f"For other engines, copy {library_path() / CATALOGS} to {place} beside the scenario.",
+        f'From any folder: <VehicleCatalog><Directory path="{folder}"/></VehicleCatalog>',
+        f"For other engines, copy {library_path() / CATALOGS} to {folder} beside the scenario.",
     ]
 
 
 def tree(
-    scenario: Annotated[str, typer.Argument(help="An .xosc file, or a name of the library.")],
-    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it into this file instead.")] = None,
+    scenario: Annotated[str, typer.Argument(help="An .xosc file, or a library name.")],
+    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="SVG file for a diagram instead of text.")] = None,
 ) -> None:
-    """Print a scenario's storyboard as a tree, triggers in words, or draw it."""
+    """Print the storyboard of a scenario as a tree with its triggers, or draw it as a diagram."""
     from eidrive_scenario.cli.storyboard_tree import storyboard_tree
     from eidrive_scenario.cli.verdicts import console
     from eidrive_scenario.library import resolve_scenario
@@ -101,7 +101,9 @@ def tree(
 
 def view(
     recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="The page; beside the recording by default.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File of the page.", show_default="beside the recording")
+    ] = None,
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
     """Write a recorded run as an HTML replay."""
@@ -118,30 +120,30 @@ def view(
     for line in replay.damage:
         typer.secho(f"warning: {path} is damaged: {line}", fg="yellow", err=True)
     if not complete:
-        typer.secho(f"warning: {path}: the run did not end, this is what there is of it", fg="yellow", err=True)
+        typer.secho(f"warning: {path}: the run did not end, the recording is incomplete", fg="yellow", err=True)
     typer.echo(str(page))
     if browser:
         typer.launch(page.resolve().as_uri())
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(help="Folders written by run --out, or folders of such folders.")],
+    runs: Annotated[list[Path], typer.Argument(help="Folders written by run --out, or their parents.")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Folder of report.html, or a page.", show_default="the first folder of runs"),
+        typer.Option("--out", "-o", help="Folder of report.html, or a file.", show_default="the first folder of runs"),
     ] = None,
 ) -> None:
-    """Write one page over many runs."""
+    """Write an HTML report of many runs."""
     from eidrive_scenario.recording.run_files import read_result, result_paths, unfinished_runs
     from eidrive_scenario.reporting.run_report.report import write_report
 
     files = list(result_paths(runs))
     results = [read_result(path) for path in files]
     for path in unfinished_runs(runs):
-        typer.secho(f"warning: {path}: the run did not end, it is not in the report", fg="yellow", err=True)
+        typer.secho(f"warning: {path}: the run did not end, the report omits it", fg="yellow", err=True)
     if not results:
-        places = ", ".join(map(str, runs))
-        raise SettingError(Diagnostic(f"no result.json in {places}", "give folders that eidrive run --out has written"))
+        folders = ", ".join(map(str, runs))
+        raise SettingError(Diagnostic(f"no result.json in {folders}", "give folders written by eidrive run --out"))
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
     typer.echo(str(write_report(results, out, sources=files)))

@@ -1,4 +1,4 @@
-"""A storyboard as a tree for human eyes: elements with their limits, triggers and actions in words."""
+"""Human-readable tree of a storyboard: elements with their limits, triggers and actions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _KINDS = {"maneuverGroup": "maneuver group"}
 
 
 def storyboard_tree(storyboard: Storyboard) -> Tree:
-    """The tree that a run would tick, with the actions of Init first."""
+    """Return the storyboard as a tree, with the actions of Init first."""
     root = Tree(Text(storyboard.scenario.name, style="bold"), guide_style="dim")
     init = root.add(_heading("init", "", ""))
     for behavior in storyboard.init.children:
@@ -25,15 +25,15 @@ def storyboard_tree(storyboard: Storyboard) -> Tree:
 
 def _add(branch: Tree, element: StoryElement) -> None:
     name = "" if element.kind == "storyboard" else element.name
-    here = branch.add(_heading(_KINDS.get(element.kind, element.kind), name, _remarks(element)))
-    for word, leaf in (("starts", element.start_leaf), ("stops", element.stop_leaf)):
+    node = branch.add(_heading(_KINDS.get(element.kind, element.kind), name, _remarks(element)))
+    for verb, leaf in (("starts", element.start_leaf), ("stops", element.stop_leaf)):
         if leaf is not None:
-            here.add(Text.assemble((f"{word} when ", "cyan"), leaf.trigger.describe() or "criteria say so"))
+            node.add(Text.assemble((f"{verb} when ", "cyan"), leaf.trigger.describe() or "criteria end the run"))
     if isinstance(element, ActionElement):
         for behavior in element.children:
-            here.add(_action(behavior))
+            node.add(_action(behavior))
     for child in element.elements:
-        _add(here, child)
+        _add(node, child)
 
 
 def _remarks(element: StoryElement) -> str:

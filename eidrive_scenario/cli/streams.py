@@ -1,4 +1,4 @@
-"""Standard output and error as this process finds them: closed, or in an encoding that lacks letters."""
+"""Standard streams that are closed, or whose encoding lacks characters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TextIO
 
 
 def make_writable() -> None:
-    """Let every message be written: what the encoding lacks as `\\u2265`, and nowhere where the stream is closed."""
+    """Make all messages writable: missing characters as `\\u2265`; a closed stream discards its output."""
     sys.stdout, sys.stderr = _writable(sys.stdout), _writable(sys.stderr)
 
 
@@ -21,6 +21,6 @@ def _writable(stream: TextIO | None) -> TextIO:
     return stream
 
 
-def has_all_letters() -> bool:
-    """Whether standard output can write whatever a text may contain."""
+def has_all_characters() -> bool:
+    """True if the encoding of standard output contains all characters."""
     return (getattr(sys.stdout, "encoding", None) or "utf-8").lower().replace("-", "") in ("utf8", "utf16", "utf32")

@@ -1,4 +1,4 @@
-"""`--wall-limit` of commands in a process of their own, whose parent reports what no code in it can interrupt."""
+"""`--wall-limit` in a child process, whose parent reports code that cannot be interrupted."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from typing import BinaryIO
 
 import typer
 
-from eidrive_scenario.cli.error_output import BROKEN
+from eidrive_scenario.cli.error_output import ABORTED
 from eidrive_scenario.files.bounded import file_in_memory
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 _FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 _DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of prctl(2)."""
+"""Option PR_SET_PDEATHSIG of prctl(2)."""
 _allowed = False
 
 
 def allow() -> None:
-    """Let commands of this process use a process of their own: it is that of the command line."""
+    """Allow commands of this process to fork: the process belongs to the command line."""
     global _allowed
     _allowed = True
 
@@ -36,15 +36,14 @@ def supervise(
     what: str = "run",
     publish: Callable[[Limit], None] | None = None,
 ) -> None:
-    """Continue in a child process; the parent waits for it and ends with its exit code, 3 where that is none of a run.
+    """Continue in a child process. The parent waits and ends with its exit code, or 3 for an abnormal end.
 
-    end      report a run that cannot be interrupted, in the child, with the frame that it executes
-    report   the same in the parent, with the stack that faulthandler wrote
-    what     of which messages speak: run or check
-    publish  save the notes of the run in progress for `report`; see LastResort
+    end      report of an uninterruptible run in the child, with the executed frame
+    report   the same report in the parent, with the stack that faulthandler wrote
+    what     subject of messages: run or check
+    publish  function that saves the notes of the run in progress for `report`; see LastResort
 
-    Without `fork`, or in a process that is not the command line's, nothing is done but to limit runs that return to the
-    interpreter.
+    Without `fork`, or outside the process of the command line, only runs that return to the interpreter are limited.
     """
     if not _allowed or not hasattr(os, "fork"):
         return
@@ -67,7 +66,7 @@ def supervise(
 
 
 def _wait(child: int) -> int:
-    """Wait for a child and pass signals on to it, but for ignored ones. Returns its status."""
+    """Wait for a child, forward all signals except ignored ones, and return its status."""
     for number in [getattr(signal, name) for name in _FORWARDED]:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, lambda received, frame: os.kill(child, received))
@@ -79,12 +78,12 @@ def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str
     stack = dump.read().decode(errors="replace")
     if stack:
         report(stack)
-        return BROKEN
+        return ABORTED
     code = os.waitstatus_to_exitcode(status)
     if code < 0:
-        typer.echo(f"the {what} broke: its process was ended by {signal.Signals(-code).name}", err=True)
-        return BROKEN
-    if code != BROKEN and not os.read(finished, 1):
-        typer.echo(f"the {what} broke: an extension ended its process (os._exit)", err=True)
-        return BROKEN
+        typer.echo(f"{what} aborted: its process was ended by {signal.Signals(-code).name}", err=True)
+        return ABORTED
+    if code != ABORTED and not os.read(finished, 1):
+        typer.echo(f"{what} aborted: an extension ended its process (os._exit)", err=True)
+        return ABORTED
     return code

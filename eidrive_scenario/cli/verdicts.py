@@ -1,4 +1,4 @@
-"""A run's result for human eyes."""
+"""Human-readable output of the result of a run."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.experiments.reproduction import reproduction_lines
 from eidrive_scenario.simulation import ABORTED, FAILED, PASSED, RunResult
 
-_OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("ran out of time", "bold red")}
+_OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("time limit", "bold red")}
 
 
 class _Output(Console):
     def on_broken_pipe(self) -> None:
-        """Leave it to the command line, as rich would end with the exit code of a criterion that failed."""
+        """Raise BrokenPipeError for the command line: rich would end with the exit code of a failed criterion."""
         raise BrokenPipeError
 
 
 def console() -> Console:
-    """A terminal's own width; wide enough for a reason on one line where the output goes to a file."""
+    """Return a console of the terminal width; for a file, wide enough for a reason on one line."""
     plain = _Output(highlight=False)
     if plain.is_terminal or "COLUMNS" in os.environ:
         return plain
@@ -31,7 +31,7 @@ def console() -> Console:
 
 
 def show(result: RunResult, varied: str = "") -> None:
-    """Print verdicts, end, fingerprint and speed; for a run of a distribution, with the parameters that it varies."""
+    """Print verdicts, end reason, trace hash and speed; for a run of a distribution, with its varied parameters."""
     out = console()
     word, style = _OUTCOMES[result.exit_code]
     run = "" if result.run is None else f"  run {result.run} ({varied})"
@@ -49,7 +49,7 @@ def show(result: RunResult, varied: str = "") -> None:
             table.add_row(*_row(verdict))
         out.print(table)
     else:
-        out.print("no criterion: nothing was judged", style="yellow")
+        out.print("no criterion: nothing was evaluated", style="yellow")
     pace = result.simulated_s / result.wall_s if result.wall_s > 0 else 0.0
     speed = f", {pace:.{0 if pace >= 10 else 1 if pace >= 1 else 2}f} times real time" if pace else ""
     out.print(Text(f"end: {result.end_reason} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))

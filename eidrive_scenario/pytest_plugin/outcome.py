@@ -150,7 +150,7 @@ def failure_text(error: BaseException) -> str | None:
         return str(error)
     notes: list[str] = getattr(error, "__notes__", [])
     if isinstance(error, OSError) and notes:
-        return "\n".join([f"broken off: {error}", *notes])
+        return "\n".join([f"aborted: {error}", *notes])
     if not isinstance(error, EidriveError):
         return None
     lines = [str(error), *notes]

@@ -63,8 +63,8 @@ def reported(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:
         where = ".".join(str(part) for part in first["loc"])
         raise InputError(
             Diagnostic(
-                f"a result's {where[:200]!r}: {first['msg'].lower()}",
-                "give what eidrive run --json prints",
+                f"result: {where[:200]!r}: {first['msg'].lower()}",
+                "give an object that eidrive run --json prints",
                 str(source),
             )
         ) from error

@@ -27,7 +27,7 @@ def folder(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
 
 def test_nothing_wrong(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     result = eidrive("check", folder())
-    assert (result.exit_code, result.stdout) == (0, "1 file, 0 problems, 0 warnings\n")
+    assert (result.exit_code, result.stdout) == (0, "1 file, 0 errors, 0 warnings\n")
 
 
 def test_all_mistakes_of_all_files(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
@@ -42,7 +42,7 @@ def test_all_mistakes_of_all_files(eidrive: Eidrive, folder: Callable[..., Path]
     assert any(line.startswith(f"{place}/criterion.xosc:47: ") and "did you mean 'Parked'?" in line for line in lines)
     assert any(line.startswith(f"{place}/command.xosc:45: ") and "'eidrive.criterion'?" in line for line in lines)
     assert any(line.startswith(f"{place}/dynamics.xosc:61: ") and "'step'?" in line for line in lines)
-    assert lines[-1] == "4 files, 3 problems, 0 warnings"
+    assert lines[-1] == "4 files, 3 errors, 0 warnings"
     assert result.stderr == ""
 
 
@@ -55,7 +55,7 @@ def test_what_is_not_judged_is_a_warning(eidrive: Eidrive, folder: Callable[...,
     result = eidrive("check", place / "runner.xosc")
     assert result.exit_code == 0, result.output
     assert "criterion 'KeepLaneTest' is not evaluated" in result.stdout
-    assert result.stdout.splitlines()[-1] == "1 file, 0 problems, 1 warning"
+    assert result.stdout.splitlines()[-1] == "1 file, 0 errors, 1 warning"
 
 
 def test_what_is_not_there_keeps_nothing_from_being_checked(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_what_is_not_there_keeps_nothing_from_being_checked(eidrive: Eidrive, pa
     first, second, count = result.stdout.splitlines()
     assert "missing.xosc': neither a file nor in the library" in first
     assert second.startswith("no .xosc or .xodr file in")
-    assert count == "1 file, 2 problems, 0 warnings"
+    assert count == "1 file, 2 errors, 0 warnings"
 
 
 def test_a_folder_without_scenarios(eidrive: Eidrive, tmp_path: Path) -> None:
@@ -94,11 +94,11 @@ def test_road_files(eidrive: Eidrive, tmp_path: Path) -> None:
         "take the link out, or add the junction with its connections (warning: road-link)"
     )
     assert wrong == f"{tmp_path}/wrong.xodr:5: <width> has a='wide'; give a finite number"
-    assert count == "4 files, 2 problems, 1 warning"
+    assert count == "4 files, 2 errors, 1 warning"
     doubtful = tmp_path / "doubtful.xodr"
     assert eidrive("check", doubtful).exit_code == 0
     assert eidrive("check", "--strict", doubtful).exit_code == 2
-    assert eidrive("check", "--strict", "--ignore", "road-link", doubtful).stdout == "1 file, 0 problems, 0 warnings\n"
+    assert eidrive("check", "--strict", "--ignore", "road-link", doubtful).stdout == "1 file, 0 errors, 0 warnings\n"
 
 
 UNUSED = (
@@ -114,7 +114,7 @@ def test_a_rule_that_is_broken_is_named(eidrive: Eidrive, folder: Callable[..., 
     assert result.stdout.splitlines() == [
         f"{path}:5: the parameter 'N' is never used; take it out, or write $N where its value belongs "
         "(warning: unused-parameter)",
-        "1 file, 0 problems, 1 warning",
+        "1 file, 0 errors, 1 warning",
     ]
 
 
@@ -127,7 +127,7 @@ def test_strict_lets_warnings_count(eidrive: Eidrive, folder: Callable[..., Path
 def test_a_rule_can_be_left_out(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     path = folder(unused=UNUSED) / "unused.xosc"
     result = eidrive("check", "--strict", "--ignore", "unused-parameter", path)
-    assert (result.exit_code, result.stdout) == (0, "1 file, 0 problems, 0 warnings\n")
+    assert (result.exit_code, result.stdout) == (0, "1 file, 0 errors, 0 warnings\n")
     unknown = eidrive("check", "--ignore", "unused-parameters", path)
     assert unknown.exit_code == 2
     assert "did you mean 'unused-parameter'?" in unknown.stderr
@@ -139,7 +139,7 @@ def test_notes_are_counted_apart(eidrive: Eidrive, folder: Callable[..., Path]) 
     result = eidrive("check", "--strict", path)
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines()[0].endswith("(note: unused-catalog)")
-    assert result.stdout.splitlines()[1] == "1 file, 0 problems, 0 warnings, 1 note"
+    assert result.stdout.splitlines()[1] == "1 file, 0 errors, 0 warnings, 1 note"
 
 
 def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def test_an_empty_name_is_not_the_folder_one_stands_in(
     (tmp_path / "a.xosc").write_text("<OpenSCENARIO/>")
     result = eidrive("check", "")
     assert result.exit_code == 2
-    assert result.stdout.splitlines()[-1] == "0 files, 1 problem, 0 warnings"
+    assert result.stdout.splitlines()[-1] == "0 files, 1 error, 0 warnings"
 
 
 def test_selections_in_a_circle_are_a_problem(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
@@ -236,7 +236,7 @@ def test_sound_catalog_has_no_problems(eidrive: Eidrive, tmp_path: Path) -> None
     declared = DECLARED.format(kind="double", value="2")
     path.write_text(CATALOG.format(entries=ENTRY.format(name="a", declared=declared, x="$Limit")), encoding="utf-8")
     result = eidrive("check", path)
-    assert (result.exit_code, result.stdout) == (0, "1 file, 0 problems, 0 warnings\n")
+    assert (result.exit_code, result.stdout) == (0, "1 file, 0 errors, 0 warnings\n")
 
 
 def test_check_of_folder_with_folders_named_like_files_checks_the_files_only(
@@ -249,4 +249,4 @@ def test_check_of_folder_with_folders_named_like_files_checks_the_files_only(
     (place / "gone").symlink_to(place / "no-such-folder")
     (place / "around").symlink_to(place)
     result = eidrive("check", place)
-    assert (result.exit_code, result.stdout) == (0, "2 files, 0 problems, 0 warnings\n")
+    assert (result.exit_code, result.stdout) == (0, "2 files, 0 errors, 0 warnings\n")

@@ -44,10 +44,10 @@ def test_check_that_exceeds_its_wall_limit_ends_with_3_and_names_each_file(folde
     assert code == 3
     for name in names:
         path = re.escape(str(library_path() / f"{name}.xosc"))
-        assert re.search(rf"^{path}: the check broke: .*not finished after 1e-06 s of wall time", err, re.MULTILINE), (
+        assert re.search(rf"^{path}: check aborted: .*not finished after 1e-06 s of wall time", err, re.MULTILINE), (
             err
         )
-    assert out == "2 files, 0 problems, 0 warnings\n"
+    assert out == "2 files, 0 errors, 0 warnings\n"
 
 
 def test_check_within_its_wall_limit_is_as_without(folder: Path) -> None:
@@ -58,11 +58,11 @@ def test_check_of_extension_that_hangs_names_it_and_goes_on_with_other_files(fol
     write_scenario(folder / "hangs.xosc", detector="hangs_when_built")
     code, out, err = check(folder, "hangs.xosc", "z_right.xosc", "--wall-limit", "20")
     assert code == 3
-    assert "hangs.xosc: the check broke: " in err
+    assert "hangs.xosc: check aborted: " in err
     assert "detector 'hangs_when_built' (faulty:HangsWhenBuilt)" in err
     assert "still running in __init__ after 20 s of wall time" in err
     assert "z_right.xosc" not in err
-    assert out == "2 files, 0 problems, 0 warnings\n"
+    assert out == "2 files, 0 errors, 0 warnings\n"
 
 
 def test_check_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
@@ -77,10 +77,10 @@ def test_check_of_extension_that_exits_reports_it_and_goes_on_with_other_files(f
     write_scenario(folder / "exits.xosc", detector="exits_when_built")
     code, out, err = check(folder, "exits.xosc", "z_right.xosc")
     assert code == 3
-    assert "exits.xosc: the check broke: " in err
+    assert "exits.xosc: check aborted: " in err
     assert "detector 'exits_when_built' (faulty:ExitsWhenBuilt)" in err
     assert "internal error" not in err
-    assert out == "2 files, 0 problems, 0 warnings\n"
+    assert out == "2 files, 0 errors, 0 warnings\n"
 
 
 @pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])

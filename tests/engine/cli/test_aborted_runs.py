@@ -1,4 +1,4 @@
-"""`eidrive run` of runs that an extension breaks: exit code, messages, lines of `--json`."""
+"""`eidrive run` of runs that an extension aborts: exit code, messages, lines of `--json`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from faulty_extensions import install, line_of, write_scenario
 from eidrive_scenario.recording import read_recording
 
 pytestmark = pytest.mark.timeout(600)
-"""Hung runs take their limit and the grace after it, and several processes load the engine."""
+"""Hung runs last for the limit and the grace period, and several processes load the engine."""
 
 DISTRIBUTION = """<OpenSCENARIO>
 <FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>
@@ -29,7 +29,7 @@ DISTRIBUTION = """<OpenSCENARIO>
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with the package and a scenario."""
+    """Return a folder with the faulty extensions and a scenario."""
     install(tmp_path)
     write_scenario(tmp_path / "s.xosc")
     return tmp_path
@@ -55,8 +55,8 @@ def run(folder: Path, *arguments: str) -> tuple[int, str, str]:
     return process.returncode, out, err
 
 
-def test_sys_exit_of_detector_ends_the_run_with_3_and_others_go_on(folder: Path) -> None:
-    """Two seeds: each has its line of JSON and its message."""
+def test_sys_exit_of_detector_aborts_only_its_run(folder: Path) -> None:
+    """Each of two seeds has its own JSON line and message."""
     code, out, err = run(folder, "s.xosc", "--detector", "exits", "--repeat", "2", "--json", "--out", "runs")
     assert code == 3
     entries = [json.loads(line) for line in out.splitlines()]
@@ -87,8 +87,8 @@ def test_sys_exit_of_detector_ends_the_run_with_3_and_others_go_on(folder: Path)
         pytest.fail("no note names the recording")
 
 
-def test_runs_of_a_distribution_go_on_after_one_that_is_aborted(folder: Path) -> None:
-    """The action fails where the parameter is 4, and not where it is 5."""
+def test_aborted_run_of_distribution_does_not_end_other_runs(folder: Path) -> None:
+    """The action fails for a parameter of 4, and not for 5."""
     text = write_scenario(folder / "s.xosc", action="fails below 5").read_text()
     parameter = '<ParameterDeclaration name="Speed" parameterType="double" value="5"/>'
     text = text.replace(
@@ -103,7 +103,7 @@ def test_runs_of_a_distribution_go_on_after_one_that_is_aborted(folder: Path) ->
     assert "2 runs in d.xosc: 1 passed, 1 not passed" in err
 
 
-def test_run_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
+def test_uninterruptible_run_ends_with_exit_code_3(folder: Path) -> None:
     code, out, err = run(folder, "s.xosc", "--detector", "hangs_in_c", "--wall-limit", "6", "--json")
     assert code == 3
     place = f"{folder / 'faulty.py'}:{line_of('sum(itertools.repeat(0))')}: detector 'hangs_in_c' (faulty:HangsInC)"
@@ -111,8 +111,8 @@ def test_run_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
     assert json.loads(out)["error"]["name"] == "hangs_in_c"
 
 
-def test_run_that_never_returns_to_python_leaves_its_recording_but_for_the_last_second(folder: Path) -> None:
-    """The detector hangs at 2.5 s; the process has ended without closing a file."""
+def test_uninterruptible_run_keeps_recording_except_last_second(folder: Path) -> None:
+    """The detector hangs at 2.5 s, and the process ends without closing its files."""
     write_scenario(folder / "s.xosc", detector="hangs_in_c_later", end=5.0)
     code, out, err = run(
         folder, "s.xosc", "--wall-limit", "6", "--out", "runs", "--json", "--seed", "4", "--repeat", "2"
@@ -128,7 +128,7 @@ def test_run_that_never_returns_to_python_leaves_its_recording_but_for_the_last_
     assert times[-1] >= 2.5 - 1.05
 
 
-def test_run_that_waits_in_native_code_ends_with_3_and_a_closed_recording(folder: Path) -> None:
+def test_run_waiting_in_native_code_ends_with_closed_recording(folder: Path) -> None:
     code, _, err = run(folder, "s.xosc", "--detector", "deadlocks", "--wall-limit", "6", "--out", "runs")
     assert code == 3
     line = line_of("library.pthread_mutex_lock(mutex)")
@@ -141,13 +141,13 @@ def test_run_that_waits_in_native_code_ends_with_3_and_a_closed_recording(folder
 
 
 def test_os_exit_of_extension_under_wall_limit_is_reported(folder: Path) -> None:
-    """Without a limit nobody is there to notice: the process is gone."""
+    """Without a limit there is no parent process that could report it."""
     code, _, err = run(folder, "s.xosc", "--detector", "ends_process", "--wall-limit", "600")
-    assert (code, err) == (3, "the run broke: an extension ended its process (os._exit)\n")
+    assert (code, err) == (3, "run aborted: an extension ended its process (os._exit)\n")
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 3)])
-def test_signal_to_run_under_wall_limit_ends_it(folder: Path, number: signal.Signals, code: int) -> None:
+def test_signal_under_wall_limit_ends_run(folder: Path, number: signal.Signals, code: int) -> None:
     process = start(folder, "s.xosc", "--detector", "sleeps", "--wall-limit", "600", "--out", "runs")
     while not list(folder.glob("runs/*/recording.partial.mcap")):
         assert process.poll() is None
@@ -158,7 +158,7 @@ def test_signal_to_run_under_wall_limit_ends_it(folder: Path, number: signal.Sig
 
 
 @pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])
-def test_wall_limit_that_is_not_positive_is_wrong_input(folder: Path, limit: str) -> None:
+def test_wall_limit_of_run_not_positive_is_invalid_input(folder: Path, limit: str) -> None:
     code, _, err = run(folder, "s.xosc", "--wall-limit", limit)
     assert code == 2
     assert "--wall-limit" in err

@@ -11,7 +11,7 @@ from typer.testing import Result
 Eidrive = Callable[..., Result]
 
 DISTRIBUTION = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="a test" author="nobody"/>
+<FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="a test" author="test"/>
 <ParameterValueDistribution>
 <ScenarioFile filepath="passing_by.xosc"/>
 {}
@@ -27,7 +27,7 @@ def values(name: str, *texts: str) -> str:
 
 @pytest.fixture
 def vary(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
-    """A distribution of passing_by, whose OtherY has to be below 9; its first distribution stands in line 6."""
+    """Return a function that writes a distribution of passing_by with OtherY < 9; line 6 has the first distribution."""
 
     def write(*distributions: str) -> Path:
         text = passing_by.read_text(encoding="utf-8").replace(
@@ -48,11 +48,11 @@ def vary(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def six(vary: Callable[..., Path]) -> Path:
-    """Six runs: at 0 m they collide, at 9 m the scenario does not allow them."""
+    """Write a distribution of six runs: a collision at 0 m, and a constraint violation at 9 m."""
     return vary(values("OtherY", "5", "0", "9"), values("End", "2", "3"))
 
 
-def test_every_run_is_played(eidrive: Eidrive, six: Path) -> None:
+def test_run_of_distribution_executes_every_run(eidrive: Eidrive, six: Path) -> None:
     result = eidrive("run", six, "--json")
     assert result.exit_code == 1, result.output
     lines = [json.loads(line) for line in result.stdout.splitlines()]
@@ -63,34 +63,36 @@ def test_every_run_is_played(eidrive: Eidrive, six: Path) -> None:
         (3, {"OtherY": "0", "End": "3"}, False),
     ]
     assert {line["scenario"] for line in lines} == {"passing_by"}
-    assert f"6 runs in {six}: 2 passed, 2 not passed, 2 ruled out by constraints" in result.stderr
+    assert f"6 runs in {six}: 2 passed, 2 not passed, 2 excluded by constraints" in result.stderr
     assert (
-        f"run 4 (OtherY=9,End=2) is left out: {six}:6: the parameter 'OtherY' is '9', outside its constraints; "
+        f"run 4 (OtherY=9,End=2) is skipped: {six}:6: the parameter 'OtherY' is '9', outside its constraints; "
         "it has to be lessThan 9"
     ) in result.stderr
 
 
-def test_for_human_eyes(eidrive: Eidrive, six: Path) -> None:
+def test_run_of_distribution_reports_varied_parameters_and_counts(eidrive: Eidrive, six: Path) -> None:
     result = eidrive("run", six, "--param", "OtherY=5")
     assert result.exit_code == 2
-    assert f"{six}:6: --param 'OtherY' would undo what the distribution varies; leave it out" in result.stderr
+    assert f"{six}:6: --param: the distribution varies parameter 'OtherY'; remove the option" in result.stderr
     result = eidrive("run", six, "--max-runs", "1")
     assert result.exit_code == 0
     assert "passing_by  run 0 (OtherY=5,End=2)  seed 1" in result.stdout
-    assert f"6 runs in {six}: 1 passed, 5 not asked for" in result.stderr
+    assert f"6 runs in {six}: 1 passed, 5 not selected" in result.stderr
 
 
-def test_some_runs(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+def test_max_runs_selects_runs_over_all_values(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
     one_to_thousand = '<DistributionRange stepWidth="1"><Range lowerLimit="1" upperLimit="1000"/></DistributionRange>'
     path = vary(SINGLE.format("End", one_to_thousand), values("OtherY", "5", "4"))
     result = eidrive("run", path, "--max-runs", "3", "--time-limit", "0.2", "--json")
     lines = [json.loads(line) for line in result.stdout.splitlines()]
     assert len(lines) == 3
     assert len({line["parameters"]["End"] for line in lines}) == 3
-    assert "3 not passed, 1997 not asked for" in result.stderr
+    assert "3 not passed, 1997 not selected" in result.stderr
 
 
-def test_every_run_has_its_own_files(eidrive: Eidrive, vary: Callable[..., Path], tmp_path: Path) -> None:
+def test_run_of_distribution_writes_files_per_run_and_seed(
+    eidrive: Eidrive, vary: Callable[..., Path], tmp_path: Path
+) -> None:
     out, path = tmp_path / "out", vary(values("OtherY", "5", "4"))
     eidrive("run", path, "--out", out, "--no-record", "--csv", out / "motion.csv", "--repeat", "2")
     files = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
@@ -102,7 +104,7 @@ def test_every_run_has_its_own_files(eidrive: Eidrive, vary: Callable[..., Path]
     assert (kept["run"], kept["seed"], kept["parameters"]["OtherY"]) == (1, 2, "4")
 
 
-def test_draws_follow_the_files_seed_or_else_the_callers(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+def test_stochastic_draws_depend_on_random_seed_or_seed_option(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
     drawn = """<Stochastic numberOfTestRuns="2" {}><StochasticDistribution parameterName="OtherY">
     <UniformDistribution><Range lowerLimit="4" upperLimit="6"/></UniformDistribution></StochasticDistribution>
     </Stochastic>"""
@@ -117,7 +119,7 @@ def test_draws_follow_the_files_seed_or_else_the_callers(eidrive: Eidrive, vary:
     assert values_of(without, 1) != values_of(without, 2)
 
 
-def test_nothing_is_left_to_run(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+def test_distribution_without_allowed_run_is_invalid_input(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
     result = eidrive("run", vary(values("OtherY", "9", "10")))
     assert result.exit_code == 2
     assert result.stdout == ""
@@ -125,37 +127,41 @@ def test_nothing_is_left_to_run(eidrive: Eidrive, vary: Callable[..., Path]) -> 
 
 
 @pytest.mark.parametrize(
-    ("texts", "played", "code"), [(("fast", "5"), 0, 2), (("5", "fast", "4"), 2, 2)], ids=["the first", "a later one"]
+    ("texts", "completed", "code"), [(("fast", "5"), 0, 2), (("5", "fast", "4"), 2, 2)], ids=["first", "later"]
 )
-def test_a_wrong_value(eidrive: Eidrive, vary: Callable[..., Path], texts: tuple[str], played: int, code: int) -> None:
+def test_invalid_value_of_first_run_ends_distribution(
+    eidrive: Eidrive, vary: Callable[..., Path], texts: tuple[str], completed: int, code: int
+) -> None:
     path = vary(values("OtherY", *texts))
     result = eidrive("run", path, "--json")
     assert result.exit_code == code
-    assert len(result.stdout.splitlines()) == played
+    assert len(result.stdout.splitlines()) == completed
     assert f"{path}:6: the parameter 'OtherY' is 'fast', which is not a number" in result.stderr
 
 
-def test_a_bound_on_one_run_means_nothing(eidrive: Eidrive, passing_by: Path) -> None:
+def test_max_runs_of_scenario_is_invalid_input(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--max-runs", "2")
     assert result.exit_code == 2
-    assert "--max-runs 2 means nothing here; it is for distributions" in result.stderr
+    assert "--max-runs has no effect for a scenario (got 2); remove the option" in result.stderr
 
 
 class TestCheck:
-    def test_nothing_wrong(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+    def test_check_of_valid_distribution_reports_number_of_runs(
+        self, eidrive: Eidrive, vary: Callable[..., Path]
+    ) -> None:
         path = vary(values("OtherY", "5", "4"), values("End", "1", "2", "3"))
         result = eidrive("check", path)
         assert result.exit_code == 0
-        assert result.stdout.splitlines() == [f"{path}: 6 runs", "1 file, 0 problems, 0 warnings"]
+        assert result.stdout.splitlines() == [f"{path}: 6 runs", "1 file, 0 errors, 0 warnings"]
 
-    def test_a_parameter_that_the_scenario_does_not_have(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+    def test_check_of_unknown_parameter_reports_error(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
         path = vary(values("OtherY", "5"), values("Edn", "1", "2"))
         result = eidrive("check", path)
         assert result.exit_code == 2
         assert f"{path}:7: unknown parameter 'Edn'; did you mean 'End'?" in result.stdout.splitlines()
-        assert result.stdout.splitlines()[-1] == "1 file, 1 problem, 0 warnings"
+        assert result.stdout.splitlines()[-1] == "1 file, 1 error, 0 warnings"
 
-    def test_every_listed_value_is_tried(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+    def test_check_validates_every_listed_value(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
         path = vary(values("OtherY", "5", "4", "3", "far", "9"), values("End", "1", "late"))
         result = eidrive("check", path)
         assert result.exit_code == 2
@@ -166,10 +172,10 @@ class TestCheck:
             f"{path}:6: the parameter 'OtherY' is '9', outside its constraints; it has to be lessThan 9; "
             "such runs are skipped (warning)"
         ) in lines
-        assert lines[-1] == "1 file, 2 problems, 1 warning"
+        assert lines[-1] == "1 file, 2 errors, 1 warning"
 
-    def test_what_the_rules_say_of_single_runs_alone(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
-        """The time is never below 0; with an End of 1 s it is at first."""
+    def test_check_reports_diagnostics_of_single_runs(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+        """The time is never below 0 s, and at first below an End of 1 s."""
         path = vary(values("OtherY", "5", "4"), values("End", "1", "0"))
         scenario = path.with_name("passing_by.xosc")
         text = scenario.read_text(encoding="utf-8")
@@ -177,13 +183,13 @@ class TestCheck:
         assert late != text
         scenario.write_text(late, encoding="utf-8")
         result = eidrive("check", path)
-        told = [line for line in result.stdout.splitlines() if "impossible-condition" in line]
-        assert len(told) == 1
-        assert "in run 1: simulation time < 0 s never counts as true" in told[0]
+        lines = [line for line in result.stdout.splitlines() if "impossible-condition" in line]
+        assert len(lines) == 1
+        assert "in run 1: simulation time < 0 s never counts as true" in lines[0]
         assert result.exit_code == 0
         assert "impossible-condition" not in eidrive("check", path, "--ignore", "impossible-condition").stdout
 
-    def test_a_mistake_in_the_scenario_is_told_once(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+    def test_check_reports_error_of_scenario_once(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
         path = vary(values("OtherY", "5"))
         scenario = path.with_name("passing_by.xosc")
         text = scenario.read_text(encoding="utf-8").replace('dynamicsShape="step"', 'dynamicsShape="stp"')
@@ -191,9 +197,9 @@ class TestCheck:
         result = eidrive("check", path.parent)
         assert result.exit_code == 2
         assert result.stdout.count("did you mean 'step'?") == 1
-        assert result.stdout.splitlines()[-1] == "2 files, 1 problem, 0 warnings"
+        assert result.stdout.splitlines()[-1] == "2 files, 1 error, 0 warnings"
 
-    def test_draws_are_tried(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+    def test_check_validates_stochastic_draws(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
         path = vary(
             '<Stochastic numberOfTestRuns="9"><StochasticDistribution parameterName="OtherY"><NormalDistribution '
             'expectedValue="20" variance="1"/></StochasticDistribution></Stochastic>'

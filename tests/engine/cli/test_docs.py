@@ -1,4 +1,4 @@
-"""What docs/explanations.md shows of scenario 1 is what comes."""
+"""Agreement of docs/explanations.md and docs/results.md with the output of the commands."""
 
 import json
 import re
@@ -18,29 +18,29 @@ PAGE = Path(__file__).parents[3] / "docs" / "explanations.md"
 
 @pytest.fixture(scope="module")
 def blocks() -> list[list[str]]:
-    """The two blocks of the page: of a log, and of an explanation."""
+    """Return the two blocks of the page: a log and an explanation."""
     found = re.findall(r"```\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     return [block.strip("\n").splitlines() for block in found]
 
 
-def test_the_log(eidrive: Eidrive, blocks: list[list[str]]) -> None:
+def test_documented_log_equals_output(eidrive: Eidrive, blocks: list[list[str]]) -> None:
     printed = eidrive("run", "coop/scenario_1", "--no-record", "--log", "-").stdout.splitlines()
     shown = [line for line in blocks[0] if line.strip() != "…"]
     assert len(shown) >= 4
     assert [line for line in shown if line not in printed] == []
 
 
-def test_the_explanation(eidrive: Eidrive, blocks: list[list[str]]) -> None:
+def test_documented_explanation_equals_output(eidrive: Eidrive, blocks: list[list[str]]) -> None:
     command, *shown = blocks[1]
     printed = eidrive(*command.removeprefix("$ eidrive ").split()).stdout
-    told = [re.sub(r"'(\w+)', .*/(scenario_1\.xosc)", r"'\1', \2", line) for line in printed.splitlines()]
-    assert told[-len(shown) :] == shown
+    lines = [re.sub(r"'(\w+)', .*/(scenario_1\.xosc)", r"'\1', \2", line) for line in printed.splitlines()]
+    assert lines[-len(shown) :] == shown
 
 
 RESULTS = PAGE.with_name("results.md")
 
 
-def test_all_keys_of_a_result_are_explained(eidrive: Eidrive, passing_by: Path) -> None:
+def test_documented_keys_equal_keys_of_result(eidrive: Eidrive, passing_by: Path) -> None:
     text = RESULTS.read_text(encoding="utf-8")
     table = text[text.index("| key |") : text.index("| metric |")]
     shown = [key for row in table.splitlines()[2:] for key in re.findall(r"`(\w+)`", row.split("|")[1] if row else "")]
@@ -49,7 +49,7 @@ def test_all_keys_of_a_result_are_explained(eidrive: Eidrive, passing_by: Path) 
     assert ",".join(COLUMNS) in text
 
 
-def test_a_recording_is_read_as_shown(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_documented_reading_of_recording_is_executable(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path / "run")
     code = re.findall(r"```python\n(.*?)```", RESULTS.read_text(encoding="utf-8"), re.DOTALL)[0]
     printed = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -18,7 +18,7 @@ from eidrive_scenario.simulation import RunResult
 Eidrive = Callable[..., Result]
 
 
-def test_passed(eidrive: Eidrive, passing_by: Path) -> None:
+def test_run_of_passing_scenario_prints_verdicts(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by)
     assert result.exit_code == 0, result.output
     assert "Ego and Parked came within 5.00 m (center to center) at 2.00 s" in result.stdout
@@ -26,14 +26,14 @@ def test_passed(eidrive: Eidrive, passing_by: Path) -> None:
     assert re.search(r"trace [0-9a-f]{64}", result.stdout)
 
 
-def test_failed_says_who_hit_whom_when(eidrive: Eidrive, passing_by: Path) -> None:
+def test_run_with_collision_prints_actors_and_time(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--param", "OtherY=0")
     assert result.exit_code == 1, result.output
     # 4 m long, reference points 20 m apart: a gap of 16 m closes at 10 m/s.
     assert re.search(r"collision +failed .*Ego and Parked hit each other at 1\.6[05] s", result.stdout)
 
 
-def test_json_is_one_object_per_run_and_nothing_else(eidrive: Eidrive, passing_by: Path) -> None:
+def test_json_option_prints_one_object_per_run(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--json", "--repeat", "2", "--seed", "5")
     lines = [json.loads(line) for line in result.stdout.splitlines()]
     assert [line["seed"] for line in lines] == [5, 6]
@@ -57,7 +57,7 @@ def test_json_is_one_object_per_run_and_nothing_else(eidrive: Eidrive, passing_b
     assert first["metrics"]["min_distance.Ego.Parked.box"] == pytest.approx(3.0)
 
 
-def test_out_keeps_recording_and_result(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_out_option_writes_recording_and_result(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     printed = json.loads(eidrive("run", passing_by, "--json", "--out", tmp_path / "run").stdout)
     (result,) = (tmp_path / "run").rglob("result.json")
     kept = json.loads(result.read_text(encoding="utf-8"))
@@ -70,7 +70,7 @@ def test_out_keeps_recording_and_result(eidrive: Eidrive, passing_by: Path, tmp_
     assert frames[-1].view.position[0, 0] == pytest.approx(30.0, abs=0.6)
 
 
-def test_no_record_and_a_folder_per_seed(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_no_record_option_writes_result_folder_per_seed(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path, "--no-record", "--repeat", "2", "--csv", tmp_path / "motion.csv")
     files = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file())
     assert files[:2] == ["motion-seed-1.csv", "motion-seed-2.csv"]
@@ -79,7 +79,7 @@ def test_no_record_and_a_folder_per_seed(eidrive: Eidrive, passing_by: Path, tmp
     assert len(files) == 4
 
 
-def test_csv(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_csv_option_writes_motion_of_all_actors(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--csv", tmp_path / "motion.csv", "--dt", "0.1")
     with (tmp_path / "motion.csv").open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
@@ -91,10 +91,10 @@ def test_csv(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     assert len(rows) == 2 * 31
 
 
-def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
+def test_run_beyond_time_limit_ends_with_exit_code_3(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--time-limit", "1")
     assert result.exit_code == 3
-    assert "ran out of time" in result.stdout.splitlines()[0]
+    assert result.stdout.splitlines()[0].endswith("time limit")
     assert "end: time limit at 1.00 s" in result.stdout
 
 
@@ -102,17 +102,19 @@ def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
     ("arguments", "message"),
     [
         (["no/such"], "no scenario 'no/such'"),
-        (["{file}", "--cooperate", " ,"], "--cooperate ' ,' names nobody; write none for no cooperation"),
-        (["{file}", "--param", "OtherY"], "--param 'OtherY' assigns nothing; write --param NAME=VALUE"),
+        (["{file}", "--cooperate", " ,"], "--cooperate: no station is listed (got ' ,'; expected A,B or none)"),
+        (["{file}", "--param", "OtherY"], "--param: no value is assigned (got 'OtherY'; expected NAME=VALUE)"),
         (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
-        (["{file}", "--user-value", "mood"], "--user-value 'mood' assigns nothing; write --user-value NAME=VALUE"),
-        (["{file}", "--controller", "ALKSController"], "--controller 'ALKSController' assigns nothing"),
+        (["{file}", "--user-value", "mood"], "--user-value: no value is assigned (got 'mood'; expected NAME=VALUE)"),
+        (["{file}", "--controller", "ALKSController"], "--controller: no value is assigned (got 'ALKSController'"),
         (["{file}", "--controller", "ALKSController=alk"], "unknown controller 'alk'; did you mean 'alks'?"),
         (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
-        (["{file}", "--dt", "0"], "--dt is 0"),
+        (["{file}", "--dt", "0"], "--dt: not a positive number of seconds (got 0.0)"),
     ],
 )
-def test_wrong_input(eidrive: Eidrive, passing_by: Path, arguments: list[str], message: str) -> None:
+def test_run_with_invalid_argument_ends_with_exit_code_2(
+    eidrive: Eidrive, passing_by: Path, arguments: list[str], message: str
+) -> None:
     result = eidrive("run", *(argument.format(file=passing_by) for argument in arguments))
     assert result.exit_code == 2, result.output
     assert message in result.stderr
@@ -120,7 +122,7 @@ def test_wrong_input(eidrive: Eidrive, passing_by: Path, arguments: list[str], m
     assert result.stdout == ""
 
 
-def test_wrong_file(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_run_of_invalid_file_reports_line(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken.xosc"
     broken.write_text(passing_by.read_text(encoding="utf-8").replace("of: Ego, to", "ofe: Ego, to"), encoding="utf-8")
     result = eidrive("run", broken)
@@ -128,14 +130,14 @@ def test_wrong_file(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     assert f"{broken}:47: unknown setting 'ofe'; did you mean 'of'?" in result.stderr
 
 
-def test_the_same_seed_gives_the_same_trace_in_another_process(eidrive: Eidrive, passing_by: Path) -> None:
+def test_trace_hash_of_equal_seed_is_equal_in_other_process(eidrive: Eidrive, passing_by: Path) -> None:
     here = json.loads(eidrive("run", passing_by, "--json").stdout)
     command = [sys.executable, "-m", "eidrive_scenario", "run", str(passing_by), "--json"]
     there = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert here["trace_hash"] == there["trace_hash"]
 
 
-def test_the_log_says_what_fired(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_log_option_writes_transitions_with_reasons(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     result = eidrive("run", passing_by, "--log", tmp_path / "run.log", "--no-record")
     assert result.exit_code == 0, result.output
     lines = (tmp_path / "run.log").read_text(encoding="utf-8").splitlines()
@@ -147,12 +149,12 @@ def test_the_log_says_what_fired(eidrive: Eidrive, passing_by: Path, tmp_path: P
     assert printed.stdout.splitlines()[:2] == lines
 
 
-def test_each_run_has_a_log_of_its_own(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_log_option_of_two_runs_writes_two_files(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--log", tmp_path / "run.log", "--repeat", "2")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run-seed-1.log", "run-seed-2.log"]
 
 
-def test_explain(eidrive: Eidrive, passing_by: Path) -> None:
+def test_explain_option_prints_trigger_history(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--explain", "storyboard")
     assert "the run stopped at 3.00 s: simulation time 3.00 s ≥ 3 s\n" in result.stdout
     assert f"['end', {passing_by}:" in result.stdout
@@ -162,7 +164,7 @@ def test_explain(eidrive: Eidrive, passing_by: Path) -> None:
     assert "no event or act is named 'Cut'" in unknown.stderr
 
 
-def test_json_stays_alone_on_standard_output(eidrive: Eidrive, passing_by: Path) -> None:
+def test_json_option_prints_explanations_on_standard_error(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--json", "--explain", "storyboard")
     assert json.loads(result.stdout)["passed"] is True
     assert "the run stopped at 3.00 s" in result.stderr
@@ -170,7 +172,7 @@ def test_json_stays_alone_on_standard_output(eidrive: Eidrive, passing_by: Path)
 
 
 @pytest.mark.parametrize("columns", ["50", "70"])
-def test_a_narrow_terminal_wraps_reasons_alone(
+def test_verdicts_on_narrow_terminal_wrap_reasons_only(
     eidrive: Eidrive, passing_by: Path, columns: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
@@ -179,25 +181,25 @@ def test_a_narrow_terminal_wraps_reasons_alone(
     assert any(re.fullmatch(r"trace [0-9a-f]{64}", line) for line in lines)
 
 
-def test_values_and_stand_ins_for_nobody_are_told(eidrive: Eidrive, passing_by: Path) -> None:
+def test_unused_user_value_and_controller_option_are_warnings(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--no-record", "--user-value", "mood=3", "--controller", "ALKS=alks")
     assert result.exit_code == 0, result.output
     assert "warning: no UserDefinedValueCondition asks for 'mood'; none is known here" in result.stderr
     assert "warning: the stand-in for 'ALKS' found no controller of that name" in result.stderr
 
 
-def test_very_long_steps_take_no_memory(eidrive: Eidrive) -> None:
+def test_run_with_long_time_step_ends(eidrive: Eidrive) -> None:
     assert eidrive("run", "coop/scenario_1", "--no-record", "--dt", "100", "--time-limit", "1000").exit_code == 0
 
 
-def test_what_is_slower_than_real_time_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> None:
-    took = {320.0: "0.01 times", 12.9: "0.31 times", 2.0: "2.0 times", 0.1: "40 times"}
-    for wall, told in took.items():
+def test_show_prints_ratio_to_real_time(capsys: pytest.CaptureFixture[str]) -> None:
+    ratios = {320.0: "0.01 times", 12.9: "0.31 times", 2.0: "2.0 times", 0.1: "40 times"}
+    for wall, ratio in ratios.items():
         show(RunResult("a", 1, "none", True, "stop trigger", 0, (), {}, "00", 4.0, wall))
-        assert f"({wall:.2f} s wall, {told} real time)" in capsys.readouterr().out
+        assert f"({wall:.2f} s wall, {ratio} real time)" in capsys.readouterr().out
 
 
-def test_nothing_stands_in_for_a_controller_of_ours(eidrive: Eidrive) -> None:
+def test_controller_option_for_station_is_a_warning(eidrive: Eidrive) -> None:
     short = ("run", "coop/scenario_1", "--no-record", "--time-limit", "0.1")
     warned = eidrive(*short, "--controller", "EgoStack=alks").stderr
     assert "warning: nothing stands in for 'EgoStack', which is a controller of ours" in warned

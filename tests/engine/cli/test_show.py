@@ -1,4 +1,4 @@
-"""`eidrive list`, `tree`, `view`, `report` and the help."""
+"""Commands `eidrive list`, `tree`, `view`, `report` and `--help`."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ from typer.testing import Result
 Eidrive = Callable[..., Result]
 
 
-def test_help_names_the_commands_and_imports_no_engine() -> None:
+def test_help_lists_commands_without_importing_engine() -> None:
     script = (
         "import sys; from eidrive_scenario.cli import app\n"
         "try:\n    app(['--help'])\nexcept SystemExit as end:\n    assert end.code == 0, end.code\n"
@@ -25,7 +25,7 @@ def test_help_names_the_commands_and_imports_no_engine() -> None:
         assert f" {command} " in done.stdout
 
 
-def test_version(eidrive: Eidrive) -> None:
+def test_version_option_prints_version(eidrive: Eidrive) -> None:
     assert eidrive("--version").stdout.startswith("eidrive-scenario ")
 
 
@@ -46,23 +46,23 @@ def test_version(eidrive: Eidrive) -> None:
         ("rules", "unobserved-edge"),
     ],
 )
-def test_list(eidrive: Eidrive, what: str, expected: str) -> None:
+def test_list_prints_names_of_each_kind(eidrive: Eidrive, what: str, expected: str) -> None:
     result = eidrive("list", what)
     assert result.exit_code == 0
     assert expected in [line.split()[0] for line in result.stdout.splitlines()]
 
 
-def test_list_is_about_scenarios_by_default(eidrive: Eidrive) -> None:
+def test_list_without_argument_prints_scenarios(eidrive: Eidrive) -> None:
     assert eidrive("list").stdout == eidrive("list", "scenarios").stdout
 
 
-def test_tree(eidrive: Eidrive, passing_by: Path) -> None:
+def test_tree_prints_storyboard(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("tree", passing_by)
     assert result.exit_code == 0, result.output
     assert "3" in result.stdout
 
 
-def test_view_writes_a_page(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_view_writes_page_beside_recording(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path)
     result = eidrive("view", tmp_path)
     assert result.exit_code == 0, result.output
@@ -71,19 +71,19 @@ def test_view_writes_a_page(eidrive: Eidrive, passing_by: Path, tmp_path: Path) 
     assert "<html" in page.read_text(encoding="utf-8")
 
 
-def test_view_of_a_folder_above_those_of_runs(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_view_of_parent_folder_requires_single_run(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     result = eidrive("view", tmp_path)
     assert result.exit_code == 2
-    assert f"{tmp_path}: no recording.mcap in this folder; eidrive run … --out DIR records" in result.stderr
+    assert f"{tmp_path}: no recording.mcap in this folder; eidrive run … --out DIR writes a recording" in result.stderr
     eidrive("run", passing_by, "--out", tmp_path / "one")
-    assert eidrive("view", tmp_path).exit_code == 0, "the only one is meant"
+    assert eidrive("view", tmp_path).exit_code == 0, "the only recording is selected"
     eidrive("run", passing_by, "--out", tmp_path / "one", "--seed", "2")
     result = eidrive("view", tmp_path)
     assert result.exit_code == 2
     assert f"{tmp_path}: 2 recordings are below this folder; give one of its folders: one/passing_by-" in result.stderr
 
 
-def test_a_page_that_cannot_be_written(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_page_of_unwritable_path_is_invalid_input(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path)
     (tmp_path / "file").touch()
     for arguments in (("view", tmp_path, "-o", tmp_path), ("report", tmp_path, "-o", tmp_path / "file")):
@@ -92,13 +92,13 @@ def test_a_page_that_cannot_be_written(eidrive: Eidrive, passing_by: Path, tmp_p
         assert "cannot write" in result.stderr
 
 
-def test_view_of_no_recording(eidrive: Eidrive, passing_by: Path) -> None:
+def test_view_of_other_file_is_invalid_input(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("view", passing_by)
     assert result.exit_code == 2
     assert f"{passing_by}: not an MCAP file" in result.stderr
 
 
-def test_report_over_runs(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_report_of_runs_writes_page(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path / "runs" / "far", "--no-record", "--repeat", "2")
     eidrive("run", passing_by, "--out", tmp_path / "runs" / "near", "--no-record", "--param", "OtherY=0")
     result = eidrive("report", tmp_path / "runs", "-o", tmp_path / "report")
@@ -112,10 +112,10 @@ def test_report_over_runs(eidrive: Eidrive, passing_by: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("command", ["report", "view"])
-def test_malformed_result_is_named_by_its_file(
+def test_malformed_result_is_reported_with_its_file(
     eidrive: Eidrive, passing_by: Path, tmp_path: Path, command: str
 ) -> None:
-    """Among the results of several runs, that one which lacks its seed."""
+    """One of several results has no seed."""
     eidrive("run", passing_by, "--out", tmp_path, "--repeat", "2")
     _, file = sorted(tmp_path.glob("*/result.json"))
     content = json.loads(file.read_text())
@@ -123,23 +123,23 @@ def test_malformed_result_is_named_by_its_file(
     file.write_text(json.dumps(content))
     result = eidrive(command, tmp_path if command == "report" else file.parent)
     assert result.exit_code == 2
-    assert result.stderr == f"{file}: a result's 'seed': field required; give what eidrive run --json prints\n"
+    assert result.stderr == f"{file}: result: 'seed': field required; give an object that eidrive run --json prints\n"
 
 
-def test_report_without_runs(eidrive: Eidrive, tmp_path: Path) -> None:
+def test_report_without_runs_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
     result = eidrive("report", tmp_path, "-o", tmp_path / "report")
     assert result.exit_code == 2
     assert "no result.json in" in result.stderr
 
 
-def test_tree_as_a_picture(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
-    picture = tmp_path / "tree.svg"
-    result = eidrive("tree", passing_by, "--svg", picture)
-    assert (result.exit_code, result.stdout.strip()) == (0, str(picture))
-    assert "simulation time ≥ 3 s" in picture.read_text(encoding="utf-8")
+def test_tree_with_svg_option_draws_diagram(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    diagram = tmp_path / "tree.svg"
+    result = eidrive("tree", passing_by, "--svg", diagram)
+    assert (result.exit_code, result.stdout.strip()) == (0, str(diagram))
+    assert "simulation time ≥ 3 s" in diagram.read_text(encoding="utf-8")
 
 
-def test_the_page_of_a_recording_has_the_verdicts_beside_it(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_view_shows_verdicts_of_result_beside_recording(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--param", "OtherY=0", "--out", tmp_path)
     eidrive("view", tmp_path)
     (kept,) = tmp_path.rglob("result.json")
@@ -147,14 +147,14 @@ def test_the_page_of_a_recording_has_the_verdicts_beside_it(eidrive: Eidrive, pa
     assert "Ego and Parked hit each other" in page.read_text(encoding="utf-8")
     kept.write_text('{"trace_hash": "00"}')
     wrong = eidrive("view", tmp_path)
-    assert (wrong.exit_code, wrong.stderr.startswith(f"{kept}: a result's 'scenario': field required")) == (2, True)
+    assert (wrong.exit_code, wrong.stderr.startswith(f"{kept}: result: 'scenario': field required")) == (2, True)
     kept.unlink()
     eidrive("view", tmp_path)
     assert "<h3>Verdict" not in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("arguments", [["view"], ["report", "-o", "page"]])
-def test_a_name_that_is_no_path_is_a_wrong_input(eidrive: Eidrive, arguments: list[str]) -> None:
+def test_too_long_file_name_is_invalid_input(eidrive: Eidrive, arguments: list[str]) -> None:
     result = eidrive(*arguments, "x" * 300)
     assert result.exit_code == 2
     assert "cannot read: File name too long" in result.stderr

@@ -1,4 +1,4 @@
-"""Standard output that is closed, full, or lacks letters, in a process of its own."""
+"""Standard output that is closed, full, or has an encoding without some characters."""
 
 import json
 import os
@@ -20,14 +20,14 @@ def eidrive(
     return subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, env=environment, check=False)
 
 
-def test_letters_that_the_encoding_lacks_are_spelled_out(passing_by: Path) -> None:
+def test_characters_missing_in_encoding_are_escaped(passing_by: Path) -> None:
     log = eidrive("run", passing_by, "--no-record", "--log", "-", PYTHONIOENCODING="ascii")
     assert log.returncode == 0, log.stderr
     assert rb"simulation time 3.00 s \u2265 3 s" in log.stdout
     assert eidrive("tree", passing_by, PYTHONIOENCODING="latin-1").returncode == 0
 
 
-def test_json_stays_json_in_any_encoding(passing_by: Path, tmp_path: Path) -> None:
+def test_json_output_is_valid_in_any_encoding(passing_by: Path, tmp_path: Path) -> None:
     folder = tmp_path / "späß"
     folder.mkdir()
     copy = folder / "größe ≥ 3.xosc"
@@ -37,33 +37,33 @@ def test_json_stays_json_in_any_encoding(passing_by: Path, tmp_path: Path) -> No
         assert json.loads(printed.stdout.decode(encoding))["scenario"] == copy.stem
 
 
-def test_bytes_in_a_name_that_are_no_letters(passing_by: Path, tmp_path: Path) -> None:
+def test_file_name_with_undecodable_bytes_is_invalid_input(passing_by: Path, tmp_path: Path) -> None:
     copy = Path(os.fsdecode(os.fsencode(tmp_path) + b"/b\xffd.xosc"))
     try:
         copy.write_bytes(passing_by.read_bytes())
     except OSError:
         pytest.skip("this file system takes no such name")
-    played = eidrive("run", copy, PYTHONUTF8="1")
-    assert played.returncode == 2
-    assert rb"b\xffd.xosc: the name has bytes that are no letters here; rename it" in played.stderr
+    result = eidrive("run", copy, PYTHONUTF8="1")
+    assert result.returncode == 2
+    assert rb"b\xffd.xosc: the name has bytes that are no letters here; rename it" in result.stderr
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "FILE"], ["run", "FILE", "--csv", str(FULL)]])
-def test_a_full_disk_is_said_in_one_line(passing_by: Path, arguments: list[str]) -> None:
+def test_full_disk_is_reported_in_one_line(passing_by: Path, arguments: list[str]) -> None:
     given = [str(passing_by) if argument == "FILE" else argument for argument in arguments]
     with FULL.open("wb") as full:
         result = eidrive(*given, stdout=full)
     assert result.returncode == 3
-    broken, *reproduction = result.stderr.decode().splitlines()
-    assert broken.startswith("broken off: No space left on device")
+    message, *reproduction = result.stderr.decode().splitlines()
+    assert message.startswith("aborted: No space left on device")
     assert all(line.startswith("reproduce: eidrive run ") for line in reproduction)
     assert b"internal error" not in result.stderr
     assert b"Traceback" not in result.stderr
 
 
 @pytest.mark.parametrize("arguments", [["run", "FILE", "--json"], ["tree", "FILE"]])
-def test_a_closed_output_is_no_error(passing_by: Path, arguments: list[str]) -> None:
+def test_closed_standard_output_is_not_an_error(passing_by: Path, arguments: list[str]) -> None:
     given = " ".join(f"'{passing_by}'" if argument == "FILE" else argument for argument in arguments)
     closed = f"'{sys.executable}' -m eidrive_scenario {given} >&-"
     result = subprocess.run(["/bin/sh", "-c", closed], capture_output=True, check=False)

@@ -1,4 +1,4 @@
-"""Runs that do not end, and readers that do not read on."""
+"""Interrupted and aborted runs, and readers that close their pipe."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ def names(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (ZeroDivisionError("physics"), 3)])
-def test_what_is_left_of_a_run_does_not_look_whole(
+def test_files_of_unfinished_run_have_partial_names(
     eidrive: Eidrive,
     passing_by: Path,
     tmp_path: Path,
@@ -53,15 +53,15 @@ def test_what_is_left_of_a_run_does_not_look_whole(
     assert shown.stdout.strip() == str(partial.with_suffix(".html"))
     assert "the run did not end" in shown.stderr
     report = eidrive("report", tmp_path, "-o", tmp_path / "report")
-    assert report.exit_code == 2, "it has no result"
-    assert f"warning: {partial}: the run did not end, it is not in the report" in report.stderr
+    assert report.exit_code == 2, "there is no result"
+    assert f"warning: {partial}: the run did not end, the report omits it" in report.stderr
 
     assert eidrive(*arguments).exit_code == 0
     assert names(tmp_path) == ["motion.csv", "recording.mcap", "result.json"]
     assert "did not end" not in eidrive("view", tmp_path).stderr
 
 
-def test_an_interrupted_run_leaves_the_files_of_an_earlier_one(
+def test_interrupted_run_keeps_files_of_earlier_run(
     eidrive: Eidrive, passing_by: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     eidrive("run", passing_by, "--out", tmp_path)
@@ -75,7 +75,7 @@ def test_an_interrupted_run_leaves_the_files_of_an_earlier_one(
     assert f"reproduce: eidrive run {passing_by} --seed 1" in interrupted.stderr
 
 
-def test_wrong_input_leaves_nothing(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_invalid_input_writes_no_files(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     result = eidrive("run", passing_by, "--out", tmp_path, "--csv", tmp_path / "motion.csv", "--channel", "idael")
     assert result.exit_code == 2
     assert names(tmp_path) == []
@@ -86,7 +86,7 @@ def test_wrong_input_leaves_nothing(eidrive: Eidrive, passing_by: Path, tmp_path
 
 
 @pytest.mark.parametrize("arguments", [["list", "conditions"], ["run", "{file}"], ["tree", "{file}"]])
-def test_a_reader_that_has_enough_hears_no_complaint(passing_by: Path, arguments: list[str]) -> None:
+def test_closed_pipe_of_reader_prints_no_error(passing_by: Path, arguments: list[str]) -> None:
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -103,7 +103,7 @@ def test_a_reader_that_has_enough_hears_no_complaint(passing_by: Path, arguments
     assert (done.returncode, done.stderr) == (141, "")
 
 
-def test_a_link_or_a_pipe_is_written_as_it_is(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_csv_to_link_or_device_keeps_it(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     table, link, null = tmp_path / "table.csv", tmp_path / "link.csv", Path(os.devnull)
     table.touch()
     link.symlink_to(table)
@@ -115,7 +115,7 @@ def test_a_link_or_a_pipe_is_written_as_it_is(eidrive: Eidrive, passing_by: Path
 
 
 @pytest.mark.parametrize("option", ["--csv", "--log"])
-def test_a_file_that_another_run_writes_is_refused(
+def test_output_file_locked_by_other_run_is_invalid_input(
     eidrive: Eidrive, passing_by: Path, tmp_path: Path, option: str
 ) -> None:
     table = tmp_path / "table"

@@ -260,7 +260,7 @@ def test_a_full_disk_ends_the_run_with_its_partial_recording(tmp_path: Path) -> 
     command = [sys.executable, "-c", code, "run", "coop/scenario_1", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 3, done.stderr
-    assert "broken off: File too large" in done.stderr
+    assert "aborted: File too large" in done.stderr
     assert "Traceback" not in done.stderr
     assert "internal error" not in done.stderr
     assert not list(tmp_path.rglob("result.json"))

@@ -77,7 +77,7 @@ def test_a_metric_that_is_null_is_left_out(tmp_path: Path) -> None:
 
 
 def test_what_is_no_result_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="a result's 'scenario': field required"):
+    with pytest.raises(InputError, match="result: 'scenario': field required"):
         write_report([{"seed": 1, "passed": True, "end": ""}], tmp_path)
     with pytest.raises(InputError, match="no result to report"):
         write_report([], tmp_path)

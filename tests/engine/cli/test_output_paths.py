@@ -1,4 +1,4 @@
-"""Where a command writes: never over what it reads, and never twice into one file."""
+"""Output paths: never an input file, and never one file for two outputs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,13 +22,15 @@ def own(passing_by: Path, tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "{own}", "--csv", "{own}"], "--csv would overwrite what is read"),
-        (["run", "{own}", "--log", "{folder}/../{name}/own.xosc"], "--log would overwrite what is read"),
-        (["tree", "{own}", "--svg", "{own}"], "--svg would overwrite what is read"),
-        (["run", "{own}", "--csv", "{folder}/a", "--log", "{folder}/a"], "--csv and --log name one file"),
+        (["run", "{own}", "--csv", "{own}"], "--csv would overwrite an input file"),
+        (["run", "{own}", "--log", "{folder}/../{name}/own.xosc"], "--log would overwrite an input file"),
+        (["tree", "{own}", "--svg", "{own}"], "--svg would overwrite an input file"),
+        (["run", "{own}", "--csv", "{folder}/a", "--log", "{folder}/a"], "--csv and --log name the same file"),
     ],
 )
-def test_an_input_is_not_overwritten(eidrive: Eidrive, own: Path, arguments: list[str], message: str) -> None:
+def test_output_path_of_input_file_is_invalid_input(
+    eidrive: Eidrive, own: Path, arguments: list[str], message: str
+) -> None:
     before = own.read_bytes()
     given = [text.format(own=own, folder=own.parent, name=own.parent.name) for text in arguments]
     result = eidrive(*given)
@@ -41,16 +43,18 @@ def test_an_input_is_not_overwritten(eidrive: Eidrive, own: Path, arguments: lis
 @pytest.mark.parametrize("option", ["--csv", "--log"])
 @pytest.mark.parametrize("place", ["/", ".", "..", ""])
 @pytest.mark.parametrize("runs", [1, 2])
-def test_folder_as_file_is_refused(eidrive: Eidrive, own: Path, option: str, place: str, runs: int) -> None:
-    """`/`, `.` and an empty text have no last part to which the number of a run could be added."""
+def test_output_path_of_folder_is_invalid_input(
+    eidrive: Eidrive, own: Path, option: str, place: str, runs: int
+) -> None:
+    """`/`, `.` and an empty text have no file name to which the number of a run could be appended."""
     result = eidrive("run", own, option, place, "--repeat", runs)
     assert result.exit_code == 2, result.output
     assert f"{place or '.'}: cannot write: Is a directory" in result.stderr
     assert "internal error" not in result.output
 
 
-def test_device_takes_the_tables_of_all_runs(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
-    """Two runs through a link to /dev/null leave no file beside it."""
+def test_csv_of_two_runs_to_device_creates_no_file(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
+    """The path is a link to /dev/null."""
     sink = tmp_path / "sink"
     sink.symlink_to("/dev/null")
     before = sorted(tmp_path.iterdir())
@@ -59,14 +63,14 @@ def test_device_takes_the_tables_of_all_runs(eidrive: Eidrive, own: Path, tmp_pa
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_recording_is_not_overwritten_by_its_page(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
+def test_view_does_not_overwrite_its_recording(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
     eidrive("run", own, "--out", tmp_path / "run")
     (recording,) = (tmp_path / "run").rglob("recording.mcap")
     result = eidrive("view", tmp_path / "run", "--out", recording)
     assert (result.exit_code, recording.read_bytes()[1:5]) == (2, b"MCAP")
 
 
-def test_devices_take_all(tmp_path: Path) -> None:
+def test_check_output_paths_allows_device_twice(tmp_path: Path) -> None:
     check_output_paths({"--csv": "/dev/null", "--log": "/dev/null"}, ["none"])
     with pytest.raises(SettingError):
         check_output_paths({"--csv": tmp_path / "a", "--log": tmp_path / "a"}, [])

@@ -1,4 +1,4 @@
-"""Errors that are nobody's input end with exit code 3, and tell where on demand only."""
+"""Internal errors: exit code 3, and a traceback on request only."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ def break_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     monkeypatch.setattr(library, "scenarios", broken)
 
 
-def test_an_internal_error_is_short(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_internal_error_is_printed_without_traceback(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
     break_with(monkeypatch, ZeroDivisionError("division by zero"))
     result = eidrive("list")
     assert result.exit_code == 3
@@ -26,13 +26,13 @@ def test_an_internal_error_is_short(eidrive: Eidrive, monkeypatch: pytest.Monkey
     assert "--traceback" in result.stderr
 
 
-def test_a_broken_run_says_so(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_simulation_error_is_printed_as_aborted_run(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
     break_with(monkeypatch, SimulationError("the physics exploded"))
     result = eidrive("list")
-    assert (result.exit_code, result.stderr) == (3, "the run broke: the physics exploded\n")
+    assert (result.exit_code, result.stderr) == (3, "run aborted: the physics exploded\n")
 
 
-def test_on_demand_it_shows_where(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_traceback_option_prints_traceback(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
     break_with(monkeypatch, ZeroDivisionError("division by zero"))
     asked = eidrive("--traceback", "list")
     assert asked.exit_code == 3
@@ -42,11 +42,11 @@ def test_on_demand_it_shows_where(eidrive: Eidrive, monkeypatch: pytest.MonkeyPa
     assert "Traceback (most recent call last)" in eidrive("list").stderr
 
 
-def test_an_interrupt_is_no_verdict(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keyboard_interrupt_ends_with_exit_code_130(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
     break_with(monkeypatch, KeyboardInterrupt())
     assert eidrive("list").exit_code == 130
 
 
-def test_a_wrong_command_is_a_wrong_input(eidrive: Eidrive) -> None:
+def test_unknown_command_or_option_is_invalid_input(eidrive: Eidrive) -> None:
     assert eidrive("rum").exit_code == 2
     assert eidrive("run", "--no-such-option").exit_code == 2
