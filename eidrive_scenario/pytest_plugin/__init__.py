@@ -1,9 +1,8 @@
-"""pytest runs scenario files: `pytest xosc/coop --eidrive-seeds 3 --eidrive-channel ideal,none`.
+"""pytest plugin that runs scenario files: `pytest xosc/coop --eidrive-seeds 3 --eidrive-channel ideal,none`.
 
-A `.xosc` file that is named on the command line, or lies below a folder named there, becomes one test per channel and
-seed; a distribution of parameter values becomes that many for each of its runs, of which `--eidrive-max-runs` is the
-most. The ini option `eidrive_paths` says instead which folders hold scenarios to test. Tests written in Python take the
-marker `scenario` and the fixture `run_scenario`.
+A `.xosc` file on the command line, or below a folder on the command line, becomes one test per channel and seed. A
+parameter value distribution becomes as many tests for each of its runs, up to `--eidrive-max-runs` runs. The ini option
+`eidrive_paths` selects other folders. Tests in Python use the marker `scenario` and the fixture `run_scenario`.
 """
 
 from __future__ import annotations

@@ -10,12 +10,12 @@ import pytest
 from eidrive_scenario.library import definition
 from eidrive_scenario.pytest_plugin.distributions import DistributionFile
 from eidrive_scenario.pytest_plugin.items import ScenarioItem
-from eidrive_scenario.pytest_plugin.options import arms, wanted
+from eidrive_scenario.pytest_plugin.options import is_selected, run_variants
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.File | None:
-    """A scenario or a distribution of parameter values that was asked for; catalogs are neither."""
-    if file_path.suffix != ".xosc" or not wanted(parent.config, file_path):
+    """Collect a selected scenario or parameter value distribution. Catalogs are not collected."""
+    if file_path.suffix != ".xosc" or not is_selected(parent.config, file_path):
         return None
     kind = definition(file_path)
     if kind not in ("scenario", "distribution", "unreadable"):
@@ -27,9 +27,9 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Fil
 
 
 class ScenarioFile(pytest.File):
-    """A `.xosc` file; it is read when its tests run."""
+    """`.xosc` file, which is read when its tests run."""
 
     def collect(self) -> Iterable[ScenarioItem]:
-        """One item per channel and seed."""
-        for arm in arms(self.config):
-            yield ScenarioItem.from_parent(self, name=f"{self.path.stem}[{arm}]", arm=arm)
+        """Yield one item per channel and seed."""
+        for variant in run_variants(self.config):
+            yield ScenarioItem.from_parent(self, name=f"{self.path.stem}[{variant}]", variant=variant)

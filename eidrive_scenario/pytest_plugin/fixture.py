@@ -1,4 +1,4 @@
-"""The marker `scenario` and the fixture `run_scenario`, for tests written in Python."""
+"""Marker `scenario` and fixture `run_scenario` for tests in Python."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
 from eidrive_scenario.library import definition, library_path, resolve_scenario
-from eidrive_scenario.pytest_plugin.options import RunVariant, arms
+from eidrive_scenario.pytest_plugin.options import RunVariant, run_variants
 from eidrive_scenario.pytest_plugin.outcome import explain, properties, run_variant
 
 if TYPE_CHECKING:
@@ -24,14 +24,14 @@ _KEYWORDS = ("channel", "seeds")
 
 @dataclass(frozen=True)
 class Case:
-    """What the marker asks the test to run."""
+    """Run that the marker requests."""
 
     source: Path
-    arm: RunVariant
+    variant: RunVariant
 
 
 class RunScenario(Protocol):
-    """What the fixture gives."""
+    """Function that the fixture returns."""
 
     def __call__(
         self,
@@ -50,42 +50,46 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         return
     if "run_scenario" not in metafunc.fixturenames:
         if marker in metafunc.definition.own_markers:
-            message = "it has the marker scenario, and does not take the fixture run_scenario, which plays it"
+            message = "a test with the marker scenario requires the fixture run_scenario"
             raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {message}", pytrace=False)
         return
     try:
         if sum(own.name == marker.name for own in metafunc.definition.own_markers) > 1:
-            raise ValueError('it has several markers scenario; give one all patterns: scenario("a.xosc", "b.xosc")')
+            raise ValueError('several markers scenario (expected one with all patterns: scenario("a.xosc", "b.xosc"))')
         channels, seeds = _read_marker(marker)
         paths = [path for pattern in marker.args for path in _matches(pattern, metafunc)]
     except ValueError as error:
         raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {error}", pytrace=False) from None
-    cases = [Case(path, arm) for path in paths for arm in arms(metafunc.config, channels, seeds)]
-    metafunc.parametrize("run_scenario", cases, indirect=True, ids=[f"{case.source.stem}-{case.arm}" for case in cases])
+    cases = [Case(path, variant) for path in paths for variant in run_variants(metafunc.config, channels, seeds)]
+    metafunc.parametrize(
+        "run_scenario", cases, indirect=True, ids=[f"{case.source.stem}-{case.variant}" for case in cases]
+    )
 
 
 def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]:
-    """Channels and number of seeds. Raise ValueError for what the marker does not take."""
+    """Return channels and number of seeds. Raise ValueError for an invalid argument of the marker."""
     if not marker.args or not all(isinstance(pattern, str | Path) for pattern in marker.args):
-        raise ValueError('the marker scenario needs a pattern, such as scenario("coop/*.xosc")')
+        raise ValueError('marker scenario: no pattern (expected, for example, scenario("coop/*.xosc"))')
     for keyword in marker.kwargs:
         if keyword not in _KEYWORDS:
-            raise ValueError(f"the marker scenario takes no {keyword!r}; {suggestion(keyword, _KEYWORDS)}")
+            raise ValueError(f"marker scenario: unknown argument {keyword!r}; {suggestion(keyword, _KEYWORDS)}")
     channel, seeds = marker.kwargs.get("channel"), marker.kwargs.get("seeds")
     channels = [channel] if isinstance(channel, str) else channel
     if channels is not None and not (
         isinstance(channels, list | tuple) and channels and all(isinstance(name, str) for name in channels)
     ):
-        raise ValueError(f'channel is {channel!r}; give a name or a list of names: channel=["ideal", "none"]')
+        raise ValueError(
+            f'channel: not a name or list of names (got {channel!r}; expected ["ideal", "none"] or "ideal")'
+        )
     if seeds is not None and (not isinstance(seeds, int) or isinstance(seeds, bool) or seeds < 1):
-        raise ValueError(f"seeds is {seeds!r}; say how many, to run with the seeds from 1 on: seeds=3")
+        raise ValueError(f"seeds: not a positive number of seeds (got {seeds!r})")
     return channels, seeds
 
 
 def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
-    """Scenarios beside the test file, else below the root, else in the library; a pattern without suffix is a name.
+    """Return scenarios beside the test file, else below the root, else in the library.
 
-    Raise ValueError if there is none.
+    A pattern without suffix is a name. Raise ValueError if no scenario matches.
     """
     glob = str(pattern) if str(pattern).endswith(".xosc") else f"{pattern}.xosc"
     if not Path(glob).is_absolute():
@@ -95,36 +99,39 @@ def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
                 return found
     elif Path(glob).is_file():
         return [Path(glob)]
-    raise ValueError(f"no scenario matches {str(pattern)!r}, beside the test file, below the root or in the library")
+    raise ValueError(f"no scenario matches {str(pattern)!r} beside the test file, below the root or in the library")
 
 
 @pytest.fixture
 def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
-    """A function that plays a scenario and gives its RunResult; the numbers go into the test report.
+    """Return a function that runs a scenario, adds its numbers to the test report and returns its RunResult.
 
-    In a test with the marker `scenario` it is called without arguments. Any other scenario is played by
-    `run_scenario("coop/scenario_1", channel="none", seed=3)`; further keywords are fields of RunSettings. In place of a
-    name it takes what load_scenario takes, as a Scenario of scenariogeneration.
+    In a test with the marker `scenario` the function is called without arguments. Other scenarios are run by
+    `run_scenario("coop/scenario_1", channel="none", seed=3)`; further keywords are fields of RunSettings. Instead of a
+    name, every source of load_scenario is valid, for example a Scenario of scenariogeneration.
 
-    The run is part of the test, which may expect its errors: `pytest.raises(WallLimitError)`. So an aborted run is a
-    failure of the test, where a `.xosc` file as a test item has an error. A wrong input fails the test with file and
-    line.
+    The run is part of the test, which may expect its errors: `pytest.raises(WallLimitError)`. An aborted run is
+    therefore a failure of the test, and an error of a `.xosc` file as a test item. Invalid input fails the test with
+    file and line.
     """
     case: Case | None = getattr(request, "param", None)
 
     def run(
         source: Source | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
     ) -> RunResult:
-        __tracebackhide__ = True  # a failure shows the line of the test that called it
+        __tracebackhide__ = True  # a failure shows the calling line of the test
         source = case.source if source is None and case is not None else source
         if source is None:
-            pytest.fail('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario', pytrace=False)
-        arm = case.arm if case is not None else RunVariant(None, 1)
-        replaced = arm.replaced if channel is None and seed is None else ()
-        arm = RunVariant(arm.channel if channel is None else channel, arm.seed if seed is None else seed, replaced)
+            message = 'run_scenario: no scenario (expected run_scenario("coop/scenario_1") or the marker scenario)'
+            pytest.fail(message, pytrace=False)
+        variant = case.variant if case is not None else RunVariant(None, 1)
+        replaced = variant.replaced if channel is None and seed is None else ()
+        variant = RunVariant(
+            variant.channel if channel is None else channel, variant.seed if seed is None else seed, replaced
+        )
         try:
             source = resolve_scenario(source) if isinstance(source, str | Path) else source
-            result = run_variant(request.node, source, arm, **settings)
+            result = run_variant(request.node, source, variant, **settings)
         except InputError as error:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
         except SimulationError as error:
@@ -132,7 +139,7 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             if error.__cause__ is not None and place is not None:
                 error.__cause__.__traceback__ = _from_file(error.__cause__.__traceback__, place.file)
             raise error.with_traceback(None) from error.__cause__
-        result = replace(result, warnings=(*result.warnings, *arm.replaced))
+        result = replace(result, warnings=(*result.warnings, *variant.replaced))
         request.node.user_properties.extend(properties(result))
         if not result.passed:
             request.node.add_report_section("call", "eidrive", explain(result))
@@ -142,7 +149,7 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
 
 
 def _from_file(trace: TracebackType | None, file: str) -> TracebackType | None:
-    """The part of a traceback that begins in a file; all of it if none does."""
+    """Return the part of a traceback that begins in a file, or the whole traceback without that file."""
     part = trace
     while part is not None and part.tb_frame.f_code.co_filename != file:
         part = part.tb_next

@@ -1,8 +1,8 @@
-"""The limit of the wall time of each run, and what becomes of a session in which a run cannot be interrupted.
+"""Wall limit of each run, and handling of uninterruptible runs.
 
-A run that returns to the interpreter fails as any other. Code that never does so ends its process after a time of
-grace: a worker of pytest-xdist is replaced and its test fails with the report that it left; without workers the session
-ends.
+A run that returns to the interpreter fails like any other. Code that does not return ends its process after a grace
+period. A worker of pytest-xdist is replaced, and its test fails with the report of the worker. Without workers the
+session ends.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _ABORTED = 3
 _NO_LIMIT = "none"
 _WORKER_KEY = "eidrive_hung_runs"
 _reports = pytest.StashKey[Path]()
-"""Folder for the reports of workers."""
+"""Folder of the reports of workers."""
 _limit = pytest.StashKey["float | None"]()
 _before = pytest.StashKey["LastResort | None"]()
 _file = pytest.StashKey["IO[Any]"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option and the ini option of the wall limit."""
+    """Add the command line option and the ini option of the wall limit."""
     group = parser.getgroup("eidrive", "OpenSCENARIO files")
     group.addoption(
         "--eidrive-wall-limit",
@@ -50,7 +50,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Read the limit, and let this process end if a run in it cannot be interrupted."""
+    """Read the limit, and install the handler of uninterruptible runs in this process."""
     config.stash[_limit] = _given_limit(config)
     workerinput = getattr(config, "workerinput", None)
     if workerinput is not None:
@@ -67,7 +67,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Take back what `pytest_configure` set."""
+    """Undo `pytest_configure`."""
     if _file in config.stash:
         set_last_resort(config.stash[_before])
         config.stash[_file].close()
@@ -76,7 +76,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 def pytest_configure_node(node: Any) -> None:
-    """Tell a worker of pytest-xdist where to leave its report."""
+    """Send the folder of reports to a worker of pytest-xdist."""
     if _reports not in node.config.stash:
         node.config.stash[_reports] = Path(tempfile.mkdtemp(prefix="eidrive-hung-runs-"))
     node.workerinput[_WORKER_KEY] = str(node.config.stash[_reports])
@@ -84,7 +84,7 @@ def pytest_configure_node(node: Any) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
-    """Add the report of a worker that ended to that of its test."""
+    """Add the report of an ended worker to the report of its test."""
     node: Any = getattr(report, "node", None)
     if node is None or _WORKER_KEY not in node.workerinput:
         return
@@ -106,24 +106,24 @@ def wall_limit_of(config: pytest.Config) -> float | None:
 
 
 class _Notes:
-    """The notes of the run in progress, in a file beside the report of its worker."""
+    """Notes of the run in progress, in a file beside the report of its worker."""
 
     def __init__(self, report: Path) -> None:
         self._path = report.with_name(f"{report.name}.notes")
 
     def __call__(self, limit: Limit) -> None:
-        with suppress(OSError):  # the run does not depend on it
+        with suppress(OSError):  # notes are optional
             self._path.write_text("\n".join(limit.notes), encoding="utf-8", errors="surrogateescape")
 
     def read(self) -> list[str]:
-        """The lines; none if no run has begun."""
+        """Return the notes; empty before the first run."""
         if not self._path.is_file():
             return []
         return self._path.read_text(encoding="utf-8", errors="replace").splitlines()
 
 
 class _Reporter:
-    """Writes the report of a run that cannot be interrupted to a file, and ends the process."""
+    """Callable that writes the report of an uninterruptible run to a file and ends the process."""
 
     def __init__(self, file: IO[Any]) -> None:
         self._file = file
@@ -161,12 +161,12 @@ def _seconds(text: str) -> float | str:
     except ValueError:
         seconds = 0.0
     if not 0.0 < seconds < float("inf"):
-        raise ArgumentTypeError(f"{text!r} is not a positive number of seconds, nor none")
+        raise ArgumentTypeError(f"not a positive number of seconds or none (got {text!r})")
     return seconds
 
 
 def _has_faulthandler_timeout(config: pytest.Config) -> bool:
-    """Whether pytest dumps stacks after a time of its own: there is one such timer in a process."""
+    """True if pytest uses the only faulthandler timer of the process."""
     try:
         return float(config.getini("faulthandler_timeout") or 0.0) > 0.0
     except (KeyError, ValueError):

@@ -1,4 +1,4 @@
-"""Runs of scenarios as test items: a run that does not come to its end is an error, a failed verdict is a failure."""
+"""Runs of scenarios as test items: an aborted run is an error, a failed verdict is a failure."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ if TYPE_CHECKING:
 
 
 class ScenarioItem(pytest.Item):
-    """One run of a scenario, with one channel and one seed.
+    """Test item of one run of a scenario, with one channel and one seed.
 
-    The run is the setup of the test and its verdict is the test. So a wrong file, an extension that raises an exception
-    and a run beyond the wall limit are errors, which pytest and JUnit report apart from failures.
+    The run is the setup of the test, and its verdict is the test. An invalid file, an exception of an extension and a
+    run beyond the wall limit are therefore errors, which pytest and JUnit report separately from failures.
 
-    run  concrete run of a parameter value distribution; one that its scenario's constraints rule out is skipped
+    run  concrete run of a parameter value distribution; skipped if it violates the constraints of the scenario
     """
 
-    def __init__(self, *, arm: RunVariant, run: ConcreteRun | None = None, **named: Any) -> None:
+    def __init__(self, *, variant: RunVariant, run: ConcreteRun | None = None, **named: Any) -> None:
         super().__init__(**named)
-        self.arm = arm
+        self.variant = variant
         self.run = run
         self._result: RunResult | None = None
 
     def setup(self) -> None:
-        """Run the scenario and record its properties. Raise an exception of pytest with the text of what is wrong."""
+        """Run the scenario and record its properties. Raise a pytest exception with the diagnostics of an error."""
         if self.config.getoption("setuponly"):
             return
         try:
-            self._result = run_file_and_report(self, self.path, self.arm, self.run)
+            self._result = run_file_and_report(self, self.path, self.variant, self.run)
         except ConstraintError as error:
             if self.run is None:
                 raise pytest.fail.Exception(str(error), pytrace=False) from None
-            pytest.skip(f"ruled out by constraints: {error}")
+            pytest.skip(f"excluded by constraints: {error}")
         except Exception as error:
             text = failure_text(error)
             if text is None:

@@ -1,4 +1,4 @@
-"""Options of the plugin, and what they mean for the runs of one scenario."""
+"""Options of the plugin, and the runs of a scenario that they select."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ MARKER = (
     "scenario(pattern, channel=None, seeds=None): run the test once for every scenario that matches the pattern "
     "(beside the test file, below the root, or in the library), channel and seed, through the fixture run_scenario"
 )
-_MOST_RUNS = 100
-_LONGEST = 80
-"""Characters of a channel in the name of a test."""
+_DEFAULT_MAX_RUNS = 100
+_MAX_LENGTH = 80
+"""Maximum number of characters of a channel in the name of a test."""
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _WORKER_KEY = "eidrive_given"
 
 
 @dataclass(frozen=True)
 class RunVariant:
-    """One way to run a scenario; the channel None is the one that the file itself names.
+    """Channel and seed of one run of a scenario; the channel None is the channel of the file.
 
-    replaced  warnings of options that replaced what the marker of the test lists
-    label     channel in the name of the test, where its own short name is that of another channel too
+    replaced  warnings about options that replace lists of the marker of the test
+    label     channel in the name of the test, if its short name is not unique
     """
 
     channel: str | None
@@ -43,19 +43,19 @@ class RunVariant:
 
 
 def _short(channel: str) -> str:
-    """A profile's name without folder and suffix; one that is written out, in words that fit a file's name."""
-    return re.sub(r"[^\w.]+", "_", channel).strip("_")[:_LONGEST] if "{" in channel else Path(channel).stem
+    """Return the name of a profile without folder and suffix, or an inline profile with characters of a file name."""
+    return re.sub(r"[^\w.]+", "_", channel).strip("_")[:_MAX_LENGTH] if "{" in channel else Path(channel).stem
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options `--eidrive-…` and the ini option `eidrive_paths`."""
+    """Add the options `--eidrive-…` and the ini option `eidrive_paths`."""
     group = parser.getgroup("eidrive", "OpenSCENARIO files")
     group.addoption(
         "--eidrive-channel",
         metavar="A,B",
         action="append",
         help="run each scenario with each of these channel profiles (default: the file's own); none: no cooperation; "
-        "may be given several times",
+        "repeatable",
     )
     group.addoption(
         "--eidrive-seeds", metavar="N", type=_count, help="run each scenario with the seeds 1 to N (default: 1)"
@@ -65,14 +65,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--eidrive-max-runs",
         metavar="N|all",
         type=_count_or_all,
-        default=_MOST_RUNS,
-        help=f"most runs of a distribution that become tests, spread over its values (default: {_MOST_RUNS})",
+        default=_DEFAULT_MAX_RUNS,
+        help=f"maximum runs of a distribution, spread over its values (default: {_DEFAULT_MAX_RUNS})",
     )
     group.addoption("--eidrive-out", metavar="DIR", help="keep recording.mcap and result.json of every run below DIR")
     hung_runs.pytest_addoption(parser)
     parser.addini(
         "eidrive_paths",
-        "folders whose .xosc files are tests (default: those given on the command line)",
+        "folders whose .xosc files are tests (default: folders of the command line)",
         type="paths",
         default=None,
     )
@@ -80,7 +80,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
-        raise ArgumentTypeError(f"{text!r} is no number from 1 on")
+        raise ArgumentTypeError(f"not a positive integer (got {text!r})")
     return int(text)
 
 
@@ -89,36 +89,36 @@ def _count_or_all(text: str) -> int | None:
 
 
 def _channels(text: str) -> list[str]:
-    """What stands between the commas, but for those within braces; each once."""
+    """Split a text at commas outside of braces and brackets, without empty and duplicate parts."""
     parts, depth = [""], 0
-    for sign in text:
-        depth += (sign in "{[") - (sign in "}]")
-        if sign == "," and depth == 0:
+    for character in text:
+        depth += (character in "{[") - (character in "}]")
+        if character == "," and depth == 0:
             parts.append("")
         else:
-            parts[-1] += sign
+            parts[-1] += character
     return [name for name in dict.fromkeys(part.strip() for part in parts) if name]
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker; note what was named on the command line."""
+    """Declare the marker and store the paths of the command line."""
     config.addinivalue_line("markers", MARKER)
     config.stash[_GIVEN] = _given(config)
     hung_runs.pytest_configure(config)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
-    """Say what the options ask for, where they ask for something."""
+    """Return the options with a value, or None."""
     options = {name: config.getoption(f"eidrive_{name}") for name in ("channel", "detector", "seeds", "out")}
     options["channel"] = ",".join(options["channel"]) if options["channel"] is not None else None
-    asked = [f"{name} {value}" for name, value in options.items() if value is not None]
-    return f"eidrive: {', '.join(asked)}" if asked else None
+    given = [f"{name} {value}" for name, value in options.items() if value is not None]
+    return f"eidrive: {', '.join(given)}" if given else None
 
 
-def arms(
+def run_variants(
     config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None
 ) -> Iterator[RunVariant]:
-    """Every channel with every seed; the command line wins over `channels` and `seeds`, those of the marker."""
+    """Yield every channel with every seed. The command line overrides `channels` and `seeds` of the marker."""
     given = config.getoption("eidrive_channel")
     names: Sequence[str | None] = _channels(",".join(given)) if given else []
     option = config.getoption("eidrive_seeds")
@@ -135,7 +135,7 @@ def arms(
 
 
 def _labels(channels: Sequence[str | None]) -> list[str]:
-    """A name of its own for each channel: profiles of two folders may have one name, and long ones one beginning."""
+    """Return unique labels: profiles of two folders may have equal names, and long profiles equal beginnings."""
     labels: list[str] = []
     for channel in channels:
         name = label = "" if channel is None else _short(channel)
@@ -147,11 +147,11 @@ def _labels(channels: Sequence[str | None]) -> list[str]:
     return labels
 
 
-def wanted(config: pytest.Config, path: Path) -> bool:
-    """Whether a scenario file is to become tests.
+def is_selected(config: pytest.Config, path: Path) -> bool:
+    """Whether a scenario file becomes tests.
 
-    One that is named itself always is. One in a folder is where the ini option `eidrive_paths` lists the folder or one
-    above; where the project does not set that option, where the folder or one above was given on the command line.
+    A file on the command line is always selected. Other files are selected by the folders of the ini option
+    `eidrive_paths`, or without that option by the folders of the command line.
     """
     given = config.stash[_GIVEN]
     if path in given:
@@ -161,7 +161,7 @@ def wanted(config: pytest.Config, path: Path) -> bool:
 
 
 def _given(config: pytest.Config) -> tuple[Path, ...]:
-    """Files and folders that were named on the command line; a worker of pytest-xdist asks its controller."""
+    """Return files and folders of the command line; a worker of pytest-xdist receives them from its controller."""
     if hasattr(config, "workerinput"):
         return tuple(map(Path, config.workerinput[_WORKER_KEY]))
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
@@ -171,6 +171,6 @@ def _given(config: pytest.Config) -> tuple[Path, ...]:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
-    """Tell a worker of pytest-xdist what was named on the command line: its own arguments do not say."""
+    """Send the paths of the command line to a worker of pytest-xdist, whose own arguments omit them."""
     hung_runs.pytest_configure_node(node)
     node.workerinput[_WORKER_KEY] = [str(path) for path in node.config.stash[_GIVEN]]

@@ -1,4 +1,4 @@
-"""One run as a test: play it, note its numbers, say why it failed."""
+"""One run as a test: execution, report properties, and text of a failure."""
 
 from __future__ import annotations
 
@@ -23,38 +23,39 @@ if TYPE_CHECKING:
 Properties = list[tuple[str, object]]
 
 WARNING = "warning"
-"""Name of the property that holds one warning of a run."""
+"""Name of the properties with the warnings of a run."""
 
 
 class ScenarioFailed(Exception):
-    """The verdict of a run is failed."""
+    """Failed verdict of a run."""
 
     def __init__(self, result: RunResult) -> None:
         super().__init__(explain(result))
         self.result = result
 
 
-def run_file_and_report(item: pytest.Item, source: Path, arm: RunVariant, run: ConcreteRun | None = None) -> RunResult:
-    """Run a test's scenario, or that run of its distribution, and record its properties. Raise InputError."""
-    result = _run_and_report(item.config, source, run or source, arm, {})
+def run_file_and_report(
+    item: pytest.Item, source: Path, variant: RunVariant, run: ConcreteRun | None = None
+) -> RunResult:
+    """Run the scenario of a test, or one run of its distribution, and record its properties. Raise InputError."""
+    result = _run_and_report(item.config, source, run or source, variant, {})
     item.user_properties.extend(properties(result))
     if run is not None:
         item.user_properties.extend((f"parameter.{name}", value) for name, value in run.parameters.items())
     return result
 
 
-def run_variant(item: pytest.Item, source: Source, arm: RunVariant, **overrides: Any) -> RunResult:
-    """Run a scenario as the options ask, the arm says and `overrides` (fields of RunSettings) insist.
+def run_variant(item: pytest.Item, source: Source, variant: RunVariant, **overrides: Any) -> RunResult:
+    """Run a scenario with the options, the variant and `overrides` (fields of RunSettings), in ascending priority.
 
-    What it leaves behind lies where the scenario's file does, or without one where that of the test does.
-    Raise InputError.
+    The output folder follows the path of the scenario, or without a file the path of the test. Raise InputError.
     """
     file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
-    return _run_and_report(item.config, file, source, arm, overrides, command=pytest_command(item))
+    return _run_and_report(item.config, file, source, variant, overrides, command=pytest_command(item))
 
 
 def pytest_command(item: pytest.Item) -> str:
-    """The command line that repeats a test; it also repeats runs of scenarios that the test has made in Python."""
+    """Return the command line that repeats a test, including runs of scenarios without a file."""
     words = ["pytest", "::".join([str(item.path), *item.nodeid.split("::")[1:]])]
     for name in ("channel", "detector", "seeds"):
         value = item.config.getoption(f"eidrive_{name}")
@@ -67,11 +68,11 @@ def _run_and_report(
     config: pytest.Config,
     file: Path,
     source: Source | ConcreteRun,
-    arm: RunVariant,
+    variant: RunVariant,
     overrides: Mapping[str, Any],
     command: str = "",
 ) -> RunResult:
-    # Imported with the first run: pytest loads this plugin in every project of its environment.
+    # Imported at the first run: pytest loads this plugin in every project of its environment.
     from eidrive_scenario.experiments.single_run import run_and_save
     from eidrive_scenario.simulation import RunSettings
 
@@ -80,13 +81,17 @@ def _run_and_report(
     known = [field.name for field in fields(RunSettings)]
     for keyword in overrides:
         if keyword not in known:
-            raise SettingError(Diagnostic(f"run_scenario takes no {keyword!r}", suggestion(keyword, known)))
-    settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
+            raise SettingError(Diagnostic(f"run_scenario: unknown setting {keyword!r}", suggestion(keyword, known)))
+    settings: dict[str, Any] = {
+        "channel": variant.channel,
+        "detector": config.getoption("eidrive_detector"),
+        **overrides,
+    }
     folder = config.getoption("eidrive_out")
-    below = Path(config.invocation_params.dir, folder, *_place(config, file)) if folder is not None else None
+    below = Path(config.invocation_params.dir, folder, *_subfolders(config, file)) if folder is not None else None
     return run_and_save(
         source,
-        seed=arm.seed,
+        seed=variant.seed,
         settings=RunSettings(**settings),
         below=below,
         wall_limit=wall_limit,
@@ -94,42 +99,42 @@ def _run_and_report(
     )
 
 
-def _place(config: pytest.Config, source: Path) -> tuple[str, ...]:
+def _subfolders(config: pytest.Config, source: Path) -> tuple[str, ...]:
     path = source.resolve().with_suffix("")
     return path.relative_to(config.rootpath).parts if path.is_relative_to(config.rootpath) else path.parts[-2:]
 
 
 def properties(result: RunResult) -> Properties:
-    """What of a run belongs into a test report: each criterion's value and limit, the metrics, the fingerprint.
+    """Return the report properties of a run: values and limits of the criteria, metrics, settings and trace hash.
 
-    Plain numbers only, as pytest-xdist sends nothing else to its controller.
+    Values are plain numbers and texts, because pytest-xdist sends no other types to its controller.
     """
-    noted: Properties = [("channel", result.channel), ("seed", result.seed), ("end_reason", result.end_reason)]
+    entries: Properties = [("channel", result.channel), ("seed", result.seed), ("end_reason", result.end_reason)]
     if result.run is not None:
-        noted.append(("run", result.run))
+        entries.append(("run", result.run))
     for verdict in result.criteria:
-        noted.append((f"{verdict.name}.passed", bool(verdict.passed)))
+        entries.append((f"{verdict.name}.passed", bool(verdict.passed)))
         if verdict.value is not None:
-            noted.append((f"{verdict.name}.value", float(verdict.value)))
+            entries.append((f"{verdict.name}.value", float(verdict.value)))
         if verdict.limit is not None:
-            noted.append((f"{verdict.name}.limit", float(verdict.limit)))
-    noted += ((name, float(value)) for name, value in result.metrics.items())
-    noted += ((WARNING, warning) for warning in result.warnings)
-    noted += setting_properties(result.settings)
-    return [*noted, ("simulated_s", result.simulated_s), ("trace_hash", result.trace_hash)]
+            entries.append((f"{verdict.name}.limit", float(verdict.limit)))
+    entries += ((name, float(value)) for name, value in result.metrics.items())
+    entries += ((WARNING, warning) for warning in result.warnings)
+    entries += setting_properties(result.settings)
+    return [*entries, ("simulated_s", result.simulated_s), ("trace_hash", result.trace_hash)]
 
 
 def setting_properties(settings: ResolvedSettings) -> Properties:
-    """Each resolved setting as a property of its own, as JSON where it is neither a text nor a number; and the hash."""
-    noted: Properties = []
+    """Return one property for each resolved setting, as text, number or JSON, and the hash of all settings."""
+    entries: Properties = []
     for name, value in settings.as_json().items():
         plain = isinstance(value, str | int | float) and not isinstance(value, bool)
-        noted.append((f"settings.{name}", value if plain else canonical_json(value)))
-    return [*noted, ("settings_sha256", settings.digest)]
+        entries.append((f"settings.{name}", value if plain else canonical_json(value)))
+    return [*entries, ("settings_sha256", settings.digest)]
 
 
 def explain(result: RunResult) -> str:
-    """Why a run failed, in words; the command that repeats it, and the path of its recording."""
+    """Return the reasons of a failed run, the command that repeats it, and the path of its recording."""
     from eidrive_scenario.experiments.reproduction import reproduction_lines
 
     lines = [f"{verdict.name}: {verdict.reason}{_limit(verdict)}" for verdict in result.criteria if not verdict.passed]
@@ -145,7 +150,7 @@ def _limit(verdict: Verdict) -> str:
 
 
 def failure_text(error: BaseException) -> str | None:
-    """The text of a failure that needs no traceback, or None for one that does."""
+    """Return the text of a failure without traceback, or None for an error that requires a traceback."""
     if isinstance(error, ScenarioFailed | InputError):
         return str(error)
     notes: list[str] = getattr(error, "__notes__", [])

@@ -1,4 +1,4 @@
-"""Sections of the plugin at the end of a test session."""
+"""Sections of the plugin in the summary of a test session."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ from eidrive_scenario.pytest_plugin.warning_summary import show_warnings
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Show the runs that were left out, and the warnings of those that were not."""
+    """Print the omitted runs and the warnings of all runs."""
     show_left_out(terminalreporter, config)
     show_warnings(terminalreporter)

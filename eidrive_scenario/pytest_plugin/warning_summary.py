@@ -1,4 +1,4 @@
-"""Warnings of all runs at the end of a test session, each once with the number of its tests."""
+"""Warnings of all runs in the summary of a test session, each once with the number of its tests."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 from eidrive_scenario.pytest_plugin.outcome import WARNING
 
 _SHOWN = 20
-"""Warnings that are listed; of more, the number is given."""
+"""Maximum number of listed warnings; the number of further warnings is printed."""
 
 
 def show_warnings(terminalreporter: Any) -> None:
-    """List the warnings; the reports of pytest-xdist's workers carry them too."""
+    """List the warnings, including those in the reports of pytest-xdist workers."""
     tests: dict[str, list[str]] = {}
     for reports in terminalreporter.stats.values():
         for report in reports:

@@ -44,9 +44,7 @@ def test_check_that_exceeds_its_wall_limit_ends_with_3_and_names_each_file(folde
     assert code == 3
     for name in names:
         path = re.escape(str(library_path() / f"{name}.xosc"))
-        assert re.search(rf"^{path}: check aborted: .*not finished after 1e-06 s of wall time", err, re.MULTILINE), (
-            err
-        )
+        assert re.search(rf"^{path}: check aborted: .*not finished after 1e-06 s of wall time", err, re.MULTILINE), err
     assert out == "2 files, 0 errors, 0 warnings\n"
 
 

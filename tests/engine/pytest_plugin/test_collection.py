@@ -1,4 +1,4 @@
-"""Scenario files as pytest items: what is collected, and what is left alone."""
+"""Collection of scenario files as pytest items."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CATALOG = '<OpenSCENARIO><FileHeader/><Catalog name="cars"/></OpenSCENARIO>'
 
 @pytest.fixture
 def project(pytester: pytest.Pytester) -> pytest.Pytester:
-    """A foreign project: Python tests, and two scenarios and a catalog in a folder of data."""
+    """Return a third-party project: Python tests, and a folder with two scenarios and a catalog."""
     pytester.makepyfile(test_own="def test_own():\n    pass")
     data = pytester.mkdir("data")
     for name in ("first", "second"):
@@ -30,25 +30,25 @@ def collected(pytester: pytest.Pytester, *arguments: str) -> list[str]:
     return [line for line in result.outlines if "::" in line]
 
 
-def test_a_bare_pytest_is_left_alone(project: pytest.Pytester) -> None:
+def test_collection_without_arguments_ignores_scenarios(project: pytest.Pytester) -> None:
     assert collected(project) == ["test_own.py::test_own"]
 
 
-def test_a_folder_that_is_named(project: pytest.Pytester) -> None:
+def test_collection_of_folder_finds_its_scenarios(project: pytest.Pytester) -> None:
     assert collected(project, "data") == ["data/first.xosc::first[seed1]", "data/second.xosc::second[seed1]"]
 
 
-def test_a_file_and_an_item_that_are_named(project: pytest.Pytester) -> None:
+def test_collection_of_file_and_node_id_finds_them(project: pytest.Pytester) -> None:
     assert collected(project, "data/first.xosc") == ["data/first.xosc::first[seed1]"]
     item = "data/first.xosc::first[none-seed2]"
     assert collected(project, item, "--eidrive-channel", "ideal,none", "--eidrive-seeds", "2") == [item]
 
 
-def test_another_folder_does_not_count(project: pytest.Pytester) -> None:
+def test_collection_of_other_file_ignores_scenarios(project: pytest.Pytester) -> None:
     assert collected(project, "test_own.py") == ["test_own.py::test_own"]
 
 
-def test_the_ini_option_decides_where_it_is_set(project: pytest.Pytester) -> None:
+def test_eidrive_paths_option_selects_folders(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_paths = scenarios")
     scenarios = project.mkdir("scenarios")
     shutil.copy(PASSING_BY, scenarios / "third.xosc")
@@ -57,7 +57,7 @@ def test_the_ini_option_decides_where_it_is_set(project: pytest.Pytester) -> Non
     assert collected(project, "data/first.xosc") == ["data/first.xosc::first[seed1]"]
 
 
-def test_one_item_per_channel_and_seed(project: pytest.Pytester) -> None:
+def test_collection_yields_one_item_per_channel_and_seed(project: pytest.Pytester) -> None:
     items = collected(
         project, "data/first.xosc", "--eidrive-channel", "ideal,channels/bad.yaml", "--eidrive-seeds", "2"
     )
@@ -69,18 +69,18 @@ def test_one_item_per_channel_and_seed(project: pytest.Pytester) -> None:
     ]
 
 
-def test_k_selects(project: pytest.Pytester) -> None:
+def test_keyword_option_selects_items(project: pytest.Pytester) -> None:
     items = collected(project, "data", "--eidrive-seeds", "3", "-k", "second and seed3")
     assert items == ["data/second.xosc::second[seed3]"]
 
 
-def test_seeds_must_count(project: pytest.Pytester) -> None:
+def test_seeds_option_of_zero_is_usage_error(project: pytest.Pytester) -> None:
     result = project.runpytest_inprocess("data", "--eidrive-seeds", "0")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*--eidrive-seeds: '0' is no number from 1 on"])
+    result.stderr.fnmatch_lines(["*--eidrive-seeds: not a positive integer (got '0')"])
 
 
-def test_a_channel_may_be_written_out_and_none_comes_twice(project: pytest.Pytester) -> None:
+def test_channel_option_accepts_inline_profile_and_drops_duplicates(project: pytest.Pytester) -> None:
     channels = "ideal, {delay: {kind: uniform, low: 0, high: 0.1}, loss: {kind: none}},ideal,none,"
     items = collected(project, "data/first.xosc", "--eidrive-channel", channels)
     assert [item.split("::")[1] for item in items] == [
@@ -90,20 +90,20 @@ def test_a_channel_may_be_written_out_and_none_comes_twice(project: pytest.Pytes
     ]
 
 
-def test_channels_may_be_asked_for_one_by_one(project: pytest.Pytester) -> None:
+def test_channel_option_is_repeatable(project: pytest.Pytester) -> None:
     items = collected(project, "data/first.xosc", "--eidrive-channel", "ideal", "--eidrive-channel", "none,ideal")
     assert [item.split("::")[1] for item in items] == ["first[ideal-seed1]", "first[none-seed1]"]
 
 
-def test_bare_pytest_under_xdist_is_left_alone_too(project: pytest.Pytester) -> None:
+def test_collection_without_arguments_under_xdist_ignores_scenarios(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess("-n", "1", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1)
 
 
 def test_item_names_of_channels_with_equal_names_differ(project: pytest.Pytester) -> None:
-    """Two folders hold a profile `bad`, and the written-out channels are equal in their first 80 characters."""
-    written = "{delay: {kind: uniform, low: 0.000000000000, high: 0.100000000000}, loss: {kind: none}, reordering: "
-    channels = f"one/bad.yaml,two/bad.yaml,{written}true}},{written}false}}"
+    """Two folders have a profile `bad`, and two inline profiles are equal in their first 80 characters."""
+    inline = "{delay: {kind: uniform, low: 0.000000000000, high: 0.100000000000}, loss: {kind: none}, reordering: "
+    channels = f"one/bad.yaml,two/bad.yaml,{inline}true}},{inline}false}}"
     items = collected(project, "data/first.xosc", "--eidrive-channel", channels)
     names = [item.split("::")[1] for item in items]
     assert names[:2] == ["first[bad-seed1]", "first[bad_2-seed1]"]

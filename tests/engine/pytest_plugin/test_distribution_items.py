@@ -10,14 +10,14 @@ from xml.etree import ElementTree
 
 import pytest
 
-# Imported here, as numpy loads once only in a process, and a run of pytester in this process forgets what it imported.
+# Imported here because pytester unloads modules after an in-process run, and numpy can be loaded only once.
 from eidrive_scenario.openscenario import load_distribution
 
 pytest_plugins = ["pytester"]
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 DISTRIBUTION = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="a test" author="nobody"/>
+<FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="a test" author="test"/>
 <ParameterValueDistribution><ScenarioFile filepath="passing_by.xosc"/><Deterministic>
 <DeterministicSingleParameterDistribution parameterName="OtherY">
 {}
@@ -32,7 +32,7 @@ def values(*texts: str) -> str:
 
 @pytest.fixture
 def vary(pytester: pytest.Pytester) -> Callable[[str], Path]:
-    """Writes `vary.xosc`, which varies how far passing_by's cars are apart; the scenario wants less than 9 m."""
+    """Return a function that writes `vary.xosc`, which varies the lateral distance; its constraint is below 9 m."""
 
     def write(distribution: str) -> Path:
         text = PASSING_BY.read_text(encoding="utf-8")
@@ -47,10 +47,10 @@ def vary(pytester: pytest.Pytester) -> Callable[[str], Path]:
 
 def collected(pytester: pytest.Pytester, *arguments: str) -> list[str]:
     result = pytester.runpytest_inprocess("--collect-only", "-q", "-p", "no:cacheprovider", *arguments)
-    return [line for line in result.outlines if "::" in line and "left out" not in line]
+    return [line for line in result.outlines if "::" in line and "omitted" not in line]
 
 
-def test_one_item_for_each_run(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
+def test_distribution_yields_one_item_per_run(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     vary(values("5", "4.5", "roads/[town]::1.xodr"))
     items = ["run0-OtherY=5-seed1", "run1-OtherY=4.5-seed1", "run2-OtherY=_town_1.xodr-seed1"]
     assert collected(pytester, "vary.xosc") == [f"vary.xosc::vary[{item}]" for item in items]
@@ -63,35 +63,39 @@ def test_one_item_for_each_run(pytester: pytest.Pytester, vary: Callable[[str], 
     ]
 
 
-def test_what_is_left_out_is_told(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
+def test_omitted_runs_are_reported(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     path = vary('<DistributionRange stepWidth="0.01"><Range lowerLimit="0" upperLimit="8"/></DistributionRange>')
     assert len(load_distribution(path)) == 801
     result = pytester.runpytest_inprocess("--collect-only", "-q", "-p", "no:cacheprovider", "vary.xosc")
     assert len([line for line in result.outlines if "::" in line]) == 100
-    told = "vary.xosc: {} of 801 runs are tests, {} are left out"
-    result.stdout.fnmatch_lines([told.format(100, 701), "--eidrive-max-runs N takes more of them*"])
+    message = "vary.xosc: {} of 801 runs are tests, {} are omitted"
+    result.stdout.fnmatch_lines([message.format(100, 701), "--eidrive-max-runs N selects more of them*"])
     result = pytester.runpytest_inprocess("--collect-only", "-q", "vary.xosc", "--eidrive-max-runs", "2")
-    result.stdout.fnmatch_lines(["vary.xosc::vary?run0-OtherY=0-seed1?", told.format(2, 799)])
+    result.stdout.fnmatch_lines(["vary.xosc::vary?run0-OtherY=0-seed1?", message.format(2, 799)])
     everything = collected(pytester, "vary.xosc", "--eidrive-max-runs", "all")
     assert len(everything) == 801
     assert everything[-1] == "vary.xosc::vary[run800-OtherY=8-seed1]"
 
 
-def test_nothing_is_told_where_nothing_is_left_out(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
+def test_distribution_without_omitted_runs_prints_no_report(
+    pytester: pytest.Pytester, vary: Callable[[str], Path]
+) -> None:
     vary(values("5", "4"))
     result = pytester.runpytest_inprocess("--collect-only", "-q", "-p", "no:cacheprovider", "vary.xosc")
-    result.stdout.no_fnmatch_line("*left out*")
+    result.stdout.no_fnmatch_line("*omitted*")
 
 
-def test_the_workers_of_xdist_tell_it_too(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
+def test_omitted_runs_of_xdist_workers_are_reported(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     vary(values("5", "4.5", "4"))
     arguments = ("vary.xosc", "--eidrive-max-runs", "2", "-n", "2", "-p", "no:cacheprovider")
     result = pytester.runpytest_subprocess(*arguments)
     result.assert_outcomes(passed=2)
-    result.stdout.fnmatch_lines(["vary.xosc: 2 of 3 runs are tests, 1 are left out"])
+    result.stdout.fnmatch_lines(["vary.xosc: 2 of 3 runs are tests, 1 are omitted"])
 
 
-def test_outcomes_and_what_is_noted(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
+def test_distribution_items_have_outcomes_and_properties(
+    pytester: pytest.Pytester, vary: Callable[[str], Path]
+) -> None:
     path = vary(values("5", "0", "9"))
     arguments = ("vary.xosc", "--junitxml", "junit.xml", "--eidrive-out", "runs", "-rs", "-p", "no:cacheprovider")
     result = pytester.runpytest_subprocess(*arguments)
@@ -100,7 +104,7 @@ def test_outcomes_and_what_is_noted(pytester: pytest.Pytester, vary: Callable[[s
         [
             "run 1 of passing_by failed with channel *, seed 1",
             "collision: Ego and Parked hit each other at 1.6* s at *",
-            f"SKIPPED * ruled out by constraints: {path}:5: the parameter 'OtherY' is '9', outside its constraints;*",
+            f"SKIPPED * excluded by constraints: {path}:5: the parameter 'OtherY' is '9', outside its constraints;*",
         ]
     )
     result.stdout.no_fnmatch_line("*Traceback*")
@@ -115,7 +119,7 @@ def test_outcomes_and_what_is_noted(pytester: pytest.Pytester, vary: Callable[[s
     assert json.loads((pytester.path / kept[1]).read_text(encoding="utf-8"))["parameters"]["OtherY"] == "0"
 
 
-def test_a_wrong_distribution_is_told_with_its_line(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
+def test_invalid_distribution_is_reported_with_its_line(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     path = vary('<DistributionRange stepWidth="0"><Range lowerLimit="0" upperLimit="8"/></DistributionRange>')
     result = pytester.runpytest_inprocess("vary.xosc", "-p", "no:cacheprovider")
     result.assert_outcomes(errors=1)
@@ -123,8 +127,8 @@ def test_a_wrong_distribution_is_told_with_its_line(pytester: pytest.Pytester, v
     result.stdout.no_fnmatch_line("*Traceback*")
 
 
-def test_the_bound_must_count(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
+def test_max_runs_option_of_text_is_usage_error(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     vary(values("5"))
     result = pytester.runpytest_inprocess("vary.xosc", "--eidrive-max-runs", "some")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*--eidrive-max-runs: 'some' is no number from 1 on"])
+    result.stderr.fnmatch_lines(["*--eidrive-max-runs: not a positive integer (got 'some')"])

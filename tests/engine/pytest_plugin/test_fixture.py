@@ -1,4 +1,4 @@
-"""The marker `scenario` and the fixture `run_scenario`."""
+"""Marker `scenario` and fixture `run_scenario`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def run(pytester: pytest.Pytester, text: str, *arguments: str) -> pytest.RunResu
     return pytester.runpytest_subprocess("test_own.py", "-v", "--strict-markers", "-p", "no:cacheprovider", *arguments)
 
 
-def test_the_marker_runs_every_match_channel_and_seed(project: pytest.Pytester) -> None:
+def test_marker_runs_every_scenario_channel_and_seed(project: pytest.Pytester) -> None:
     text = """
 @pytest.mark.scenario("drives/*.xosc", channel=["ideal", "none"], seeds=2)
 def test_far(run_scenario):
@@ -42,7 +42,7 @@ def test_far(run_scenario):
     assert "min_distance.value" in {entry.get("name") for entry in case.iter("property")}
 
 
-def test_the_command_line_wins(project: pytest.Pytester) -> None:
+def test_command_line_overrides_marker(project: pytest.Pytester) -> None:
     text = """
 @pytest.mark.scenario("drives/first", channel="ideal", seeds=5)
 def test_far(run_scenario):
@@ -51,7 +51,7 @@ def test_far(run_scenario):
     run(project, text, "--eidrive-channel", "none", "--eidrive-seeds", "1").assert_outcomes(passed=1)
 
 
-def test_a_call_may_say_otherwise(project: pytest.Pytester) -> None:
+def test_run_scenario_arguments_select_run(project: pytest.Pytester) -> None:
     text = """
 def test_any(run_scenario):
     near = run_scenario("drives/first.xosc", seed=3, parameters={"OtherY": "0"})
@@ -62,7 +62,7 @@ def test_any(run_scenario):
     run(project, text).assert_outcomes(passed=1)
 
 
-def test_a_wrong_input_fails_with_its_place(project: pytest.Pytester) -> None:
+def test_run_scenario_of_invalid_input_fails_without_traceback(project: pytest.Pytester) -> None:
     text = """
 def test_wrong(run_scenario):
     run_scenario("drives/first.xosc", parameters={"OthreY": "0"})
@@ -77,15 +77,15 @@ def test_missing(run_scenario):
 
 @pytest.mark.parametrize(
     ("marker", "message"),
-    [('"none/*.xosc"', "no scenario matches 'none/*.xosc'"), ("", "the marker scenario needs a pattern")],
+    [('"none/*.xosc"', "no scenario matches 'none/*.xosc'"), ("", "marker scenario: no pattern")],
 )
-def test_a_marker_that_matches_nothing_is_an_error(project: pytest.Pytester, marker: str, message: str) -> None:
+def test_marker_without_match_is_an_error(project: pytest.Pytester, marker: str, message: str) -> None:
     result = run(project, f"@pytest.mark.scenario({marker})\ndef test_none(run_scenario):\n    pass")
     assert result.ret != 0
     assert message in str(result.stdout) + str(result.stderr)
 
 
-def test_no_traceback_of_the_plugin(project: pytest.Pytester) -> None:
+def test_marker_with_unknown_argument_shows_no_traceback(project: pytest.Pytester) -> None:
     text = """
 @pytest.mark.scenario("drives/first", chanel="ideal")
 def test_far(run_scenario):
@@ -97,7 +97,7 @@ def test_far(run_scenario):
     result.stdout.no_fnmatch_line("*During handling*")
 
 
-def test_a_wrong_keyword_of_the_call(project: pytest.Pytester) -> None:
+def test_run_scenario_with_unknown_setting_fails(project: pytest.Pytester) -> None:
     text = """
 def test_far(run_scenario):
     run_scenario("drives/first.xosc", time_limmit=3.0)
@@ -106,19 +106,19 @@ def test_channel(run_scenario):
 """
     result = run(project, text)
     result.assert_outcomes(failed=2)
-    result.stdout.fnmatch_lines(["run_scenario takes no 'time_limmit'; did you mean 'time_limit'?"])
+    result.stdout.fnmatch_lines(["run_scenario: unknown setting 'time_limmit'; did you mean 'time_limit'?"])
     result.stdout.fnmatch_lines(["*no channel profile 'idael'; did you mean 'ideal'?"])
     result.stdout.no_fnmatch_line("*Error*")
     result.stdout.no_fnmatch_line("*During handling*")
 
 
-def test_without_marker_a_name_is_needed(project: pytest.Pytester) -> None:
+def test_run_scenario_without_scenario_fails(project: pytest.Pytester) -> None:
     result = run(project, "def test_none(run_scenario):\n    run_scenario()")
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*name a scenario*"])
+    result.stdout.fnmatch_lines(["*run_scenario: no scenario*"])
 
 
-def test_a_scenario_that_was_written_in_python(project: pytest.Pytester) -> None:
+def test_run_scenario_accepts_scenario_objects(project: pytest.Pytester) -> None:
     text = """
 from xml.etree import ElementTree
 
@@ -140,17 +140,17 @@ def test_wrong(run_scenario):
     assert kept == {"kept/test_own/test_object", "kept/drives/first"}
 
 
-def test_a_marked_test_that_plays_nothing_is_told(project: pytest.Pytester) -> None:
+def test_marked_test_without_fixture_is_an_error(project: pytest.Pytester) -> None:
     alone = "@pytest.mark.scenario('drives/first.xosc')\ndef test_alone(): pass"
     result = run(project, alone)
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines(["*::test_alone: it has the marker scenario, and does not take the fixture *"])
+    result.stdout.fnmatch_lines(["*::test_alone: a test with the marker scenario requires the fixture *"])
     whole = "pytestmark = pytest.mark.scenario('drives/first.xosc')\ndef test_beside_others(): pass"
     run(project, whole).assert_outcomes(passed=1)
 
 
-def test_second_marker_on_a_test_is_refused(project: pytest.Pytester) -> None:
-    """pytest's closest marker would count, and the scenarios of the other one would be left out without a word."""
+def test_second_marker_of_test_is_an_error(project: pytest.Pytester) -> None:
+    """pytest would use the closest marker only, so the scenarios of the other one would be ignored silently."""
     text = """
 @pytest.mark.scenario("drives/first.xosc")
 @pytest.mark.scenario("drives/second.xosc")
@@ -159,4 +159,4 @@ def test_both(run_scenario):
 """
     result = run(project, text)
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines(["*it has several markers scenario*"])
+    result.stdout.fnmatch_lines(["*several markers scenario*"])

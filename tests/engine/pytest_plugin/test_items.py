@@ -1,4 +1,4 @@
-"""Scenario files that run as tests: outcome, properties, what a failure says."""
+"""Scenario files as tests: outcomes, properties, texts of failures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 
 @pytest.fixture
 def project(pytester: pytest.Pytester) -> pytest.Pytester:
-    """One scenario that passes, one that fails, one that is wrong."""
+    """Return a project with a passing, a failing and an invalid scenario."""
     text = PASSING_BY.read_text(encoding="utf-8")
     folder = pytester.mkdir("xosc")
     shutil.copy(PASSING_BY, folder / "far.xosc")
@@ -29,7 +29,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
     return pytester
 
 
-def test_outcomes_and_reasons(project: pytest.Pytester) -> None:
+def test_scenario_items_have_outcomes_and_reasons(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess("xosc", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1, failed=1, errors=1)
     result.stdout.fnmatch_lines_random(
@@ -44,7 +44,7 @@ def test_outcomes_and_reasons(project: pytest.Pytester) -> None:
     result.stdout.no_fnmatch_line("*.py:*: *Error*")
 
 
-def test_junit_of_all_seeds_over_two_workers(project: pytest.Pytester) -> None:
+def test_junit_file_of_two_workers_contains_all_runs(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-seeds", "2", "--eidrive-channel", "ideal,none", "-n", "2", "--junitxml", "junit.xml")
     result = project.runpytest_subprocess("xosc/far.xosc", "xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
     result.assert_outcomes(passed=4, failed=4)
@@ -72,7 +72,7 @@ def test_junit_of_all_seeds_over_two_workers(project: pytest.Pytester) -> None:
     assert "Traceback" not in (failure.text or "")
 
 
-def test_out_keeps_every_run(project: pytest.Pytester) -> None:
+def test_out_option_writes_folder_per_run(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess(
         "xosc/far.xosc", "--eidrive-out", "runs", "--eidrive-seeds", "2", "-p", "no:cacheprovider"
     )
@@ -85,7 +85,7 @@ def test_out_keeps_every_run(project: pytest.Pytester) -> None:
     assert json.loads((project.path / kept[1]).read_text())["passed"] is True
 
 
-def test_the_trace_does_not_depend_on_the_order(project: pytest.Pytester) -> None:
+def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> None:
     def hashes(*arguments: str) -> dict[str, str]:
         project.runpytest_subprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
         found = {}
@@ -100,7 +100,7 @@ def test_the_trace_does_not_depend_on_the_order(project: pytest.Pytester) -> Non
     assert len(set(forwards.values())) == 2
 
 
-def test_failures_print_a_command_that_reproduces_them_and_the_recording(project: pytest.Pytester) -> None:
+def test_failure_prints_reproducing_command_and_recording(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-channel", "{delay: {kind: constant, seconds: 0.1}}", "--eidrive-out", "kept runs")
     result = project.runpytest_subprocess("xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
     result.assert_outcomes(failed=1)
@@ -121,7 +121,7 @@ def test_failures_print_a_command_that_reproduces_them_and_the_recording(project
     assert (printed["trace_hash"], printed["settings"]) == (kept["trace_hash"], kept["settings"])
 
 
-def test_junit_properties_hold_all_settings(project: pytest.Pytester) -> None:
+def test_junit_properties_contain_all_settings(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-channel", "{loss: {kind: bernoulli, probability: 0.5}}", "--junitxml", "junit.xml")
     project.runpytest_subprocess("xosc/far.xosc", *arguments, "--eidrive-out", "runs", "-p", "no:cacheprovider")
     (case,) = ElementTree.parse(project.path / "junit.xml").iter("testcase")
@@ -135,7 +135,7 @@ def test_junit_properties_hold_all_settings(project: pytest.Pytester) -> None:
     assert len(properties["settings_sha256"]) == 64
 
 
-def test_a_failed_test_in_python_prints_the_command_of_its_run(project: pytest.Pytester) -> None:
+def test_failed_python_test_prints_command_of_run(project: pytest.Pytester) -> None:
     project.makepyfile(
         test_own="""
         def test_file(run_scenario):

@@ -1,4 +1,4 @@
-"""Warnings of runs in a test session: properties, the JUnit file, and the end of the output."""
+"""Warnings of runs in a test session: properties, JUnit file and summary."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def warnings_of(junit: Path) -> list[str | None]:
     return [entry.get("value") for entry in ElementTree.parse(junit).iter("property") if entry.get("name") == "warning"]
 
 
-def test_option_that_replaces_the_list_of_a_marker_warns(pytester: pytest.Pytester) -> None:
+def test_option_that_replaces_marker_list_warns(pytester: pytest.Pytester) -> None:
     options = ("--eidrive-channel", "latency_300ms", "--eidrive-seeds", "1", "--junitxml", "junit.xml")
     result = session(pytester, [CHANNEL, SEEDS], *options)
     result.assert_outcomes(passed=1)
@@ -41,7 +41,7 @@ def test_option_that_replaces_the_list_of_a_marker_warns(pytester: pytest.Pytest
     assert warnings_of(pytester.path / "junit.xml") == [CHANNEL, SEEDS]
 
 
-def test_warning_of_a_worker_reaches_the_controller(pytester: pytest.Pytester) -> None:
+def test_warning_of_worker_is_reported_by_controller(pytester: pytest.Pytester) -> None:
     options = ("--eidrive-channel", "latency_300ms", "-n", "2", "--junitxml", "junit.xml")
     result = session(pytester, [CHANNEL], *options)
     result.assert_outcomes(passed=3)
@@ -50,7 +50,7 @@ def test_warning_of_a_worker_reaches_the_controller(pytester: pytest.Pytester) -
 
 
 @pytest.mark.parametrize("options", [(), ("--eidrive-channel", "ideal,none"), ("--eidrive-seeds", "3")])
-def test_options_that_replace_nothing_do_not_warn(pytester: pytest.Pytester, options: tuple[str, ...]) -> None:
+def test_option_equal_to_marker_list_does_not_warn(pytester: pytest.Pytester, options: tuple[str, ...]) -> None:
     result = session(pytester, [], *options)
     result.assert_outcomes(passed=6)
     result.stdout.no_fnmatch_line("*warnings of runs*")

@@ -1,4 +1,4 @@
-"""Runs that an extension breaks, as tests: all others finish, and the JUnit file is complete."""
+"""Runs as tests that an extension aborts: all others finish, and the JUnit file is complete."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from faulty_extensions import install, line_of, write_scenario
 
 pytest_plugins = ["pytester"]
 pytestmark = pytest.mark.timeout(600)
-"""Hung runs take their limit and the grace after it, and several processes load the engine."""
+"""Hung runs last for the limit and the grace period, and several processes load the engine."""
 
 LIMIT = 8
-"""Wall limit of each run [s]: far more than a sound run takes."""
+"""Wall limit of each run [s]; a valid run needs much less."""
 FAULTS: dict[str, dict[str, str]] = {
     "hangs": {"detector": "hangs"},
     "exits": {"detector": "exits"},
@@ -27,7 +27,7 @@ SOUND = [f"sound_{number}" for number in range(7)]
 
 @pytest.fixture
 def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
-    """A folder with scenarios whose extensions are faulty, and with sound ones."""
+    """Return a project with scenarios of faulty extensions and valid scenarios."""
     monkeypatch.setenv("PYTHONPATH", str(install(pytester.mkdir("package"))), prepend=":")
     folder = pytester.mkdir("xosc")
     for name in SOUND:
@@ -39,7 +39,7 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
 
 
 def cases_of(junit: Path) -> dict[str, str]:
-    """Return the failure of each case by its name without channel and seed; "" for one that passed."""
+    """Return the failure of each case by its name without channel and seed; "" for a passed case."""
     cases = ElementTree.parse(junit).iter("testcase")
     return {
         str(case.get("name")).partition("[")[0]: "\n".join(
@@ -49,8 +49,8 @@ def cases_of(junit: Path) -> dict[str, str]:
     }
 
 
-def test_faulty_extensions_over_two_workers_leave_other_runs_alone(project: pytest.Pytester) -> None:
-    """12 runs, 5 of which end in an error of an extension that the JUnit file names."""
+def test_faulty_extensions_over_two_workers_do_not_affect_other_runs(project: pytest.Pytester) -> None:
+    """5 of 12 runs end with an error of an extension, which the JUnit file names."""
     arguments = ("xosc", "-n", "2", "--junitxml", "junit.xml", "--eidrive-out", "runs", "-p", "no:cacheprovider")
     result = project.runpytest_subprocess(*arguments)
     result.assert_outcomes(passed=7, errors=5)
@@ -73,8 +73,8 @@ def test_faulty_extensions_over_two_workers_leave_other_runs_alone(project: pyte
         assert "recording.partial.mcap" in cases[name]
 
 
-def test_run_that_never_returns_to_python_fails_alone_over_workers(project: pytest.Pytester) -> None:
-    """The worker is replaced; what it left names the extension and its line."""
+def test_uninterruptible_run_of_worker_does_not_affect_other_runs(project: pytest.Pytester) -> None:
+    """The worker is replaced, and its report names the extension and the line."""
     folder = project.mkdir("hung")
     write_scenario(folder / "native.xosc", detector="hangs_in_c")
     for name in SOUND[:3]:
@@ -90,18 +90,16 @@ def test_run_that_never_returns_to_python_fails_alone_over_workers(project: pyte
     assert not any(cases[name] for name in SOUND[:3])
 
 
-def test_wall_limit_option_wins_over_ini(project: pytest.Pytester) -> None:
+def test_wall_limit_option_overrides_ini_option(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_wall_limit = never\n")
     refused = project.runpytest_subprocess("xosc/sound_0.xosc", "-p", "no:cacheprovider")
-    refused.stderr.fnmatch_lines(["*eidrive_wall_limit: 'never' is not a positive number of seconds, nor none*"])
+    refused.stderr.fnmatch_lines(["*eidrive_wall_limit: not a positive number of seconds or none (got 'never')*"])
     sound = project.runpytest_subprocess("xosc/sound_0.xosc", "--eidrive-wall-limit", "none", "-p", "no:cacheprovider")
     sound.assert_outcomes(passed=1)
 
 
-def test_aborted_run_of_run_scenario_fails_with_the_line_of_the_test_and_of_the_extension(
-    project: pytest.Pytester,
-) -> None:
-    """Neither frames of the engine nor of the plugin are shown."""
+def test_aborted_run_scenario_shows_lines_of_test_and_extension(project: pytest.Pytester) -> None:
+    """Frames of the engine and of the plugin are hidden."""
     project.makepyfile(
         """
         import pytest
@@ -129,7 +127,7 @@ def test_aborted_run_of_run_scenario_fails_with_the_line_of_the_test_and_of_the_
         assert file not in text
 
 
-def test_wall_limit_of_run_scenario_fixture(project: pytest.Pytester) -> None:
+def test_run_scenario_beyond_wall_limit_raises_error(project: pytest.Pytester) -> None:
     project.makepyfile(
         """
         import pytest
