@@ -1,4 +1,4 @@
-"""The command line as a function."""
+"""Fixtures that execute the command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Eidrive = Callable[..., Result]
 
 @pytest.fixture
 def eidrive(monkeypatch: pytest.MonkeyPatch) -> Eidrive:
-    """`eidrive("run", path, …)`: exit code, stdout and stderr; wide enough for a message on one line."""
+    """Return a function that executes `eidrive("run", path, …)`, with a console of 200 columns."""
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.delenv("EIDRIVE_TRACEBACK", raising=False)
 
@@ -27,5 +27,5 @@ def eidrive(monkeypatch: pytest.MonkeyPatch) -> Eidrive:
 
 @pytest.fixture
 def passing_by() -> Path:
-    """The Ego passes a parked car at 5 m between the centers; `--param OtherY=0` makes them collide."""
+    """Return a scenario in which Ego passes a parked car with 5 m between the centers; OtherY=0 is a collision."""
     return Path(__file__).parents[1] / "data" / "passing_by.xosc"

@@ -1,39 +1,5 @@
-<<<<<<< HEAD
-"""Fixtures of the tests of the command line."""
-=======
 """Fixtures of command line tests."""
->>>>>>> 948cf39 (Use standard terms in the command line)
 
 from command_fixtures import eidrive, passing_by
 
-<<<<<<< HEAD
 __all__ = ["eidrive", "passing_by"]
-=======
-from collections.abc import Callable
-from pathlib import Path
-
-import pytest
-from typer.testing import CliRunner, Result
-
-from eidrive_scenario.cli import app
-
-Eidrive = Callable[..., Result]
-
-
-@pytest.fixture
-def eidrive(monkeypatch: pytest.MonkeyPatch) -> Eidrive:
-    """Return a function that executes `eidrive("run", path, …)`, with a console of 200 columns."""
-    monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.delenv("EIDRIVE_TRACEBACK", raising=False)
-
-    def invoke(*arguments: str | Path) -> Result:
-        return CliRunner().invoke(app, [str(argument) for argument in arguments])
-
-    return invoke
-
-
-@pytest.fixture
-def passing_by() -> Path:
-    """Return a scenario in which Ego passes a parked car with 5 m between the centers; OtherY=0 is a collision."""
-    return Path(__file__).parents[2] / "data" / "passing_by.xosc"
->>>>>>> 948cf39 (Use standard terms in the command line)
