@@ -1,1 +1,1 @@
-"""Pass/fail criteria: one per file, each a fold over frames. They import the engine's api only."""
+"""Pass/fail criteria, one per module. Each criterion aggregates frames and imports only the API of the engine."""

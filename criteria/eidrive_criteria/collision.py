@@ -1,4 +1,4 @@
-"""No contact between an actor and others."""
+"""Criterion: no contact between an actor and others."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class CollisionSettings(CriterionSettings):
-    """`{of: Ego}` for contact with anything, `{of: Ego, with: Incoming}` or `{of: Ego, with: [A, B]}` for some."""
+    """Settings: `{of: Ego}` for contact with any body, `{of: Ego, with: Incoming}` or `{of: Ego, with: [A, B]}`."""
 
     of: str
     others: str | tuple[str, ...] | None = Field(default=None, alias="with")
@@ -20,13 +20,13 @@ class CollisionSettings(CriterionSettings):
     @model_validator(mode="after")
     def _not_itself(self) -> Self:
         if self.others is not None and self.of in ((self.others,) if isinstance(self.others, str) else self.others):
-            raise ValueError(f"{self.of!r} cannot hit itself: name another actor in 'with'")
+            raise ValueError(f"'with' contains the actor itself (got {self.of!r}; expected another actor)")
         return self
 
 
 @dataclass(frozen=True)
 class Impact:
-    """A first touch at `time` [s], at `x`, `y` [m], with `speed` of approach [m/s]."""
+    """Start of a contact at `time` [s] at `x`, `y` [m], with closing speed `speed` [m/s]."""
 
     time: float
     other: str
@@ -36,7 +36,10 @@ class Impact:
 
 
 class Collision(Criterion):
-    """Fails with the first touch and says who hit whom, when, where and how fast; the value counts the touches."""
+    """Criterion that fails at the first contact.
+
+    The reason states actors, time, position and speed. The value is the number of contacts.
+    """
 
     settings_type = CollisionSettings
     name = "collision"
@@ -86,7 +89,7 @@ class Collision(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """Number of touches; time [s] and relative speed [m/s] of the first one, where there was one."""
+        """Return the number of contacts, and time [s] and relative speed [m/s] of the first one."""
         found = {f"{self.name}.count": float(len(self._impacts))}
         if self._impacts:
             found[f"{self.name}.time"] = self._impacts[0].time

@@ -1,4 +1,4 @@
-"""An actor must get somewhere: the length of its way."""
+"""Criterion: minimum driven distance of an actor."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class DrivenDistanceSettings(CriterionSettings):
-    """`{of: Ego, at_least: 100, by: 30}`: that far [m], until then [s].
+    """Settings: `{of: Ego, at_least: 100, by: 30}` with distance [m] and deadline [s].
 
-    A fatal one ends the run when `by` has passed in vain; without `by` it stays open to the end.
+    A fatal criterion ends the run at an expired deadline. Without `by` it is open until the end.
     """
 
     of: str
@@ -23,7 +23,10 @@ class DrivenDistanceSettings(CriterionSettings):
 
 
 class DrivenDistance(Criterion):
-    """Passes once the actor has driven that far: its speed over time (trapezoidal rule), so that a jump counts not."""
+    """Criterion that passes once the actor has driven a distance.
+
+    The distance is the integral of the speed (trapezoidal rule), so that teleports do not count.
+    """
 
     settings_type = DrivenDistanceSettings
     name = "driven_distance"
@@ -33,9 +36,9 @@ class DrivenDistance(Criterion):
         self._settings = settings
         self.subjects = (settings.of,)
         self._distance = 0.0
-        self._seen = False
+        self._was_present = False
         self._last: tuple[float, float] | None = None
-        """Time and speed [s, m/s] in the frame before; None where the actor was not in the world."""
+        """Time and speed in the previous frame [s, m/s]; None while the actor is absent."""
         self._late = False
 
     def observe(self, frame: Frame) -> None:
@@ -46,7 +49,7 @@ class DrivenDistance(Criterion):
             self._last = None
         if row is None or self._late:
             return
-        self._seen = True
+        self._was_present = True
         time, speed = view.time, abs(float(view.speed[row]))
         if self._last is not None:
             before, speed_before = self._last
@@ -54,18 +57,18 @@ class DrivenDistance(Criterion):
         self._last = time, speed
 
     def verdict(self) -> Verdict:
-        of, limit, seen = self._settings.of, self._settings.at_least, self._seen
+        of, limit, was_present = self._settings.of, self._settings.at_least, self._was_present
         return Verdict(
             name=self.name,
-            passed=seen and self._distance >= limit,
-            value=self._distance if seen else None,
+            passed=was_present and self._distance >= limit,
+            value=self._distance if was_present else None,
             limit=limit,
             unit="m",
             first_violation=None,
-            reason=f"{of} drove {self._distance:.1f} m" if seen else actor_never_present([of]),
+            reason=f"{of} drove {self._distance:.1f} m" if was_present else actor_never_present([of]),
             fatal=self.fatal and self._late,
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """The length of the way [m]."""
-        return {f"driven_distance.{self._settings.of}": self._distance} if self._seen else {}
+        """Return the driven distance [m]."""
+        return {f"driven_distance.{self._settings.of}": self._distance} if self._was_present else {}

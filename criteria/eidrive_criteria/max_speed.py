@@ -1,4 +1,4 @@
-"""An actor must not be faster than a limit."""
+"""Criterion: maximum speed of an actor."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class MaxSpeedSettings(CriterionSettings):
-    """`{of: Ego, at_most: 13.9}` [m/s]; without `at_most` it measures and passes."""
+    """Settings: `{of: Ego, at_most: 13.9}` [m/s]. Without `at_most` the criterion only measures and passes."""
 
     of: str
     at_most: Annotated[float, Field(gt=0)] | None = None
 
 
 class MaxSpeed(Criterion):
-    """Fails where the actor's speed along its heading, forwards or backwards, exceeds `at_most`."""
+    """Criterion that fails if the absolute speed of the actor along its heading exceeds `at_most`."""
 
     settings_type = MaxSpeedSettings
     name = "max_speed"
@@ -43,14 +43,16 @@ class MaxSpeed(Criterion):
             self._violated = view.time
 
     def verdict(self) -> Verdict:
-        of, seen = self._settings.of, math.isfinite(self._fastest)
+        of, was_present = self._settings.of, math.isfinite(self._fastest)
         reason = (
-            f"{of} drove up to {self._fastest:.2f} m/s at {self._when:.2f} s" if seen else actor_never_present([of])
+            f"{of} drove up to {self._fastest:.2f} m/s at {self._when:.2f} s"
+            if was_present
+            else actor_never_present([of])
         )
         return Verdict(
             name=self.name,
-            passed=seen and self._violated is None,
-            value=self._fastest if seen else None,
+            passed=was_present and self._violated is None,
+            value=self._fastest if was_present else None,
             limit=self._settings.at_most,
             unit="m/s",
             first_violation=self._violated,
@@ -59,5 +61,5 @@ class MaxSpeed(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """The largest speed [m/s]."""
+        """Return the maximum speed [m/s]."""
         return {f"max_speed.{self._settings.of}": self._fastest} if math.isfinite(self._fastest) else {}

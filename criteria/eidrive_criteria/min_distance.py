@@ -1,4 +1,4 @@
-"""The smallest distance between two actors."""
+"""Criterion: minimum distance between two actors."""
 
 from __future__ import annotations
 
@@ -11,18 +11,21 @@ from eidrive_scenario.api.common import WorldView, box_distance
 
 
 class MinDistanceSettings(PairSettings):
-    """`{of: Ego, to: Incoming, at_least: 1.5}` [m]; without `at_least` it measures and passes.
+    """Settings: `{of: Ego, to: Incoming, at_least: 1.5}` [m]. Without `at_least` it only measures and passes.
 
-    measure  `box`: between the nearest points of the bodies, 0 if they touch, so that a crash fails every limit;
+    measure  `box`: between the nearest points of the bodies, 0 at contact, so that a crash violates every limit;
              `center`: between the centers of the bounding boxes in the horizontal plane (the metric of the EI-Drive
-             paper), which stays above 0 in a crash
+             paper), which remains above 0 in a crash
     """
 
     measure: Literal["center", "box"] = "box"
 
 
 class MinDistance(PairCriterion):
-    """Fails where two actors come closer than `at_least`; both distances [m] are metrics, whatever is judged."""
+    """Criterion that fails if two actors come closer than `at_least`.
+
+    Both distances [m] are metrics, whichever is evaluated.
+    """
 
     settings_type = MinDistanceSettings
     name = "min_distance"
@@ -38,18 +41,18 @@ class MinDistance(PairCriterion):
         center = math.hypot(b[0] - a[0], b[1] - a[1])
         box = center - (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4])) / 2.0
         if view.contacts and any({contact.first, contact.second} == {self.of, self.to} for contact in view.contacts):
-            box = 0.0  # Bodies that touched within the step may stand apart again at its end.
-        elif box <= self._box:  # Else they are not as near as they have been, however they are turned.
+            box = 0.0  # Bodies with a contact within the step may be apart at its end.
+        elif box <= self._box:  # A larger lower bound cannot reduce the minimum.
             box = box_distance(a, b)
         self._center, self._box = min(self._center, center), min(self._box, box)
         return center if self._measure == "center" else box
 
-    def words(self) -> str:
+    def describe_smallest(self) -> str:
         measure = "center to center" if self._measure == "center" else "box to box"
         return f"{self.of} and {self.to} came within {self.smallest:.2f} m ({measure}) at {self.when:.2f} s"
 
     def metrics(self) -> Mapping[str, float]:
-        """Both distances [m] and when the judged one was smallest [s]; nothing where the two never met."""
+        """Return both minimum distances [m] and the time of the evaluated one [s]; empty without a common frame."""
         if not math.isfinite(self.smallest):
             return {}
         pair = f"min_distance.{self.of}.{self.to}"

@@ -1,4 +1,4 @@
-"""A monitor of the scenario must have a value."""
+"""Criterion: value of a monitor of the scenario."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class MonitorSettings(CriterionSettings):
-    """`{of: CutInHappened, expected: true, throughout: false}`; `of` names a MonitorDeclaration of the scenario."""
+    """Settings: `{of: CutInHappened, expected: true, throughout: false}`; `of` is the name of a MonitorDeclaration."""
 
     of: str
     expected: bool = True
     throughout: bool = False
-    """Whether it has to have the value all the time, not at the end only."""
+    """Whether the value is required at all times, not only at the end."""
 
 
 class Monitor(Criterion):
-    """Fails where a monitor does not have the expected value at the end, or at any time where it has to throughout."""
+    """Criterion that fails if a monitor has an unexpected value at the end, or with `throughout` at any time."""
 
     settings_type = MonitorSettings
     name = "monitor"
@@ -56,5 +56,5 @@ class Monitor(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """When it last changed [s]."""
+        """Return the time of the last change [s]."""
         return {f"monitor.{self._settings.of}.changed": self._changed} if self._value is not None else {}

@@ -1,4 +1,4 @@
-"""What the criteria on a pair of actors share: the smallest value of a quantity between the two, held to a limit."""
+"""Base class of criteria on a pair of actors: minimum of a quantity between both, compared with a limit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class PairSettings(CriterionSettings):
-    """`{of: Ego, to: Incoming, at_least: 3.5}`; without `at_least` the criterion measures and passes."""
+    """Settings: `{of: Ego, to: Incoming, at_least: 3.5}`. Without `at_least` the criterion only measures and passes."""
 
     of: str
     to: str
@@ -22,12 +22,15 @@ class PairSettings(CriterionSettings):
     @model_validator(mode="after")
     def _two_actors(self) -> Self:
         if self.of == self.to:
-            raise ValueError(f"of and to are both {self.of!r}: name two actors")
+            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
         return self
 
 
 class PairCriterion(Criterion):
-    """Fails where the quantity falls below `at_least`, or where the two actors are never there together."""
+    """Criterion that fails if a quantity falls below `at_least`.
+
+    It also fails if both actors are never present at the same time.
+    """
 
     unit: ClassVar[str]
 
@@ -36,21 +39,21 @@ class PairCriterion(Criterion):
         self.of, self.to, self.limit = settings.of, settings.to, settings.at_least
         self.subjects = (settings.of, settings.to)
         self.smallest, self.when = math.inf, math.nan
-        """The smallest value yet, infinity where there was none, and when it was so [s]."""
+        """Minimum so far, infinite without a value, and its time [s]."""
         self._missing = set(self.subjects)
         self._together = False
         self._violated: float | None = None
 
     @abstractmethod
     def measure(self, view: WorldView, of: int, to: int) -> float:
-        """The quantity between the actors in these two rows; infinity where there is none now.
+        """Return the quantity between the actors in two rows of the view; infinite if there is none now.
 
-        Where it is not the smallest yet, anything between that and the quantity will do.
+        If it exceeds the minimum so far, any value between that minimum and the quantity is allowed.
         """
 
     @abstractmethod
-    def words(self) -> str:
-        """What the smallest value says, or that there was none though both were there."""
+    def describe_smallest(self) -> str:
+        """Describe the minimum, or its absence although both actors were present."""
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
@@ -68,9 +71,9 @@ class PairCriterion(Criterion):
 
     def verdict(self) -> Verdict:
         if self._together:
-            reason = self.words()
+            reason = self.describe_smallest()
         else:
-            apart = f"{self.of} and {self.to} were never there together"
+            apart = f"{self.of} and {self.to} were never present at the same time"
             reason = actor_never_present(self._missing) if self._missing else apart
         return Verdict(
             name=self.name,

@@ -1,4 +1,4 @@
-"""An actor must come to a place."""
+"""Criterion: arrival of an actor at a position."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class ReachPositionSettings(CriterionSettings):
-    """`{of: Ego, x: 42.0, y: -3.5, within: 2.0, by: 30}`: no farther than `within` [m] from there, until `by` [s].
+    """Settings: `{of: Ego, x: 42.0, y: -3.5, within: 2.0, by: 30}` with position and tolerance [m] and deadline [s].
 
-    A fatal one ends the run when `by` has passed in vain; without `by` it stays open to the end.
+    A fatal criterion ends the run at an expired deadline. Without `by` it is open until the end.
     """
 
     of: str
@@ -26,7 +26,10 @@ class ReachPositionSettings(CriterionSettings):
 
 
 class ReachPosition(Criterion):
-    """Passes once the actor's reference point, seen from above, has come near enough in time."""
+    """Criterion that passes once the actor is within the tolerance of the position, before the deadline.
+
+    The distance is horizontal and refers to the reference point of the actor.
+    """
 
     settings_type = ReachPositionSettings
     name = "reach_position"
@@ -73,5 +76,5 @@ class ReachPosition(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """When the actor arrived [s], where it did."""
+        """Return the arrival time [s]; empty without arrival."""
         return {} if self._reached is None else {f"{self.name}.time": self._reached}

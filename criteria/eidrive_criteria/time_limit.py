@@ -1,4 +1,4 @@
-"""The run must end by itself in time."""
+"""Criterion: maximum duration of a run."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class TimeLimitSettings(CriterionSettings):
-    """`{within: 60}`: by its stop trigger, or as its storyboard is complete, no later than that [s]."""
+    """Settings: `{within: 60}` [s]. The run has to end by its stop trigger or by its storyboard within that time."""
 
     within: Annotated[float, Field(gt=0)]
     fatal: bool = True
 
 
 class TimeLimit(Criterion):
-    """Fails, and by default ends the run, when it goes on after `within` [s] of simulated time."""
+    """Criterion that fails if the simulated time exceeds `within` [s]. By default it then ends the run."""
 
     settings_type = TimeLimitSettings
     name = "time_limit"
@@ -31,7 +31,7 @@ class TimeLimit(Criterion):
 
     def observe(self, frame: Frame) -> None:
         self._time = frame.view.time
-        # Time is tick * dt: its rounding must not fail a run that ends exactly on the limit.
+        # Time is tick * dt: its rounding error must not fail a run that ends exactly at the limit.
         if self._violated is None and self._time > self._within + TIME_TOLERANCE:
             self._violated = self._time
 

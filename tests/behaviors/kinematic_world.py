@@ -1,4 +1,4 @@
-"""A world without a physics engine, for tests of single actions and conditions."""
+"""World without a physics engine, for tests of single actions and conditions."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.view import WorldView
 
+Vector = tuple[float, float, float]
+
 
 class KinematicWorld:
-    """A world without forces: everybody is exactly where the storyboard puts them."""
+    """World without forces: every actor has exactly the placement of the storyboard."""
 
     def __init__(self, scenario: Scenario, dt: float) -> None:
         self.dt = dt
         self.tick = 0
         self.placements: dict[str, Placement] = {}
         self._entities = scenario.entities
-        self._velocity: dict[str, tuple[float, float, float]] = {}
-        self._acceleration: dict[str, tuple[float, float, float]] = {}
+        self._velocity: dict[str, Vector] = {}
+        self._acceleration: dict[str, Vector] = {}
 
     def add(self, additions: Mapping[str, Placement]) -> None:
         for name, placement in additions.items():
@@ -36,14 +38,16 @@ class KinematicWorld:
     def move(self, placements: Mapping[str, Placement]) -> None:
         for name, after in placements.items():
             before = self.placements[name]
-            velocity = tuple((b - a) / self.dt for a, b in zip(_position(before), _position(after), strict=True))
+            velocity = self._rate(_position(before), _position(after))
             if after.teleport or not after.across:
                 velocity = _along(after)
-            old = self._velocity[name]
-            self._acceleration[name] = tuple((b - a) / self.dt for a, b in zip(old, velocity, strict=True))
+            self._acceleration[name] = self._rate(self._velocity[name], velocity)
             self._velocity[name] = velocity
             self.placements[name] = after
         self.tick += 1
+
+    def _rate(self, before: Vector, after: Vector) -> Vector:
+        return (after[0] - before[0]) / self.dt, (after[1] - before[1]) / self.dt, (after[2] - before[2]) / self.dt
 
     def view(self) -> WorldView:
         names = tuple(self.placements)
@@ -70,9 +74,9 @@ class KinematicWorld:
         )
 
 
-def _position(placement: Placement) -> tuple[float, float, float]:
+def _position(placement: Placement) -> Vector:
     return placement.x, placement.y, placement.z
 
 
-def _along(placement: Placement) -> tuple[float, float, float]:
+def _along(placement: Placement) -> Vector:
     return placement.speed * math.cos(placement.yaw), placement.speed * math.sin(placement.yaw), 0.0

@@ -1,4 +1,4 @@
-"""Parts of scenarios: cars on a straight street, what they do, and when."""
+"""Parts of scenarios: cars on a straight street, their actions and triggers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
 
 
 def at(lane: int, s: float, speed: float) -> str:
-    """Init actions: in a lane (-1: y = -2, -2: y = -6, 1: y = 2 towards -x), at a speed."""
+    """Return Init actions: position in a lane (-1: y = -2, -2: y = -6, 1: y = 2 towards -x) and speed."""
     return f"""<PrivateAction><TeleportAction><Position><LanePosition roadId="1" laneId="{lane}" s="{s}"/></Position>
       </TeleportAction></PrivateAction><PrivateAction><LongitudinalAction><SpeedAction>
       <SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
@@ -40,19 +40,19 @@ def at(lane: int, s: float, speed: float) -> str:
 
 
 def after(time: float) -> str:
-    """A condition: later than this."""
+    """Return a condition on the simulation time: later than `time` [s]."""
     return f'<ByValueCondition><SimulationTimeCondition value="{time}" rule="greaterThan"/></ByValueCondition>'
 
 
 def private(action: str) -> str:
-    """An action of an actor."""
+    """Return an action of an actor."""
     return f"<PrivateAction>{action}</PrivateAction>"
 
 
 def everywhere(action: str) -> str:
-    """An action of nobody."""
+    """Return an action without an actor."""
     return f"<GlobalAction>{action}</GlobalAction>"
 
 
 NOTHING = private('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
-"""An action after which all is as before."""
+"""Action without effect."""

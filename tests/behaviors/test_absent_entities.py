@@ -1,11 +1,11 @@
-"""Entities that are deleted while somebody acts with them, and actions of those that are not there."""
+"""Actions of deleted entities, and actions that refer to deleted entities."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
+from recorded_scene import RecordedScene, RunScene
 from street_scene import after, everywhere, private
+from whole_run import Run
 
 DELETE = everywhere('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')
 TO_OTHER_S_LANE = private(
@@ -28,7 +28,7 @@ DRIVE_TO = private(
 )
 
 
-def transitions(played: Any, element: str) -> list[tuple[float, str]]:
+def transitions(played: RecordedScene, element: str) -> list[tuple[float, str]]:
     return [
         (round(change.time, 3), change.transition.name)
         for change in played.changes
@@ -41,7 +41,7 @@ def transitions(played: Any, element: str) -> list[tuple[float, str]]:
     [("Ego", TO_OTHER_S_LANE), ("Ego", BESIDE_OTHER), ("Other", BEHIND_EGO), ("Other", DRIVE_TO)],
     ids=["lane of", "beside", "behind", "to"],
 )
-def test_an_action_with_somebody_who_is_gone_is_stopped_as_it_starts(scene: Any, actor: str, action: str) -> None:
+def test_action_with_deleted_entity_is_stopped_at_its_start(scene: RunScene, actor: str, action: str) -> None:
     played = scene(2, ("Ego", DELETE, after(0.45)), (actor, action, after(0.95)))
     assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]
     assert transitions(played, "event 1") == [(1.0, "START"), (1.0, "END")]
@@ -49,22 +49,22 @@ def test_an_action_with_somebody_who_is_gone_is_stopped_as_it_starts(scene: Any,
 
 
 @pytest.mark.element("DeleteEntityAction")
-def test_an_action_stops_when_the_entity_that_it_follows_is_deleted(scene: Any) -> None:
+def test_action_stops_when_its_reference_entity_is_deleted(scene: RunScene) -> None:
     played = scene(2, ("Ego", BESIDE_OTHER), ("Ego", DELETE, after(0.95)))
     assert transitions(played, "action 0") == [(0.0, "START"), (1.1, "STOP")]
     assert next(c.why for c in played.changes if c.element == "action 0" and c.why) == "Other is not in the world"
 
 
-def test_what_is_not_performed_is_said_at_the_end(run: Any) -> None:
+def test_action_with_absent_entity_warns_at_the_end(run: Run) -> None:
     others = {"Other": (-2, 150.0, 10.0)}
     played = run(2, ("Ego", DELETE, after(0.45)), ("Other", DRIVE_TO, after(0.95)), others=others, driven=False)
-    (warning,) = [told for told in played.result.warnings if "AcquirePosition" in told]
+    (warning,) = [text for text in played.result.warnings if "AcquirePosition" in text]
     assert "is not performed: Other is not in the world" in warning
 
 
 @pytest.mark.element("AddEntityAction", "DeleteEntityAction")
-def test_who_is_deleted_and_added_at_one_instant_is_moved(run: Any) -> None:
-    """Deleted and added in one event, Other is where it was added in the next view, as after a teleport."""
+def test_entity_deleted_and_added_at_one_instant_is_moved(run: Run) -> None:
+    """After deletion and addition in one event, Other is at its new position in the next view, as after a teleport."""
     back = everywhere(
         '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
         "</Position></AddEntityAction></EntityAction>"
@@ -102,7 +102,7 @@ BACK = everywhere(
 @pytest.mark.parametrize(
     "action", [SPEED_UP, TO_THE_SIDE, PROFILE, TOGETHER], ids=["speed", "offset", "profile", "meet"]
 )
-def test_who_is_not_in_the_world_does_nothing(scene: Any, action: str) -> None:
+def test_action_of_absent_entity_has_no_effect(scene: RunScene, action: str) -> None:
     played = scene(3, ("Ego", DELETE, after(0.45)), ("Other", action, after(0.95)), ("Ego", BACK, after(2.05)))
     assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]
     assert next(c.why for c in played.changes if c.element == "action 1" and c.why) == "Other is not in the world"
@@ -112,8 +112,10 @@ def test_who_is_not_in_the_world_does_nothing(scene: Any, action: str) -> None:
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["enters first", "acts first"])
 @pytest.mark.parametrize("action", [SPEED_UP, TO_THE_SIDE], ids=["speed", "offset"])
-def test_who_enters_at_the_instant_of_his_action_does_it(scene: Any, order: tuple[int, int], action: str) -> None:
-    """Triggers that hold at one instant have no order, nor have their actions."""
+def test_action_of_entity_added_at_the_same_instant_is_performed(
+    scene: RunScene, order: tuple[int, int], action: str
+) -> None:
+    """Triggers that hold at one instant have no order, nor do their actions."""
     both = (("Ego", BACK, after(0.95)), ("Other", action, after(0.95)))
     played = scene(4, ("Ego", DELETE, after(0.45)), *(both[number] for number in order))
     ended = [name for _, name in transitions(played, f"action {1 + order.index(1)}")]
@@ -122,12 +124,14 @@ def test_who_enters_at_the_instant_of_his_action_does_it(scene: Any, order: tupl
     assert (there.speed, there.y) == ((20.0, -2.0) if action == SPEED_UP else (10.0, -1.0))
 
 
-def test_an_ego_that_drives_itself_may_be_deleted(run: Any) -> None:
+def test_driven_ego_is_deleted_and_added_again(run: Run) -> None:
     delete = everywhere('<EntityAction entityRef="Ego"><DeleteEntityAction/></EntityAction>')
     add = BACK.replace('"Other"', '"Ego"')
     played = run(2, ("Ego", delete, after(0.475)), ("Ego", add, after(0.975)), others={"Other": (-2, 150.0, 10.0)})
-    there = ["Ego" in frame.view for frame in played.frames]
-    assert there.index(False) == 11
-    assert there[21:] == [True] * 20
+    present = ["Ego" in frame.view for frame in played.frames]
+    assert present.index(False) == 11
+    assert present[21:] == [True] * 20
     view = played.frames[21].view
-    assert 300.0 <= view.position[view.rows["Ego"], 0] < 301.1, "its engine moves it on in the step in which it enters"
+    assert 300.0 <= view.position[view.rows["Ego"], 0] < 301.1, (
+        "the engine already moves it in the step in which it is added"
+    )

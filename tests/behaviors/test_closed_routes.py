@@ -1,4 +1,4 @@
-"""Closed routes: round and round a ring with an exit, which is the straightest way on at its fork."""
+"""Closed routes: laps on a ring with an exit, which is the straightest branch at its junction."""
 
 from __future__ import annotations
 
@@ -9,15 +9,20 @@ import numpy as np
 import pytest
 from street_scene import NOTHING, after, private
 from test_random_routes import road
+from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import ScenarioError
 
 LAP = 200.0 + 2 * 22.0 * math.pi
-"""Along lane -1, 2 m outside the reference line: two straights of 100 m, two half circles of 22 m radius [m]."""
+"""Length of a lap along lane -1 [m]: two straights of 100 m, two half circles of 22 m radius, 2 m outside the reference
+line.
+"""
 
 
 def ring() -> str:
-    """Road 1 east, the junction's road 12 round to the left, road 2 west, road 4 round to road 1; 11 leads out to 3."""
+    """Return a ring: road 1 east, connecting road 12 to the left, road 2 west, road 4 back to road 1; road 11 exits to
+    road 3.
+    """
     half = 20.0 * math.pi
     both = '<predecessor id="-1"/><successor id="-1"/>'
     before = '<predecessor elementType="road" elementId="{}" contactPoint="end"/>'
@@ -52,14 +57,14 @@ def assign(closed: str, *places: tuple[int, float]) -> str:
     return private(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
 
 
-def played(run: Any, end: float, action: str, *steps: tuple[str, ...], **more: Any) -> Any:
+def played(run: Run, end: float, action: str, *steps: tuple[str, ...], **more: Any) -> RecordedRun:
     return run(end, ("Ego", action), *steps, street=ring(), ego=(-1, 50.0, 20.0), **more)
 
 
 @pytest.mark.element("AssignRouteAction")
 @pytest.mark.parametrize("start", [(1, 70.0), (2, 30.0)], ids=["a way to it", "past the fork"])
-def test_a_closed_route_is_driven_again_and_again(run: Any, start: tuple[int, float]) -> None:
-    """After 35 s at 20 m/s: two laps from road 1, s 50, and what is left of 700 m."""
+def test_closed_route_is_driven_in_laps(run: Run, start: tuple[int, float]) -> None:
+    """After 35 s at 20 m/s: two laps from road 1, s 50, and the rest of 700 m."""
     action = assign("true", start, (4, 30.0))
     watched = played(run, 35.0, action, driven=False)
     rest = 35.0 * 20.0 - 2 * LAP
@@ -68,10 +73,10 @@ def test_a_closed_route_is_driven_again_and_again(run: Any, start: tuple[int, fl
 
 
 @pytest.mark.parametrize("driven", [False, True])
-def test_a_route_takes_another_branch_when_it_comes_by_again(run: Any, driven: bool) -> None:
-    """From road 1, s 50, round by road 2 and out by road 3: after 35 s at 20 m/s a lap and the rest of 700 m.
+def test_route_takes_another_branch_on_its_second_pass(run: Run, driven: bool) -> None:
+    """From road 1, s 50, by road 2 and out by road 3: after 35 s at 20 m/s a lap and the rest of 700 m.
 
-    Who drives itself slows down in the half circles, and is on road 3 by then.
+    An active controller slows down in the half circles, and is on road 3 by then.
     """
     watched = played(run, 35.0, assign("false", (1, 60.0), (2, 30.0), (3, 800.0)), driven=driven)
     position = watched.frames[-1].view.position[0]
@@ -82,15 +87,15 @@ def test_a_route_takes_another_branch_when_it_comes_by_again(run: Any, driven: b
     assert position[:2] == pytest.approx((50.0 + 35.0 * 20.0 - LAP, -2.0), abs=0.1)
 
 
-def test_an_open_one_ends(run: Any) -> None:
-    """From road 1, s 50, to s 70: at the fork the straightest way leads out."""
+def test_open_route_ends_at_its_last_waypoint(run: Run) -> None:
+    """From road 1, s 50, to s 70: at the junction the straightest branch is the exit."""
     watched = played(run, 10.0, assign("false", (1, 60.0), (1, 70.0)), driven=False)
     assert watched.frames[-1].view.position[0][:2] == pytest.approx((250.0, -2.0), abs=0.1)
 
 
 @pytest.mark.element("AssignRouteAction")
 @pytest.mark.parametrize("relieved", [False, True], ids=["alone", "switched off for two seconds"])
-def test_who_drives_itself_goes_round_too(run: Any, relieved: bool) -> None:
+def test_closed_route_of_driven_vehicle_is_driven_in_laps(run: Run, relieved: bool) -> None:
     """In the half circles sqrt(5 · 22) = 10.5 m/s at most: in 60 s it is once round and more, and never out."""
     switch = '<ControllerAction><ActivateControllerAction lateral="{0}" longitudinal="{0}"/></ControllerAction>'
     off, on = (private(switch.format(word)) for word in ("false", "true"))
@@ -104,14 +109,14 @@ def test_who_drives_itself_goes_round_too(run: Any, relieved: bool) -> None:
     assert min(watched.of("Ego", "speed")) > 5.0
 
 
-def test_a_closed_route_without_a_way_back_is_an_error(run: Any) -> None:
+def test_closed_route_without_a_path_back_is_rejected(run: Run) -> None:
     with pytest.raises(ScenarioError, match="no way leads round the closed route 'round'"):
         played(run, 1.0, assign("true", (1, 70.0), (3, 30.0)), driven=False)
 
 
 @pytest.mark.element("DistanceCondition")
 @pytest.mark.parametrize(("algorithm", "far"), [("assignedRoute", True), ("shortest", False), ("undefined", False)])
-def test_along_the_assigned_route_it_may_be_further(run: Any, algorithm: str, far: bool) -> None:
+def test_distance_along_the_assigned_route_exceeds_the_shortest(run: Run, algorithm: str, far: bool) -> None:
     """The end of road 2 is 50 + 62.8 + 100 m ahead along the route, and 50 + 62.8 m behind by road 4."""
     position = '<Position><LanePosition roadId="2" laneId="-1" s="100"/></Position>'
     condition = f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>

@@ -1,11 +1,13 @@
-"""Conditions with numbers by hand. Ego drives 20 m/s from x = 100 in lane -1, Other 10 m/s ahead of it from x = 150."""
+"""Conditions with values calculated by hand.
+
+Ego drives at 20 m/s from x = 100 in lane -1, Other at 10 m/s from x = 150 ahead of it.
+"""
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 from eidrive_behaviors.conditions.values import satisfies
+from recorded_scene import RecordedScene, RunScene
 from street_scene import after
 
 from eidrive_scenario.api.actions import model, satisfies_rule
@@ -19,11 +21,11 @@ def of(condition: str, entity: str = "Ego", rule: str = "any") -> str:
       <EntityCondition>{condition}</EntityCondition></ByEntityCondition>"""
 
 
-def first(played: Any) -> float | None:
-    return played.when("event 0", "runningState")  # type: ignore[no-any-return]
+def first(played: RecordedScene) -> float | None:
+    return played.when("event 0", "runningState")
 
 
-def starts(played: Any) -> list[float]:
+def starts(played: RecordedScene) -> list[float]:
     return [one.time for one in played.changes if one.element == "event 0" and one.after.value == "runningState"]
 
 
@@ -75,7 +77,7 @@ def speed(value: float, seconds: float) -> str:
         ('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>', 4.5),
     ],
 )  # fmt: skip
-def test_distances_and_what_comes_of_them(scene: Any, condition: str, time: float) -> None:
+def test_distance_conditions_hold_at_the_calculated_times(scene: RunScene, condition: str, time: float) -> None:
     assert first(scene(6, ("Ego", NOTHING, of(condition)))) == pytest.approx(time)
 
 
@@ -91,12 +93,12 @@ TURN = """<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><
     ("kind", "value", "time"),
     [("longitudinal", 11, 1.0), ("longitudinal", 1, 1.5), ("lateral", 3.5, 0.1), ("lateral", 2.5, None)],
 )
-def test_distances_along_the_trajectory_that_is_followed(
-    scene: Any, kind: str, value: float, time: float | None
+def test_distance_in_trajectory_frame_is_measured_along_the_trajectory(
+    scene: RunScene, kind: str, value: float, time: float | None
 ) -> None:
-    """To a place 20 m behind the corner and 3 m to the left: 30 m at first, by 2 m in each tenth of a second less.
+    """The position is 20 m behind the corner and 3 m to the left: 30 m at first, 2 m less in each step of 0.1 s.
 
-    Before the action begins it lies 7 m ahead and 20 m to the left.
+    Before the action starts it is 7 m ahead and 20 m to the left.
     """
     condition = of(
         f'<DistanceCondition value="{value}" rule="lessThan" freespace="false" relativeDistanceType="{kind}" '
@@ -118,25 +120,27 @@ def test_distances_along_the_trajectory_that_is_followed(
         ('<StandStillCondition duration="0.95"/>', 5.0),
     ],
 )
-def test_speeds_while_ego_brakes_to_a_stop_in_four_seconds(scene: Any, condition: str, time: float) -> None:
-    """At 5 m/s²; it stands at 4 s."""
+def test_motion_conditions_during_braking_hold_at_the_calculated_times(
+    scene: RunScene, condition: str, time: float
+) -> None:
+    """The deceleration is 5 m/s²; Ego stands at 4 s."""
     played = scene(6, ("Ego", NOTHING, of(condition)), ("Ego", speed(0, 4)), other=(-2, 150, 10))
     assert first(played) == pytest.approx(time)
 
 
-def test_a_direction_is_named(scene: Any) -> None:
+def test_speed_condition_with_direction_explains_the_direction(scene: RunScene) -> None:
     slow = '<SpeedCondition rule="lessThan" value="1" direction="lateral"/>'
     assert "lateral speed 0" in scene(1, ("Ego", NOTHING, of(slow))).why("event 0")
 
 
 @pytest.mark.element("triggeringEntitiesRule")
-def test_any_and_all(scene: Any) -> None:
+def test_triggering_entities_rule_any_and_all(scene: RunScene) -> None:
     fast = '<SpeedCondition rule="greaterThan" value="15"/>'
     assert first(scene(1, ("Ego", NOTHING, of(fast, "Ego Other", "any")))) == 0.0
     assert first(scene(1, ("Ego", NOTHING, of(fast, "Ego Other", "all")))) is None
 
 
-def test_who_is_not_in_the_world_fulfils_nothing(scene: Any) -> None:
+def test_conditions_on_absent_entity_are_false(scene: RunScene) -> None:
     gone = '<GlobalAction><EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction></GlobalAction>'
     near = of(
         '<RelativeDistanceCondition entityRef="Other" freespace="false" relativeDistanceType="longitudinal" '
@@ -157,8 +161,8 @@ def test_who_is_not_in_the_world_fulfils_nothing(scene: Any) -> None:
     ("frame", "kind"),
     [("world", "longitudinal"), ("world", "lateral"), ("entity", "longitudinal"), ("entity", "lateral")],
 )
-def test_the_speed_of_approach_is_along_the_axis_of_the_distance(scene: Any, frame: str, kind: str) -> None:
-    """Ego has 100 m towards +y at 20 m/s, Other 50 m towards +x at 10 m/s: 5 s, of which 4 are left after 1."""
+def test_time_to_collision_uses_the_axis_of_the_distance(scene: RunScene, frame: str, kind: str) -> None:
+    """Ego is at 100 m towards +y at 20 m/s, Other at 50 m towards +x at 10 m/s: 5 s, of which 4 s remain after 1 s."""
     condition = of(
         f'<TimeToCollisionCondition freespace="false" rule="lessOrEqual" value="4" coordinateSystem="{frame}" '
         f'relativeDistanceType="{kind}"><TimeToCollisionConditionTarget><EntityRef entityRef="Other"/>'
@@ -170,12 +174,12 @@ def test_the_speed_of_approach_is_along_the_axis_of_the_distance(scene: Any, fra
     assert first(played) == pytest.approx(1.1)
 
 
-def test_a_standing_entity_has_a_headway_without_end(scene: Any) -> None:
+def test_time_headway_of_standing_entity_is_infinite(scene: RunScene) -> None:
     condition = '<TimeHeadwayCondition entityRef="Other" freespace="false" rule="greaterThan" value="1000"/>'
     assert first(scene(0.5, ("Ego", NOTHING, of(condition)), ego=(-1, 100, 0))) == 0.0
 
 
-def test_who_moves_away_has_no_time_to_collision(scene: Any) -> None:
+def test_time_to_collision_of_departing_entity_is_undefined(scene: RunScene) -> None:
     condition = (
         '<TimeToCollisionCondition freespace="false" rule="greaterThan" value="0"><TimeToCollisionConditionTarget>'
         '<EntityRef entityRef="Other"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>'
@@ -184,24 +188,24 @@ def test_who_moves_away_has_no_time_to_collision(scene: Any) -> None:
 
 
 @pytest.mark.element("EndOfRoadCondition", "OffroadCondition")
-def test_the_end_of_the_road_and_off_the_road(scene: Any) -> None:
-    """5 m before the end at 20 m/s: there at 0.3 s. Off the road from 4 m beside it on."""
+def test_end_of_road_and_offroad_hold_after_their_durations(scene: RunScene) -> None:
+    """From 5 m before the end at 20 m/s Ego is there at 0.3 s. It is off the road from 4 m beside the road."""
     end = of('<EndOfRoadCondition duration="0.5"/>')
     assert first(scene(2, ("Ego", NOTHING, end), ego=(-1, 995, 20))) == pytest.approx(0.8)
     off = of('<OffroadCondition duration="0.35"/>')
     assert first(scene(2, ("Ego", NOTHING, off), ("Ego", aside(-7)))) == pytest.approx(0.5)
 
 
-def test_off_the_road_again_counts_from_then_on_though_nobody_asked_in_between(scene: Any) -> None:
-    """Its event runs from 0.5 s to 1.5 s; off the road again at 1.3 s."""
+def test_offroad_duration_after_return_restarts_without_evaluation(scene: RunScene) -> None:
+    """The event runs from 0.5 s to 1.5 s; Ego is off the road again at 1.3 s."""
     off = of('<OffroadCondition duration="0.35"/>')
     ways = (("Ego", aside(-7)), ("Ego", aside(0), after(0.65)), ("Ego", aside(-7), after(1.15)))
     played = scene(2.5, ("Ego", speed(20, 1), off), *ways, executions=2)
     assert starts(played) == pytest.approx([0.5, 1.7])
 
 
-def test_who_comes_back_has_not_stood_still_while_away(scene: Any) -> None:
-    """Deleted at 0.5 s, back at 2.0 s, seen there at 2.1 s."""
+def test_standstill_duration_after_reentry_restarts(scene: RunScene) -> None:
+    """Other is deleted at 0.5 s, added at 2.0 s and visible at 2.1 s."""
     entity = '<GlobalAction><EntityAction entityRef="Other">{}</EntityAction></GlobalAction>'
     back = """<AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="500"/></Position></AddEntityAction>"""
     away = ("Ego", entity.format("<DeleteEntityAction/>"), after(0.45))
@@ -211,7 +215,7 @@ def test_who_comes_back_has_not_stood_still_while_away(scene: Any) -> None:
 
 
 @pytest.mark.element("AngleCondition", "RelativeAngleCondition")
-def test_angles(scene: Any) -> None:
+def test_angle_conditions_in_world_lane_and_relative_hold(scene: RunScene) -> None:
     turn = """<PrivateAction><TeleportAction><Position><WorldPosition x="300" y="-2" h="{}"/></Position>
       </TeleportAction></PrivateAction>"""
     world = of('<AngleCondition angleType="heading" angle="0.5" angleTolerance="0.1" coordinateSystem="world"/>')
@@ -233,8 +237,10 @@ def test_angles(scene: Any) -> None:
         ("world", 1.571, (0.6, None)),
     ],
 )
-def test_angles_to_the_own_axes_and_to_the_trajectory(scene: Any, frame: str, angle: float, times: Any) -> None:
-    """On a trajectory round a corner at 0.5 s, which is turned about within 2 m, and without one."""
+def test_angle_in_entity_and_trajectory_frame(
+    scene: RunScene, frame: str, angle: float, times: tuple[float | None, float | None]
+) -> None:
+    """The trajectory has a corner at 0.5 s, rounded within 2 m; the second run has none."""
     condition = of(
         f'<AngleCondition angleType="heading" angle="{angle}" angleTolerance="0.001" coordinateSystem="{frame}"/>'
     )
@@ -255,8 +261,10 @@ def test_angles_to_the_own_axes_and_to_the_trajectory(scene: Any, frame: str, an
         ((1, 110, 20), "true", True),
     ],
 )
-def test_clearance_in_the_lane_to_the_right(scene: Any, other: Any, opposite: str, clear: bool) -> None:
-    """30 m ahead and 20 m behind in the lane to the right."""
+def test_clearance_in_the_right_lane_depends_on_the_range(
+    scene: RunScene, other: tuple[int, float, float], opposite: str, clear: bool
+) -> None:
+    """The range is 30 m ahead and 20 m behind in the lane to the right."""
     condition = of(
         f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="false" '
         f'oppositeLanes="{opposite}"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
@@ -269,8 +277,10 @@ def test_clearance_in_the_lane_to_the_right(scene: Any, other: Any, opposite: st
     ("s", "free_space", "clear"),
     [(130.5, "false", True), (130.5, "true", False), (131.5, "true", True), (77, "true", False), (75, "true", True)],
 )
-def test_with_free_space_whoever_reaches_in_is_in_the_way(scene: Any, s: float, free_space: str, clear: bool) -> None:
-    """Other's box reaches from 1 m behind its reference point to 4 m ahead of it."""
+def test_clearance_with_free_space_counts_the_whole_box(
+    scene: RunScene, s: float, free_space: str, clear: bool
+) -> None:
+    """The box of Other extends from 1 m behind its reference point to 4 m ahead of it."""
     condition = of(
         f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="{free_space}" '
         f'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
@@ -279,10 +289,10 @@ def test_with_free_space_whoever_reaches_in_is_in_the_way(scene: Any, s: float, 
 
 
 @pytest.mark.parametrize(("free_space", "time"), [("true", 0.1), ("false", None)])
-def test_a_flank_in_the_next_lane_is_in_the_way_with_free_space(
-    scene: Any, free_space: str, time: float | None
+def test_clearance_with_free_space_counts_a_side_in_the_lane(
+    scene: RunScene, free_space: str, time: float | None
 ) -> None:
-    """From 0.1 s on 1.5 m beside the middle of a lane of 4 m, Other's flank is 0.5 m in the lane to the right."""
+    """From 0.1 s Other is 1.5 m beside the center of a 4 m lane; its side is 0.5 m inside the lane to the right."""
     condition = of(
         f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="{free_space}" '
         f'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
@@ -294,7 +304,7 @@ def test_a_flank_in_the_next_lane_is_in_the_way_with_free_space(
     assert first(played) == (None if time is None else pytest.approx(time))
 
 
-def test_where_there_is_no_such_lane_there_is_no_clearance(scene: Any) -> None:
+def test_clearance_without_the_lane_is_false(scene: RunScene) -> None:
     condition = of(
         '<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="false" '
         'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
@@ -303,8 +313,8 @@ def test_where_there_is_no_such_lane_there_is_no_clearance(scene: Any) -> None:
 
 
 @pytest.mark.element("StoryboardElementStateCondition")
-def test_a_state_lasts_and_a_transition_passes(scene: Any) -> None:
-    """The braking ends at 1.0 s, where conditions see that."""
+def test_element_state_lasts_and_transition_is_instantaneous(scene: RunScene) -> None:
+    """The braking ends at 1.0 s, which conditions observe."""
     state = (
         '<ByValueCondition><StoryboardElementStateCondition storyboardElementType="{}" storyboardElementRef="{}" '
         'state="{}"/></ByValueCondition>'
@@ -323,7 +333,7 @@ def test_a_state_lasts_and_a_transition_passes(scene: Any) -> None:
 
 
 @pytest.mark.element("ParameterCondition")
-def test_a_parameter_and_a_value_from_outside(scene: Any) -> None:
+def test_parameter_and_user_defined_value_conditions(scene: RunScene) -> None:
     value = "<ByValueCondition>{}</ByValueCondition>"
     level = value.format('<ParameterCondition parameterRef="Level" rule="greaterThan" value="1.5"/>')
     outside = value.format('<UserDefinedValueCondition name="button" rule="equalTo" value="pressed"/>')
@@ -347,7 +357,9 @@ def test_a_parameter_and_a_value_from_outside(scene: Any) -> None:
         (None, "notEqualTo", "a", False),
     ],
 )
-def test_texts_compare_as_numbers_where_both_are(text: str | None, rule: str, limit: str, expected: bool) -> None:
+def test_satisfies_compares_numbers_if_both_texts_are_numbers(
+    text: str | None, rule: str, limit: str, expected: bool
+) -> None:
     assert satisfies(text, model.Rule(rule), limit) is expected
 
 
@@ -362,7 +374,7 @@ def test_texts_compare_as_numbers_where_both_are(text: str | None, rule: str, li
         ("notEqualTo", True, False, True),
     ],
 )
-def test_rules_have_a_small_tolerance(rule: str, below: bool, same: bool, above: bool) -> None:
+def test_satisfies_rule_has_a_small_tolerance(rule: str, below: bool, same: bool, above: bool) -> None:
     answers = [satisfies_rule(value, model.Rule(rule), 3.0) for value in (2.9, 3.0 + 1e-9, 3.1)]
     assert answers == [below, same, above]
     assert not satisfies_rule(float("nan"), model.Rule(rule), 3.0)

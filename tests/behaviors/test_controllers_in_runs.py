@@ -1,13 +1,12 @@
-"""Pedals, wheel and gear that are held, and who drives: through the simulation, with its physics."""
+"""Overrides of pedals, wheel and gear, and activation of controllers, in simulation runs with physics."""
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from street_scene import after, everywhere, private
-from whole_run import slope
+from whole_run import Run, slope
 
 
 def hold(*controls: str) -> str:
@@ -24,8 +23,8 @@ def activate(on: str) -> str:
 
 
 @pytest.mark.element("OverrideControllerValueAction")
-def test_a_held_brake_stops_the_car_with_its_share_and_lets_go(run: Any) -> None:
-    """Half of 10 m/s² in the 1.5 s of the hold, rolling resistance and drag (below 0.5 m/s²) beside it."""
+def test_brake_override_decelerates_by_its_share_and_is_released(run: Run) -> None:
+    """Half of 10 m/s² during 1.5 s, plus rolling resistance and drag (below 0.5 m/s²)."""
     brake = '<Throttle active="{0}" value="0"/><Brake active="{0}"><BrakePercent value="0.5"/></Brake>'
     played = run(5, ("Ego", hold(brake.format("true")), after(1.0)), ("Ego", hold(brake.format("false")), after(2.5)))
     speed = played.of("Ego", "speed")
@@ -34,8 +33,8 @@ def test_a_held_brake_stops_the_car_with_its_share_and_lets_go(run: Any) -> None
     assert slope(speed, 2.7, 4.5) > 1.0
 
 
-def test_a_brake_by_force_and_a_parking_brake(run: Any) -> None:
-    """CAR has no mass: 1500 kg. 3000 N are 2 m/s²; three tenths of the parking brake are 3 m/s²."""
+def test_brake_force_and_parking_brake_overrides_decelerate(run: Run) -> None:
+    """CAR specifies no mass: 1500 kg. 3000 N are 2 m/s²; 0.3 of the parking brake is 3 m/s²."""
     force = '<Throttle active="true" value="0"/><Brake active="true"><BrakeForce value="3000"/></Brake>'
     assert -2.5 < slope(run(2, ("Ego", hold(force))).of("Ego", "speed"), 0.5, 1.9) < -2.0
     parking = (
@@ -44,16 +43,16 @@ def test_a_brake_by_force_and_a_parking_brake(run: Any) -> None:
     assert -3.5 < slope(run(2, ("Ego", hold(parking))).of("Ego", "speed"), 0.5, 1.9) < -3.0
 
 
-def test_a_pedal_with_a_rate_gets_there_in_its_time(run: Any) -> None:
-    """At 0.5 per second the brake is at 0.25 after half a second and at 0.5 after one."""
+def test_pedal_override_with_max_rate_changes_gradually(run: Run) -> None:
+    """At 0.5 1/s the brake is at 0.25 after 0.5 s and at 0.5 after 1 s."""
     brake = '<Throttle active="true" value="0"/><Brake active="true"><BrakePercent value="0.5" maxRate="0.5"/></Brake>'
     speed = run(2.5, ("Ego", hold(brake))).of("Ego", "speed")
     assert -3.1 < slope(speed, 0.45, 0.55) < -2.4
     assert -5.5 < slope(speed, 1.2, 2.2) < -5.0
 
 
-def test_a_held_wheel_bends_the_way(run: Any) -> None:
-    """1.6 rad at the wheel are 0.1 rad at the axle: at 5 m/s over 3 m that turns by 5 tan(0.1) / 3 = 0.167 rad/s."""
+def test_steering_override_yields_the_yaw_rate(run: Run) -> None:
+    """1.6 rad at the wheel are 0.1 rad at the axle: at 5 m/s over 3 m the yaw rate is 5 tan(0.1) / 3 = 0.167 rad/s."""
     played = run(3, ("Ego", hold('<SteeringWheel active="true" value="1.6"/>')), ego=(-1, 100.0, 5.0))
     assert slope(played.of("Ego", "yaw"), 1.0, 2.5) == pytest.approx(0.167, rel=0.05)
     right = run(3, ("Ego", hold('<SteeringWheel active="true" value="-1.6"/>')), ego=(-1, 100.0, 5.0))
@@ -61,8 +60,8 @@ def test_a_held_wheel_bends_the_way(run: Any) -> None:
 
 
 @pytest.mark.element("OverrideControllerValueAction")
-def test_gears_and_the_clutch(run: Any) -> None:
-    """Reverse drives backwards, neutral and a trodden clutch roll, park holds."""
+def test_gear_and_clutch_overrides(run: Run) -> None:
+    """Reverse drives backwards, neutral and a pressed clutch roll, park holds."""
 
     def speeds(*controls: str, speed: float = 0.0) -> list[float]:
         return run(2, ("Ego", hold(*controls)), ego=(-1, 100.0, speed)).of("Ego", "speed")
@@ -78,7 +77,7 @@ def test_gears_and_the_clutch(run: Any) -> None:
 
 
 @pytest.mark.element("ActivateControllerAction")
-def test_a_controller_hands_over_and_takes_over_again_without_a_jump(run: Any) -> None:
+def test_controller_activation_continues_without_a_jump(run: Run) -> None:
     stop = private(
         "<LongitudinalAction><SpeedAction>"
         '<SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="rate" value="2"/><SpeedActionTarget>'
@@ -96,12 +95,12 @@ def test_a_controller_hands_over_and_takes_over_again_without_a_jump(run: Any) -
     assert slope(speed, 2.0, 4.0) == pytest.approx(-2.0, abs=1e-6)
     steps = [b - a for a, b in pairwise(x)]
     assert max(abs(b - a) for a, b in pairwise(steps)) < 0.05
-    # From 5 s on it drives by itself again: towards its goal, by its pedals, no longer exactly even.
+    # From 5 s the station drives again: toward its goal, by its pedals, not at an exactly constant speed.
     assert max(abs(s - 14.0) for s in speed[102:]) < 0.5
     assert any(s != 14.0 for s in speed[102:])
 
 
-def test_a_car_that_was_handed_over_is_no_longer_moved_by_its_pedals(run: Any) -> None:
+def test_pedal_override_of_deactivated_controller_has_no_effect(run: Run) -> None:
     brake = hold('<Brake active="true"><BrakePercent value="1"/></Brake>')
     played = run(3, ("Ego", activate("false"), after(0.5)), ("Ego", brake, after(1.0)))
     speed = played.of("Ego", "speed")
@@ -109,8 +108,8 @@ def test_a_car_that_was_handed_over_is_no_longer_moved_by_its_pedals(run: Any) -
 
 
 @pytest.mark.element("EnvironmentAction")
-def test_a_slippery_road_takes_grip(run: Any) -> None:
-    """Of the grip 0.2 · 9.81 m/s² the brakes use 0.95."""
+def test_low_road_friction_limits_braking(run: Run) -> None:
+    """The brakes use 0.95 of the grip 0.2 · 9.81 m/s²."""
     ice = everywhere(
         '<EnvironmentAction><Environment name="ice"><RoadCondition frictionScaleFactor="0.2" wetness="moist"/>'
         "</Environment></EnvironmentAction>"
@@ -119,11 +118,12 @@ def test_a_slippery_road_takes_grip(run: Any) -> None:
     played = run(3, ("Ego", brake, after(0.5)), globally=ice)
     assert slope(played.of("Ego", "speed"), 1.0, 2.5) == pytest.approx(-0.95 * 0.2 * 9.81, abs=0.35)
     environment = played.frames[0].environment
+    assert environment is not None
     assert (environment.friction, environment.wetness, environment.name) == (0.2, "moist", "ice")
 
 
 def other(name: str, **activate: str) -> str:
-    """Assigns a controller of another tool."""
+    """Return the assignment of a controller of another tool."""
     given = " ".join(f'activate{domain}="{on}"' for domain, on in activate.items())
     return private(
         f"<ControllerAction><AssignControllerAction {given}><ObjectController>"
@@ -140,8 +140,8 @@ def by_name(name: str, on: str) -> str:
 
 
 @pytest.mark.element("AssignControllerAction")
-def test_another_tool_s_controller_takes_over_when_it_is_activated(run: Any) -> None:
-    """Scripted speed stays as it is to the last bit; driven speed does not."""
+def test_activation_of_another_tools_controller_deactivates_the_station(run: Run) -> None:
+    """A scripted speed is constant to the last bit; a driven speed is not."""
 
     def scripted(*steps: tuple[str, ...]) -> list[bool]:
         speed = run(2, *steps).of("Ego", "speed")

@@ -1,4 +1,4 @@
-"""A car whose poses come from outside of the run."""
+"""Car with poses from outside the run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ON = """<ControllerAction><ActivateControllerAction {named} lateral="true" longi
 
 @pytest.fixture
 def simulation(tmp_path: Path, request: pytest.FixtureRequest) -> Simulation:
-    """Ego at 20 m/s in lane -1; its controller of another tool is switched on unless the test says otherwise."""
+    """Return a run of Ego at 20 m/s in lane -1; its controller of another tool is active by default."""
     named = getattr(request, "param", "")
     cars = CAR.format(name="Ego", controller=JOYSTICK) + CAR.format(name="Other", controller="")
     ego = at(-1, 100.0, 20.0) + (private(ON.format(named=named)) if named is not None else "")
@@ -35,7 +35,7 @@ def simulation(tmp_path: Path, request: pytest.FixtureRequest) -> Simulation:
 
 
 @pytest.mark.parametrize("simulation", ["", 'objectControllerRef="seat"'], indirect=True)
-def test_without_poses_it_stands_where_it_is(simulation: Simulation) -> None:
+def test_external_driver_without_poses_stands_still(simulation: Simulation) -> None:
     with simulation:
         views = [simulation.tick()[0].view for _ in range(11)]
     assert [round(float(view.position[view.row("Ego"), 0]), 6) for view in views] == [100.0] * 11
@@ -43,7 +43,7 @@ def test_without_poses_it_stands_where_it_is(simulation: Simulation) -> None:
     assert views[-1].position[views[-1].row("Other"), 0] == pytest.approx(60.0)
 
 
-def test_it_is_where_it_is_put_in_the_next_view(simulation: Simulation) -> None:
+def test_external_pose_applies_in_the_next_view(simulation: Simulation) -> None:
     with simulation:
         simulation.tick()
         simulation.set_pose("Ego", Pose(123.0, -5.5, 0.0, 0.2, 0.0, 0.0), speed=7.0)
@@ -62,19 +62,19 @@ def test_it_is_where_it_is_put_in_the_next_view(simulation: Simulation) -> None:
 
 
 @pytest.mark.parametrize("simulation", [None], indirect=True)
-def test_while_its_controller_is_off_it_keeps_lane_and_speed(simulation: Simulation) -> None:
+def test_external_driver_while_inactive_keeps_lane_and_speed(simulation: Simulation) -> None:
     with simulation:
         simulation.set_pose("Ego", Pose(500.0, -2.0, 0.0, 0.0, 0.0, 0.0))
         view = [simulation.tick()[0].view for _ in range(11)][-1]
     assert view.position[view.row("Ego"), 0] == pytest.approx(120.0)
 
 
-def test_poses_for_somebody_else_are_an_error(simulation: Simulation) -> None:
+def test_external_pose_of_another_entity_is_rejected(simulation: Simulation) -> None:
     with simulation, pytest.raises(SettingError, match="entity 'Other' has no controller model that accepts poses"):
         simulation.set_pose("Other", Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def test_a_stand_in_for_a_controller_that_no_entity_has_is_told(simulation: Simulation) -> None:
+def test_controller_model_for_unknown_controller_warns(simulation: Simulation) -> None:
     scenario = simulation.scenario
     simulation.close()
     with Simulation(scenario, settings=RunSettings(controllers={"joystik": "external"})) as other:

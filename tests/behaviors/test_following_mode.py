@@ -1,16 +1,17 @@
-"""The following mode `follow`: a car within its limits (10 m/s², front wheels 0.5 rad, 3 m between the axles).
+"""Following mode `follow`: a car within its limits (10 m/s², front wheels 0.5 rad, wheelbase 3 m).
 
-Ego drives 20 m/s from x = 100 in lane -1 (y = -2), unless a test says otherwise.
+Ego drives at 20 m/s from x = 100 in lane -1 (y = -2) by default.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from eidrive_behaviors.actions.following import RateLimitedValue, speed_limiter
+from recorded_scene import RunScene
 from street_scene import private
 
 from eidrive_scenario.api.actions import model
@@ -33,7 +34,7 @@ def change(shape: str, value: float, mode: str) -> str:
       <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
 
 
-def trajectory(points: list[tuple[float, float, float | None]], mode: str) -> str:
+def trajectory(points: Sequence[tuple[float, float, float | None]], mode: str) -> str:
     timed = points[0][2] is not None
     vertices = "".join(
         f'<Vertex {f"time={chr(34)}{t}{chr(34)}" if timed else ""}><Position><WorldPosition x="{x}" y="{y}"/>'
@@ -51,15 +52,15 @@ def motion(placement: Placement) -> tuple[float, ...]:
 
 
 @pytest.mark.element("SpeedAction")
-def test_a_step_of_speed_takes_the_time_that_the_car_needs(scene: Any) -> None:
+def test_speed_step_in_follow_mode_takes_the_vehicle_time(scene: RunScene) -> None:
     played = scene(2, ("Ego", speed(25, "step", 0, "follow")))
     assert [played.at(t).speed for t in (0.1, 0.3, 0.5, 1.0)] == pytest.approx([21.0, 23.0, 25.0, 25.0])
     assert played.when("action 0", "completeState") == pytest.approx(0.5)
     assert scene(1, ("Ego", speed(25, "step", 0, "position"))).at(0.1).speed == 25.0
 
 
-def test_a_jerk_that_the_performance_states_is_kept() -> None:
-    """By 10 m/s at most 2 m/s² and 4 m/s³: 0.5 s to build up, as long to let go, 10 / 2 + 2 / 4 s in all."""
+def test_limited_speed_respects_the_jerk_of_the_performance() -> None:
+    """By 10 m/s at most 2 m/s² and 4 m/s³: 0.5 s to build up, 0.5 s to reduce, 10 / 2 + 2 / 4 s in total."""
     car = model.Performance(
         max_speed=70, max_acceleration=2, max_deceleration=8, max_acceleration_rate=4, max_deceleration_rate=4
     )
@@ -91,7 +92,7 @@ def vehicle(performance: model.Performance) -> model.Vehicle:
 
 
 @pytest.mark.parametrize(("start", "rate"), [(-5.0, 3.0), (0.0, 0.0), (7.0, -2.0)])
-def test_a_tracker_settles_on_a_moving_value_within_its_bound(start: float, rate: float) -> None:
+def test_rate_limited_value_settles_on_a_moving_target(start: float, rate: float) -> None:
     tracker, dt = RateLimitedValue(start, rate, up=2.0, down=3.0), 0.02
     tracker.advance(0.0, dt)
     for tick in range(1, 800):
@@ -102,8 +103,8 @@ def test_a_tracker_settles_on_a_moving_value_within_its_bound(start: float, rate
 
 
 @pytest.mark.element("LaneChangeAction")
-def test_a_step_to_the_side_takes_the_time_that_the_tires_need(scene: Any) -> None:
-    """4 m with 10 m/s², half of it to gain speed sideways: 2 · √(4 / 10) s = 1.26 s."""
+def test_lane_step_in_follow_mode_takes_the_tire_time(scene: RunScene) -> None:
+    """4 m at 10 m/s², half of it to gain lateral speed: 2 · √(4 / 10) s = 1.26 s."""
     played = scene(3, ("Ego", change("step", 0, "follow")), dt=0.01)
     y = [row["Ego"].y for row in played.rows]
     rates = [(after - before) / 0.01 for before, after in pairwise(y)]
@@ -112,16 +113,20 @@ def test_a_step_to_the_side_takes_the_time_that_the_tires_need(scene: Any) -> No
     assert played.when("action 0", "completeState") == pytest.approx(2.0 * math.sqrt(0.4), abs=0.05)
 
 
-def test_what_the_car_can_do_is_the_same_in_both_modes(scene: Any) -> None:
-    """A cubic change of lane by 4 m in 4 s needs 6 · 4 / 16 m/s² = 1.5 m/s²; 5 m/s in 2 s need 2.5 m/s²."""
-    for action in (lambda mode: change("cubic", 4, mode), lambda mode: speed(25, "linear", 2, mode)):
+def test_request_within_the_limits_is_equal_in_both_modes(scene: RunScene) -> None:
+    """A cubic lane change by 4 m in 4 s needs 6 · 4 / 16 m/s² = 1.5 m/s²; 5 m/s in 2 s need 2.5 m/s²."""
+    actions: tuple[Callable[[str], str], ...] = (
+        lambda mode: change("cubic", 4, mode),
+        lambda mode: speed(25, "linear", 2, mode),
+    )
+    for action in actions:
         one, other = (scene(5, ("Ego", action(mode))) for mode in ("position", "follow"))
         for before, after in zip(one.rows, other.rows, strict=True):
             assert motion(before["Ego"]) == pytest.approx(motion(after["Ego"]), abs=1e-9)
 
 
 @pytest.mark.element("FollowTrajectoryAction")
-def test_at_a_corner_the_wheels_turn_as_far_as_they_can(scene: Any) -> None:
+def test_corner_in_follow_mode_uses_the_maximum_steering_angle(scene: RunScene) -> None:
     corner = [(100.0, -2.0, None), (120.0, -2.0, None), (120.0, 38.0, None)]
     played = scene(10, ("Ego", trajectory(corner, "follow")), ego=(-1, 100.0, 5.0), dt=0.05)
     path = [row["Ego"] for row in played.rows]
@@ -136,8 +141,8 @@ def test_at_a_corner_the_wheels_turn_as_far_as_they_can(scene: Any) -> None:
     assert max(row["Ego"].x for row in exact.rows) == pytest.approx(120.0)
 
 
-def test_a_vehicle_drives_to_its_trajectory_from_where_it_is(scene: Any) -> None:
-    """It begins 4 m to the left of it, and reaches the end in time."""
+def test_trajectory_in_follow_mode_starts_from_the_actual_position(scene: RunScene) -> None:
+    """It starts 4 m to the left of the trajectory, and reaches the end in time."""
     way = [(100.0, -6.0, 0.0), (200.0, -6.0, 5.0)]
     played = scene(6, ("Ego", trajectory(way, "follow")))
     assert (played.at(0.1).x, played.at(0.1).y) == pytest.approx((102.0, -2.0), abs=0.2)
@@ -146,8 +151,8 @@ def test_a_vehicle_drives_to_its_trajectory_from_where_it_is(scene: Any) -> None
     assert scene(1, ("Ego", trajectory(way, "position"))).at(0.1).y == pytest.approx(-6.0)
 
 
-def test_on_a_bend_that_the_car_can_drive_both_modes_are_the_same(scene: Any) -> None:
-    """Corners of 0.1 rad, which a polyline takes within 4 m: 0.025 per meter."""
+def test_feasible_bend_is_equal_in_both_modes(scene: RunScene) -> None:
+    """Corners of 0.1 rad, which a polyline rounds within 4 m: 0.025 1/m."""
     points, heading = [(100.0, -2.0)], 0.0
     for _ in range(6):
         points.append((points[-1][0] + 10.0 * math.cos(heading), points[-1][1] + 10.0 * math.sin(heading)))

@@ -1,4 +1,4 @@
-"""Groups of entities and entities that others define: through the simulation."""
+"""Entity selections and external objects in simulation runs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from street_scene import NOTHING, STREET, after, everywhere, private
-from whole_run import Watched
+from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
 
@@ -24,11 +24,11 @@ SPEED = private(
 
 
 @pytest.fixture
-def group(run: Any) -> Callable[..., Watched]:
-    """Three scripted cars, two of which are the selections `slow` and `nested`; all are `all`."""
+def group(run: Run) -> Callable[..., RecordedRun]:
+    """Return a function that runs three scripted cars; selections: `slow`, `nested` (two of them) and `all`."""
     others = {name: place for name, place in CARS.items() if name != "Ego"}
 
-    def play(end: float, *steps: tuple[str, ...], more: str = "", **options: Any) -> Watched:
+    def play(end: float, *steps: tuple[str, ...], more: str = "", **options: Any) -> RecordedRun:
         return run(end, *steps, driven=False, others=others, more=MANY + more, **options)
 
     return play
@@ -41,7 +41,7 @@ def by(entities: str, condition: str, rule: str = "any") -> str:
 
 
 @pytest.mark.element("EntitySelection")
-def test_a_group_acts_as_each_of_its_members(group: Any) -> None:
+def test_selection_as_actor_acts_as_each_member(group: Run) -> None:
     for selection, expected in (("slow", [20, 5, 5]), ("nested", [20, 5, 5]), ("all", [5, 5, 5])):
         played = group(1, (selection, SPEED, after(0.5)))
         assert [played.of(name, "speed")[-1] for name in CARS] == expected
@@ -54,40 +54,40 @@ SLOW_DOWN = private(
 
 
 @pytest.mark.element("EntitySelection")
-def test_who_of_a_selection_is_taken_over_frees_all_of_it(group: Any) -> None:
-    """Conflict of one entity is conflict of all (7.5.1): from 10 to 6 m/s in 2 s, Third keeps the 8 m/s of half way."""
+def test_selection_with_preempted_member_releases_all_members(group: Run) -> None:
+    """A conflict of one entity is a conflict of all (7.5.1): from 10 to 6 m/s in 2 s, Third keeps 8 m/s of halfway."""
     played = group(3, ("slow", SLOW_DOWN), ("Second", SPEED, after(0.95)))
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 8])
 
 
-def test_so_it_is_with_actions_of_init(group: Any) -> None:
+def test_selection_in_init_with_preempted_member_releases_all_members(group: Run) -> None:
     init = f'<Private entityRef="slow">{SLOW_DOWN}</Private>'
     played = group(3, ("Second", SPEED, after(0.95)), init=init)
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 8])
 
 
-def test_actors_that_are_named_one_by_one_are_taken_over_one_by_one(group: Any) -> None:
+def test_actors_listed_individually_are_preempted_individually(group: Run) -> None:
     named = 'Second"/><EntityRef entityRef="Third'
     played = group(3, (named, SLOW_DOWN), ("Second", SPEED, after(0.95)))
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 6])
 
 
-def test_who_of_a_selection_is_deleted_leaves_the_others_to_it(group: Any) -> None:
+def test_selection_with_deleted_member_continues_with_the_others(group: Run) -> None:
     delete = everywhere('<EntityAction entityRef="Second"><DeleteEntityAction/></EntityAction>')
     played = group(3, ("slow", SLOW_DOWN), ("Ego", delete, after(0.95)))
     assert played.of("Third", "speed")[-1] == pytest.approx(6)
 
 
 @pytest.mark.element("EntitySelection", "triggeringEntitiesRule")
-def test_a_group_triggers_by_any_or_all_of_its_members(group: Any) -> None:
-    """At 10 m/s from s = 120 m and 300 m the group's first member has gone 3 m after 0.3 s, and both have."""
+def test_selection_triggers_by_any_or_all_members(group: Run) -> None:
+    """The condition is 10 m: Ego covers it at 20 m/s in 0.5 s, the others at 10 m/s in 1.0 s."""
     gone = by("all", '<TraveledDistanceCondition value="{}"/>', "{}")
     assert group(3, ("Ego", NOTHING, gone.format("any", 10.0))).begun("event 0") == pytest.approx([0.5])
     assert group(3, ("Ego", NOTHING, gone.format("all", 10.0))).begun("event 0") == pytest.approx([1.0])
 
 
-def test_a_condition_towards_a_group_holds_towards_any_member(group: Any) -> None:
-    """Ego is 20 m behind Second and 10 m/s faster: 10 m at 1 s; 200 m behind Third."""
+def test_condition_with_selection_as_target_holds_for_any_member(group: Run) -> None:
+    """Ego is 20 m behind Second and 10 m/s faster: 10 m at 1 s. Third is 200 m ahead."""
     near = (
         '<RelativeDistanceCondition entityRef="slow" relativeDistanceType="longitudinal" value="10" freespace="false"'
     )
@@ -101,8 +101,8 @@ def test_a_condition_towards_a_group_holds_towards_any_member(group: Any) -> Non
     assert "Third" not in why
 
 
-def test_a_free_lane_is_free_of_all_members(group: Any) -> None:
-    """Both of the group are in lane -2; Ego's own lane is free, and in front of it nobody drives there within 50 m."""
+def test_clearance_of_selection_requires_all_members_absent(group: Run) -> None:
+    """Both members are in lane -2. Ego's own lane is free, and so are 5 m ahead in lane -2, but not 50 m."""
     free = """<RelativeClearanceCondition distanceForward="{}" distanceBackward="0" freeSpace="false"
       oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/><EntityRef entityRef="slow"/>
       </RelativeClearanceCondition>"""
@@ -111,8 +111,8 @@ def test_a_free_lane_is_free_of_all_members(group: Any) -> None:
 
 
 @pytest.mark.element("selectTriggeringEntities")
-def test_the_entities_that_triggered_the_act_act_beside_the_actors(group: Any) -> None:
-    """Second and Third are slower than 15 m/s, Ego is faster; who triggers a single event does not matter (7.3.1)."""
+def test_triggering_entities_of_the_act_are_added_to_actors(group: Run) -> None:
+    """Second and Third are slower than 15 m/s, Ego is faster. Those of a single event have no effect (7.3.1)."""
     slower = by("all", '<SpeedCondition value="15" rule="lessThan"/>')
     faster = by("all", '<SpeedCondition value="15" rule="greaterThan"/>')
     for start, actor, speeds in (
@@ -127,8 +127,8 @@ def test_the_entities_that_triggered_the_act_act_beside_the_actors(group: Any) -
 
 
 @pytest.mark.element("selectTriggeringEntities")
-def test_all_groups_of_conditions_that_hold_select(group: Any) -> None:
-    """Of two condition groups Ego fulfils one, and Third the other; both act."""
+def test_triggering_entities_of_all_fulfilled_groups_are_selected(group: Run) -> None:
+    """Ego fulfils one of two condition groups, Third the other one; both act."""
     far = by("Third", '<TraveledDistanceCondition value="0"/>')
     fast = by("Ego", '<SpeedCondition value="15" rule="greaterThan"/>')
     other = '</Condition></ConditionGroup><ConditionGroup><Condition name="d" delay="0" conditionEdge="none">'
@@ -137,8 +137,8 @@ def test_all_groups_of_conditions_that_hold_select(group: Any) -> None:
 
 
 @pytest.mark.element("selectTriggeringEntities")
-def test_who_triggers_late_or_by_an_end_is_who_did_it_then(group: Any) -> None:
-    """Ego is nearer than 5 m to where it began until 0.25 s, and nobody is when the trigger fires."""
+def test_triggering_entities_with_delay_or_falling_edge_are_those_of_then(group: Run) -> None:
+    """Ego is within 5 m of its start until 0.25 s; no entity is when the trigger fires."""
     near = by(
         "all",
         '<DistanceCondition value="5" rule="lessThan" freespace="false"><Position><LanePosition roadId="1" laneId="-1" '
@@ -155,19 +155,19 @@ def test_who_triggers_late_or_by_an_end_is_who_did_it_then(group: Any) -> None:
 
 
 @pytest.mark.element("EntitySelection")
-def test_a_group_without_members_is_near_nobody_and_in_nobody_s_way(group: Any) -> None:
-    nobody = '<EntitySelection name="walkers"><Members><ByType objectType="pedestrian"/></Members></EntitySelection>'
+def test_empty_selection_is_never_near_and_always_clear(group: Run) -> None:
+    empty = '<EntitySelection name="walkers"><Members><ByType objectType="pedestrian"/></Members></EntitySelection>'
     near = """<RelativeDistanceCondition entityRef="walkers" relativeDistanceType="longitudinal" value="1000"
       freespace="false" rule="lessThan"/>"""
-    assert group(0.5, ("Ego", NOTHING, by("Ego", near)), more=nobody).begun("event 0") == []
+    assert group(0.5, ("Ego", NOTHING, by("Ego", near)), more=empty).begun("event 0") == []
     free = """<RelativeClearanceCondition distanceForward="50" distanceBackward="0" freeSpace="false"
       oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/>{}</RelativeClearanceCondition>"""
     walkers = free.format('<EntityRef entityRef="walkers"/>')
-    assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(""))), more=nobody).begun("event 0") == []
-    assert group(0.5, ("Ego", NOTHING, by("Ego", walkers)), more=nobody).begun("event 0") == [0.0]
+    assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(""))), more=empty).begun("event 0") == []
+    assert group(0.5, ("Ego", NOTHING, by("Ego", walkers)), more=empty).begun("event 0") == [0.0]
 
 
-def test_a_group_is_deleted_and_one_car_is_meant_where_one_has_to_be(group: Any) -> None:
+def test_selection_as_reference_requires_a_single_member(group: Run) -> None:
     delete = everywhere('<EntityAction entityRef="slow"><DeleteEntityAction/></EntityAction>')
     played = group(1, ("Ego", delete, after(0.5)))
     assert played.frames[0].view.names == ("Ego", "Second", "Third")
@@ -182,7 +182,7 @@ def test_a_group_is_deleted_and_one_car_is_meant_where_one_has_to_be(group: Any)
     assert group(8, ("Ego", follow.format("one")), more=alone).result.end_reason == "stop trigger"
 
 
-def test_a_group_in_a_circle_is_an_error(group: Any) -> None:
+def test_selection_with_itself_as_member_is_rejected(group: Run) -> None:
     ring = '<EntitySelection name="{}"><Members><EntityRef entityRef="{}"/></Members></EntitySelection>'
     with pytest.raises(InputError, match="is a member of itself"):
         group(1, ("a", SPEED), more=ring.format("a", "b") + ring.format("b", "a"))
@@ -193,7 +193,7 @@ OBJECT = """<objects><object id="77" name="hut" type="building" s="200" t="-9" z
 
 
 @pytest.mark.element("ExternalObjectReference")
-def test_an_external_object_is_where_and_what_the_road_network_says(run: Any) -> None:
+def test_external_object_has_pose_and_size_of_the_road_object(run: Run) -> None:
     street = STREET.replace("</lanes>", f"</lanes>{OBJECT}")
     external = '<ScenarioObject name="Hut"><ExternalObjectReference name="{}"/></ScenarioObject>'
     for name in ("77", "hut"):
@@ -204,7 +204,7 @@ def test_an_external_object_is_where_and_what_the_road_network_says(run: Any) ->
         assert played.result.warnings == ()
 
 
-def test_an_unknown_external_object_is_a_box_where_the_scenario_puts_it(run: Any) -> None:
+def test_unknown_external_object_is_a_box_with_a_warning(run: Run) -> None:
     external = '<ScenarioObject name="Thing"><ExternalObjectReference name="elsewhere"/></ScenarioObject>'
     add = everywhere(
         '<EntityAction entityRef="Thing"><AddEntityAction><Position><WorldPosition x="140" y="-2" h="0"/></Position>'
@@ -217,7 +217,7 @@ def test_an_unknown_external_object_is_a_box_where_the_scenario_puts_it(run: Any
     assert "'elsewhere', of which nothing is known here" in played.result.warnings[0]
 
 
-def test_a_selection_by_type_knows_external_objects(run: Any) -> None:
+def test_selection_by_type_includes_external_objects(run: Run) -> None:
     external = '<ScenarioObject name="Thing"><ExternalObjectReference name="elsewhere"/></ScenarioObject>'
     chosen = '<EntitySelection name="outer"><Members><ByType objectType="external"/></Members></EntitySelection>'
     put = private('<TeleportAction><Position><WorldPosition x="140" y="-2" h="0"/></Position></TeleportAction>')

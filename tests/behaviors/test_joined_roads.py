@@ -1,13 +1,12 @@
-"""Two roads that meet head to head: what is left, ahead and oncoming goes by driving directions, not by lane ids.
+"""Roads that meet head to head: left, ahead and oncoming depend on driving directions, not on lane ids.
 
-Road 1 runs from x = 0 to 200, road 2 from x = 400 back to 200. Lanes -1 and -2 of road 1 go on as 1 and 2 of road 2.
+Road 1 runs from x = 0 to 200, road 2 from x = 400 back to 200. Lanes -1 and -2 of road 1 continue as 1 and 2 of road 2.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
+from whole_run import Run
 
 LANE = """<lane id="{0}" type="driving" level="false"><link><successor id="{1}"/></link>
   <width sOffset="0" a="4" b="0" c="0" d="0"/></lane>"""
@@ -58,7 +57,7 @@ NOTHING = '<PrivateAction><VisibilityAction graphics="true" sensors="true" traff
 @pytest.mark.parametrize(
     ("place", "opposite", "lanes", "is_clear"),
     [
-        ((2, 1, 180), "false", 'from="0" to="0"', False),  # the own lane goes on as lane 1 of road 2
+        ((2, 1, 180), "false", 'from="0" to="0"', False),  # the own lane continues as lane 1 of road 2
         ((2, 1, 180), "false", 'from="-1" to="-1"', True),
         ((2, 2, 180), "false", 'from="-1" to="-1"', False),  # to the right
         ((2, -1, 180), "false", 'from="-1" to="1"', True),  # oncoming
@@ -69,7 +68,7 @@ NOTHING = '<PrivateAction><VisibilityAction graphics="true" sensors="true" traff
     ],
 )
 def test_clearance_across_head_to_head_roads_goes_by_driving_direction(
-    run: Any, place: tuple[int, int, float], opposite: str, lanes: str, is_clear: bool
+    run: Run, place: tuple[int, int, float], opposite: str, lanes: str, is_clear: bool
 ) -> None:
     init = put("Ego", 1, -1, 180.0) + put("Other", *place) + set_speed("Ego", 0.0) + set_speed("Other", 0.0)
     played = run(
@@ -85,9 +84,9 @@ def test_clearance_across_head_to_head_roads_goes_by_driving_direction(
 
 @pytest.mark.parametrize(("rule", "same", "against"), [("", -1, 1), (LEFT_HAND, 1, -1)])
 def test_clearance_against_the_lane_counts_lanes_of_the_own_direction(
-    run: Any, rule: str, same: int, against: int
+    run: Run, rule: str, same: int, against: int
 ) -> None:
-    """Room in the lane to which a car comes back that overtakes in the oncoming lane."""
+    """The lane to which a car returns after overtaking in the oncoming lane."""
     for lane, wanted in ((same, []), (against, [0.0])):
         init = put("Ego", 1, against, 150.0, turned=True) + put("Other", 1, lane, 130.0)
         init += set_speed("Ego", 0.0) + set_speed("Other", 0.0)

@@ -1,19 +1,19 @@
-"""Lateral actions in a lane that ends inside its road: they continue from where the actor is, in the lane beside."""
+"""Lateral actions in a lane that ends within its road: they continue in the adjacent lane from the actor's position."""
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from street_scene import STREET
+from whole_run import RecordedRun, Run
 
 FROM_150 = """<laneSection s="150"><center><lane id="0" type="none" level="false"/></center><right>
   <lane id="-1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
   </laneSection></lanes>"""
 NARROWED = STREET.replace("</lanes>", FROM_150)
-"""The street, whose lane -2 (y = -6) ends at x = 150; lane -1 (y = -2) goes on."""
+"""Street whose lane -2 (y = -6) ends at x = 150; lane -1 (y = -2) continues."""
 
 
 def change(shape: str, dimension: str, value: float) -> str:
@@ -30,12 +30,12 @@ def offset(continuous: str) -> str:
       </PrivateAction>"""
 
 
-def fastest_sideways(played: Any) -> float:
+def fastest_sideways(played: RecordedRun) -> float:
     y = [float(frame.view.position[frame.view.rows["Ego"], 1]) for frame in played.frames]
     return max(abs(b - a) / 0.05 for a, b in pairwise(y))
 
 
-def ends(played: Any) -> float:
+def ends(played: RecordedRun) -> float:
     return next(
         change.time
         for frame in played.frames
@@ -48,8 +48,8 @@ def ends(played: Any) -> float:
 @pytest.mark.parametrize(
     ("action", "time"), [(change("sinusoidal", "time", 4.0), 4.0), (change("linear", "distance", 40.0), 4.02)]
 )
-def test_lane_change_into_a_lane_that_ends_returns_smoothly(run: Any, action: str, time: float) -> None:
-    """40 m of lane -2 are wanted, and after 15 m it ends: the rest of the 40 m leads back to lane -1."""
+def test_lane_change_into_a_lane_that_ends_returns_smoothly(run: Run, action: str, time: float) -> None:
+    """The change takes 40 m, but lane -2 ends after 15 m: the rest of the 40 m leads back to lane -1."""
     played = run(6, ("Ego", action), ego=(-1, 135.0, 10.0), driven=False, street=NARROWED)
     assert float(played.frames[-1].view.position[0, 1]) == pytest.approx(-2.0, abs=1e-6)
     assert ends(played) == pytest.approx(time, abs=0.06)
@@ -58,8 +58,8 @@ def test_lane_change_into_a_lane_that_ends_returns_smoothly(run: Any, action: st
 
 @pytest.mark.element("LaneOffsetAction")
 @pytest.mark.parametrize("continuous", ["false", "true"])
-def test_lane_offset_after_its_lane_has_ended_counts_from_the_lane_beside(run: Any, continuous: str) -> None:
-    """At x = 150 (1.5 s) 4 m are left from y = -5 to -1; at 2 m/s² they take π s, with at most 2 m/s sideways."""
+def test_lane_offset_after_lane_end_refers_to_the_adjacent_lane(run: Run, continuous: str) -> None:
+    """At x = 150 (1.5 s) 4 m remain from y = -5 to -1; at 2 m/s² they take π s, with at most 2 m/s lateral speed."""
     played = run(7, ("Ego", offset(continuous)), ego=(-2, 135.0, 10.0), driven=False, street=NARROWED)
     assert float(played.frames[-1].view.position[0, 1]) == pytest.approx(-1.0, abs=1e-6)
     assert fastest_sideways(played) == pytest.approx(2.0, abs=0.05)

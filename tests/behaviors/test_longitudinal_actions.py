@@ -1,13 +1,16 @@
-"""Speeds and distances along the way, with numbers by hand. Ego drives 20 m/s from x = 100 in steps of 0.1 s."""
+"""Speeds and distances along the road with values calculated by hand.
+
+Ego drives at 20 m/s from x = 100 in steps of 0.1 s.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import pytest
 from eidrive_behaviors.actions.speed import duration_over
 from eidrive_behaviors.actions.speed_profile import smoothed_segments
+from recorded_scene import RunScene
 
 
 def speed(target: str, shape: str = "linear", dimension: str = "time", value: float = 0.0) -> str:
@@ -38,44 +41,44 @@ def relative(value: float, kind: str, continuous: bool = False) -> str:
         ("linear", "distance", 50.0, 25.0, 2.0),
     ],
 )
-def test_a_speed_is_reached_by_its_dynamics(
-    scene: Any, shape: str, dimension: str, value: float, half: float, end: float
+def test_speed_action_reaches_the_target_by_its_dynamics(
+    scene: RunScene, shape: str, dimension: str, value: float, half: float, end: float
 ) -> None:
-    """From 20 to 30 m/s in 2 s, at 5 m/s², over 50 m at 25 m/s on average: the same to the second."""
+    """From 20 to 30 m/s in 2 s, at 5 m/s², or over 50 m at a mean of 25 m/s: all end at the same time."""
     played = scene(3, ("Ego", speed(absolute(30), shape, dimension, value)))
     assert played.at(1.0).speed == pytest.approx(half)
     assert played.at(2.0).speed == 30.0
     assert played.when("action 0", "completeState") == pytest.approx(end)
 
 
-def test_the_steepest_slope_of_a_cubic_is_its_rate(scene: Any) -> None:
-    """Δ = 10 at 5 m/s² take 1.5 · 10 / 5 = 3 s."""
+def test_speed_action_rate_is_the_maximum_slope_of_a_cubic(scene: RunScene) -> None:
+    """Δ = 10 m/s at 5 m/s² takes 1.5 · 10 / 5 = 3 s."""
     played = scene(4, ("Ego", speed(absolute(30), "cubic", "rate", 5)))
     assert played.at(1.5).speed == pytest.approx(25.0)
     assert played.when("action 0", "completeState") == pytest.approx(3.0)
 
 
-def test_a_step_holds_at_once_and_moves_the_actor_in_the_same_step(scene: Any) -> None:
+def test_speed_step_applies_within_the_same_time_step(scene: RunScene) -> None:
     played = scene(0.2, ("Ego", speed(absolute(30), "step")))
     assert played.at(0.1).x == pytest.approx(103.0)
     assert played.when("action 0", "completeState") == pytest.approx(0.1)
 
 
-def test_the_vehicle_cannot_do_more_than_its_performance(scene: Any) -> None:
-    """From 20 to 60 m/s in 1 s would be 40 m/s²; at 10 m/s² it takes 4 s. And 80 m/s are beyond its 70."""
+def test_speed_action_is_limited_by_the_performance(scene: RunScene) -> None:
+    """From 20 to 60 m/s in 1 s would be 40 m/s²; at 10 m/s² it takes 4 s. 80 m/s exceed the maximum of 70 m/s."""
     played = scene(8, ("Ego", speed(absolute(60), "linear", "time", 1)))
     assert played.at(2.0).speed == pytest.approx(40.0)
     assert scene(8, ("Ego", speed(absolute(80), "linear", "rate", 10))).at(8.0).speed == 70.0
 
 
 @pytest.mark.parametrize(("value", "kind", "expected"), [(5, "delta", 15.0), (1.5, "factor", 15.0), (-4, "delta", 6.0)])
-def test_a_relative_speed(scene: Any, value: float, kind: str, expected: float) -> None:
+def test_speed_action_relative_target_is_reached(scene: RunScene, value: float, kind: str, expected: float) -> None:
     played = scene(1, ("Ego", speed(relative(value, kind), "step")))
     assert played.at(0.5).speed == expected
 
 
 @pytest.mark.element("SpeedAction")
-def test_a_continuous_relative_speed_follows_until_somebody_else_takes_over(scene: Any) -> None:
+def test_speed_action_continuous_follows_until_it_is_preempted(scene: RunScene) -> None:
     later = '<ByValueCondition><SimulationTimeCondition value="2.95" rule="greaterThan"/></ByValueCondition>'
     played = scene(
         4,
@@ -91,12 +94,12 @@ def test_a_continuous_relative_speed_follows_until_somebody_else_takes_over(scen
 @pytest.mark.parametrize(
     ("start", "target", "expected"), [(10, 20, 4.0), (10, 10, 0.0), (20, 0, 6.0), (-10, 10, 2 * 30 / 10 + 2 * 30 / 10)]
 )
-def test_time_over_a_distance_of_60_m(start: float, target: float, expected: float) -> None:
+def test_duration_over_a_distance_of_60_m(start: float, target: float, expected: float) -> None:
     assert duration_over(start, target, 60.0) == pytest.approx(expected)
 
 
-def test_who_drives_itself_is_given_the_speed_as_a_goal(scene: Any) -> None:
-    """Nothing moves it here, so the goal stands and the action goes on."""
+def test_speed_action_of_driven_vehicle_sets_the_goal(scene: RunScene) -> None:
+    """No engine moves the vehicle here, so that the goal remains and the action continues."""
     played = scene(3, ("Ego", speed(absolute(30), "linear", "time", 1)), driven=True)
     assert played.commands[0].driven == {"Ego"}
     assert "Ego" not in played.commands[5].placements
@@ -116,7 +119,7 @@ def profile(mode: str, *entries: tuple[float | None, float], rates: str = "") ->
 
 @pytest.mark.element("SpeedAction", "SpeedProfileAction")
 @pytest.mark.parametrize("step_first", [True, False])
-def test_step_beside_profile_takes_effect_and_the_profile_goes_on_from_there(scene: Any, step_first: bool) -> None:
+def test_speed_step_beside_profile_sets_the_start_of_the_profile(scene: RunScene, step_first: bool) -> None:
     """At 0.5 s from 20 m/s to 0 at once, from there to 4 m/s within 4 s: v = t - 0.5 s."""
     later = '<ByValueCondition><SimulationTimeCondition value="0.45" rule="greaterThan"/></ByValueCondition>'
     step, rise = speed(absolute(0), "step"), profile("position", (4.0, 4.0))
@@ -135,24 +138,24 @@ def test_step_beside_profile_takes_effect_and_the_profile_goes_on_from_there(sce
 
 
 @pytest.mark.element("SpeedProfileAction")
-def test_a_profile_in_straight_lines(scene: Any) -> None:
+def test_speed_profile_in_position_mode_is_linear(scene: RunScene) -> None:
     played = scene(4, ("Ego", profile("position", (1.0, 30.0), (2.0, 20.0))))
     assert [played.at(t).speed for t in (0.5, 1.0, 2.0, 3.0)] == pytest.approx([25, 30, 25, 20])
     assert played.when("action 0", "completeState") == pytest.approx(3.0)
 
 
-def test_an_entry_without_time_is_reached_as_fast_as_the_limits_allow(scene: Any) -> None:
+def test_speed_profile_entry_without_time_uses_the_limits(scene: RunScene) -> None:
     """10 m/s more at 5 m/s², then 8 m/s less at 4 m/s²: 2 s each."""
     played = scene(5, ("Ego", profile("position", (None, 30.0), (None, 22.0))))
     assert [played.at(t).speed for t in (1.0, 2.0, 3.0, 4.0)] == pytest.approx([25, 30, 26, 22])
 
 
 @pytest.mark.element("SpeedProfileAction")
-def test_followed_profiles_round_their_corners() -> None:
-    """To 10 m/s in 4 s, to 4 m/s in 4 s more; slopes 2.5 and -1.5 m/s², rates 4 and 3 m/s³: worked by hand.
+def test_speed_profile_in_follow_mode_has_parabolic_corners() -> None:
+    """To 10 m/s in 4 s, to 4 m/s in 4 s more; slopes 2.5 and -1.5 m/s², rates 4 and 3 m/s³, calculated by hand.
 
-    The first slope is there after 0.625 s with 0.78125 m/s; from then on v = 2.5 t - 0.78125, which meets the second
-    line 16 - 1.5 t at 4.1953 s; the turn takes 4/3 s about that; the last slope ends 0.25 s after the end.
+    The first slope is reached after 0.625 s with 0.78125 m/s. From then v = 2.5 t - 0.78125, which meets the second
+    line 16 - 1.5 t at 4.1953 s. The transition takes 4/3 s, centered there. The last slope ends 0.25 s after the end.
     """
     segments = smoothed_segments([(0.0, 0.0), (4.0, 10.0), (8.0, 4.0)], up=4.0, down=3.0)
     assert segments is not None
@@ -163,7 +166,7 @@ def test_followed_profiles_round_their_corners() -> None:
     assert segments[-1].speed == pytest.approx(4.0)
 
 
-def test_one_change_of_speed_within_a_time_begins_and_ends_without_acceleration() -> None:
+def test_speed_profile_single_change_starts_and_ends_without_acceleration() -> None:
     """8 m/s in 5 s at 4 m/s³: a (5 - a/4) = 8 gives a = 1.754 m/s²."""
     segments = smoothed_segments([(0.0, 0.0), (5.0, 8.0)], up=4.0, down=4.0)
     assert segments is not None
@@ -175,7 +178,7 @@ def test_one_change_of_speed_within_a_time_begins_and_ends_without_acceleration(
 
 @pytest.mark.element("SpeedProfileAction")
 @pytest.mark.parametrize("own", [False, True])
-def test_a_profile_keeps_to_the_limits_of_the_vehicle_unless_it_has_its_own(scene: Any, own: bool) -> None:
+def test_speed_profile_limits_of_the_action_precede_the_vehicle(scene: RunScene, own: bool) -> None:
     """8 m/s more in 5 s at 4 m/s³ as above: 2 m/s³ · (0.438 s)² and 1.754 m/s² · 0.562 s in the first second."""
     action = profile("follow", (5.0, 28.0), rates='maxAccelerationRate="4" maxDecelerationRate="4"' if own else "")
     rate = 100 if own else 4
@@ -183,7 +186,7 @@ def test_a_profile_keeps_to_the_limits_of_the_vehicle_unless_it_has_its_own(scen
     assert [played.at(t).speed for t in (1.0, 2.5, 5.0)] == pytest.approx([21.3693, 24.0, 28.0], abs=1e-3)
 
 
-def test_a_profile_stays_below_the_largest_speed(scene: Any) -> None:
+def test_speed_profile_is_limited_to_the_maximum_speed(scene: RunScene) -> None:
     played = scene(3, ("Ego", profile("position", (1.0, 90.0))))
     assert played.at(2.0).speed == 70.0
     played = scene(3, ("Ego", profile("position", (1.0, 90.0), rates='maxSpeed="30"')))
@@ -206,7 +209,7 @@ def keep(attributes: str, limits: str = "") -> str:
         ('distance="15" freespace="false" continuous="true" displacement="leadingReferencedEntity"', -15.0),
     ],
 )
-def test_without_limits_a_distance_holds_at_once(scene: Any, attributes: str, gap: float) -> None:
+def test_longitudinal_distance_without_limits_applies_at_once(scene: RunScene, attributes: str, gap: float) -> None:
     played = scene(1, ("Ego", keep(attributes)))
     for time in (0.1, 1.0):
         assert played.at(time, "Other").x - played.at(time).x == pytest.approx(gap)
@@ -214,7 +217,7 @@ def test_without_limits_a_distance_holds_at_once(scene: Any, attributes: str, ga
 
 
 @pytest.mark.element("LongitudinalDistanceAction")
-def test_with_limits_it_is_reached_smoothly_and_within_them(scene: Any) -> None:
+def test_longitudinal_distance_with_limits_is_reached_within_them(scene: RunScene) -> None:
     limits = '<DynamicConstraints maxAcceleration="3" maxDeceleration="3" maxSpeed="25"/>'
     played = scene(40, ("Ego", keep('distance="20" freespace="false" continuous="false"', limits)))
     end = played.when("action 0", "completeState")
@@ -225,8 +228,8 @@ def test_with_limits_it_is_reached_smoothly_and_within_them(scene: Any) -> None:
 
 
 @pytest.mark.element("SynchronizeAction")
-def test_two_arrive_together(scene: Any) -> None:
-    """Other needs (400 - 150) / 10 = 25 s; Ego has 500 m for that, and shall arrive with 22 m/s."""
+def test_synchronize_arrives_with_the_master_at_the_final_speed(scene: RunScene) -> None:
+    """Other needs (400 - 150) / 10 = 25 s; Ego covers 500 m in that time, with 22 m/s at arrival."""
     position = '<Position><LanePosition roadId="1" laneId="{}" s="{}"/></Position>'
     action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
       <TargetPositionMaster>{position.format(-1, 400)[10:-11]}</TargetPositionMaster>
@@ -234,14 +237,15 @@ def test_two_arrive_together(scene: Any) -> None:
       <FinalSpeed><AbsoluteSpeed value="22"/></FinalSpeed></SynchronizeAction></PrivateAction>"""
     played = scene(30, ("Ego", action), dt=0.05)
     end = played.when("action 0", "completeState")
+    assert end is not None
     assert end == pytest.approx(25.0, abs=0.15)
     assert played.at(25.0).x == pytest.approx(600.0, abs=1.0)
     assert played.at(end + 0.1).speed == 22.0
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.02, 0.05, 0.1, 0.5])
-def test_at_any_step_the_meeting_ends_when_the_master_arrives(scene: Any, dt: float) -> None:
-    """Ego needs (200 - 100) / 20 = 5 s, a whole number of all these steps."""
+def test_synchronize_at_any_time_step_ends_at_the_arrival(scene: RunScene, dt: float) -> None:
+    """Ego needs (200 - 100) / 20 = 5 s, a multiple of all these steps."""
     action = """<PrivateAction><SynchronizeAction masterEntityRef="Ego">
       <TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="200"/></TargetPositionMaster>
       <TargetPosition><LanePosition roadId="1" laneId="-2" s="220"/></TargetPosition>
@@ -252,9 +256,11 @@ def test_at_any_step_the_meeting_ends_when_the_master_arrives(scene: Any, dt: fl
 
 
 @pytest.mark.element("SynchronizeAction")
-def test_who_is_early_by_far_arrives_together_all_the_same(scene: Any) -> None:
-    """Other needs (350 - 150) / 10 = 20 s; Ego has 100 m for that: braking evenly from 20 m/s it would be there after
-    6.7 s, and would have to come back."""
+def test_synchronize_of_much_too_fast_actor_arrives_with_the_master(scene: RunScene) -> None:
+    """Other needs (350 - 150) / 10 = 20 s; Ego has 100 m.
+
+    At constant deceleration from 20 m/s Ego would be there after 6.7 s, and would have to reverse.
+    """
     position = '<Position><LanePosition roadId="1" laneId="{}" s="{}"/></Position>'
     action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
       <TargetPositionMaster>{position.format(-1, 350)[10:-11]}</TargetPositionMaster>

@@ -1,17 +1,21 @@
-"""Actions of actors that drive backwards, stand, or look the other way than the one they refer to.
+"""Actions of actors that drive backwards, stand, or face another way than their reference.
 
-Whatever is commanded, an actor moves where it looks, or straight back.
+An actor always moves along its heading, forwards or backwards.
 """
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from eidrive_behaviors.actions.speed import slope_limit
+from recorded_scene import RecordedScene, RunScene
 from street_scene import after
+from whole_run import Run
+
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import Simulation
 
 LIMITS = '<DynamicConstraints maxAcceleration="4" maxDeceleration="4" maxSpeed="30"/>'
 
@@ -53,8 +57,8 @@ def speed(value: float, dimension: str = "time", extent: float = 0.0) -> str:
       <SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget></SpeedAction>""")
 
 
-def largest_slip(played: Any, dt: float) -> float:
-    """Largest speed across the mean heading of a step [m/s]; 0 for a car that never slides."""
+def largest_slip(played: RecordedScene, dt: float) -> float:
+    """Return the maximum speed across the mean heading of a step [m/s]; 0 without side slip."""
     worst = 0.0
     for before, now in pairwise(row["Ego"] for row in played.rows):
         heading = before.yaw + 0.5 * math.remainder(now.yaw - before.yaw, math.tau)
@@ -69,8 +73,8 @@ def largest_slip(played: Any, dt: float) -> float:
     "action",
     [change("cubic", "time", 4.0), change("cubic", "distance", 40.0), offset(1.0), offset(1.0, 1.0, "true"), beside()],
 )
-def test_lateral_motion_follows_the_heading_forwards_and_backwards(scene: Any, action: str, value: float) -> None:
-    """Steps of 0.02 s; what is left are the steps in which a motion that is cut begins or ends, at half its angle."""
+def test_lateral_motion_follows_the_heading_forwards_and_backwards(scene: RunScene, action: str, value: float) -> None:
+    """At steps of 0.02 s only those steps remain in which a limited motion starts or ends, at half its angle."""
     dt = 0.02
     played = scene(6, ("Ego", action), ego=(-1, 300.0, value), other=(-1, 330.0, value), dt=dt)
     cut = abs(value) * math.sin(math.pi / 8) if abs(value) < 1.0 else 0.0
@@ -79,14 +83,14 @@ def test_lateral_motion_follows_the_heading_forwards_and_backwards(scene: Any, a
 
 @pytest.mark.element("LaneOffsetAction", "LateralDistanceAction", "LaneChangeAction")
 @pytest.mark.parametrize("action", [offset(1.0), beside(), change("cubic", "time", 4.0)])
-def test_lateral_motion_at_standstill_waits_for_speed(scene: Any, action: str) -> None:
+def test_lateral_motion_at_standstill_waits_for_speed(scene: RunScene, action: str) -> None:
     played = scene(8, ("Ego", action), ("Ego", speed(5.0), after(1.95)), ego=(-1, 300.0, 0.0), other=(-1, 330.0, 0.0))
     assert {played.at(0.1 * n).y for n in range(21)} == {-2.0}
     assert abs(played.at(8.0).y + 2.0) > 0.9
 
 
-def test_lane_offset_at_low_speed_goes_sideways_as_fast_as_forwards(scene: Any) -> None:
-    """At 0.5 m/s, 0.354 m/s each way: for the 1 m that 1 m/s² would allow within 2.4 s it takes about 2.9 s."""
+def test_lane_offset_at_low_speed_is_limited_to_forward_speed(scene: RunScene) -> None:
+    """At 0.5 m/s, 0.354 m/s in each direction: 1 m at 1 m/s² would take 2.4 s, here about 2.9 s."""
     played = scene(6, ("Ego", offset(1.0)), ego=(-1, 100.0, 0.5))
     end = played.when("action 0", "completeState")
     assert end == pytest.approx(1.0 / (0.5 * math.sqrt(0.5)), abs=0.3)
@@ -105,10 +109,10 @@ def test_lane_offset_at_low_speed_goes_sideways_as_fast_as_forwards(scene: Any) 
         ("leadingReferencedEntity", 1, 20.0),
     ],
 )
-def test_distance_leading_and_trailing_count_from_the_other_front(
-    scene: Any, limits: str, displacement: str, lane: int, ahead: float
+def test_longitudinal_distance_displacement_refers_to_the_heading_of_the_reference(
+    scene: RunScene, limits: str, displacement: str, lane: int, ahead: float
 ) -> None:
-    """Other drives towards +x in each case: forwards in lane -1, backwards in lane 1. Ego ends at its speed."""
+    """Other drives towards +x in each case: forwards in lane -1, backwards in lane 1. Ego reaches its speed."""
     other = (lane, 450.0, 10.0 if lane < 0 else -10.0)
     played = scene(30, ("Ego", keep(displacement, limits)), ego=(-1, 440.0, 10.0), other=other)
     ego, there = played.rows[-1]["Ego"], played.rows[-1]["Other"]
@@ -126,8 +130,8 @@ def test_distance_leading_and_trailing_count_from_the_other_front(
         ("rightToReferencedEntity", 1, 3.0),
     ],
 )
-def test_lateral_distance_left_and_right_count_from_the_other_heading(
-    scene: Any, displacement: str, lane: int, y: float
+def test_lateral_distance_displacement_refers_to_the_heading_of_the_reference(
+    scene: RunScene, displacement: str, lane: int, y: float
 ) -> None:
     other = (lane, 400.0, 10.0 if lane < 0 else -10.0)
     played = scene(15, ("Ego", beside(displacement)), ego=(-1, 400.0, 10.0), other=other)
@@ -136,7 +140,7 @@ def test_lateral_distance_left_and_right_count_from_the_other_heading(
 
 @pytest.mark.element("LaneOffsetAction")
 @pytest.mark.parametrize(("lane", "other", "y"), [(-1, -1, -1.0), (-1, 1, 1.0), (1, 1, 1.0), (1, -1, -1.0)])
-def test_lane_offset_relative_to_an_entity_counts_to_its_left(scene: Any, lane: int, other: int, y: float) -> None:
+def test_lane_offset_relative_to_an_entity_counts_to_its_left(scene: RunScene, lane: int, other: int, y: float) -> None:
     """The center of lane -1 is at y = -2 towards +x, that of lane 1 at y = 2 towards -x; 1 m to the left of Other."""
     relative = '<RelativeTargetLaneOffset entityRef="Other" value="1"/>'
     action = offset(0.0).replace('<AbsoluteTargetLaneOffset value="0.0"/>', relative)
@@ -148,13 +152,13 @@ def test_lane_offset_relative_to_an_entity_counts_to_its_left(scene: Any, lane: 
     ("start", "target", "limit"),
     [(0, 10, 3.0), (10, 0, 8.0), (0, -10, 3.0), (-10, 0, 8.0), (-5, -10, 3.0), (-10, -5, 8.0), (10, -10, 3.0)],
 )
-def test_slope_limit_is_that_of_gaining_or_losing_speed(start: float, target: float, limit: float) -> None:
+def test_slope_limit_depends_on_acceleration_or_deceleration(start: float, target: float, limit: float) -> None:
     assert slope_limit(start, target, 3.0, 8.0) == limit
 
 
 @pytest.mark.element("SpeedAction")
-def test_braking_from_a_negative_speed_is_bounded_by_the_deceleration(scene: Any) -> None:
-    """From -20 m/s at 4 m/s² to rest takes 5 s, though 10 m/s² of acceleration would be there."""
+def test_braking_from_negative_speed_is_limited_by_the_deceleration(scene: RunScene) -> None:
+    """From -20 m/s at 4 m/s² to standstill takes 5 s, although the maximum acceleration is 10 m/s²."""
     played = scene(6, ("Ego", speed(0.0, "rate", 50.0)), ego=(-1, 500.0, -20.0), brakes=4.0)
     assert played.at(2.0).speed == pytest.approx(-12.0)
     assert played.when("action 0", "completeState") == pytest.approx(5.0)
@@ -162,8 +166,8 @@ def test_braking_from_a_negative_speed_is_bounded_by_the_deceleration(scene: Any
 
 @pytest.mark.element("LongitudinalDistanceAction")
 @pytest.mark.parametrize("lane", [-1, 1])
-def test_distance_backwards_is_the_mirror_image_of_forwards(scene: Any, lane: int) -> None:
-    """200 m from rest, forwards and backwards: speed is gained by 2 m/s² and lost by up to 6 m/s² both ways."""
+def test_longitudinal_distance_backwards_mirrors_forwards(scene: RunScene, lane: int) -> None:
+    """200 m from standstill, forwards and backwards: speed rises by 2 m/s² and falls by up to 6 m/s² both ways."""
     limits = '<DynamicConstraints maxAcceleration="2" maxDeceleration="6" maxSpeed="40"/>'
     action, way = keep("trailingReferencedEntity", limits), 1.0 if lane < 0 else -1.0
     other = (lane, 500.0, 0.0)
@@ -179,9 +183,9 @@ def test_distance_backwards_is_the_mirror_image_of_forwards(scene: Any, lane: in
 
 
 @pytest.mark.element("EndOfRoadCondition")
-def test_end_of_road_is_over_after_backing_away(run: Any) -> None:
-    """At 20 m/s from 980 m, Ego is at the end, 1000 m, after 1 s; from 2 s on it goes back."""
-    played = run(4.0, ("Ego", speed(-5.0), after(1.995)), driven=False, ego=(-1, 980.0, 20.0), during=_note_end)
+def test_end_of_road_ends_after_driving_backwards(run: Run) -> None:
+    """At 20 m/s from 980 m, Ego is at the end, 1000 m, after 1 s; from 2 s it drives backwards."""
+    played = run(4.0, ("Ego", speed(-5.0), after(1.995)), driven=False, ego=(-1, 980.0, 20.0), during=_record_end)
     assert played.x("Ego")[round(1.5 / 0.05)] == pytest.approx(1000.0)
     assert ENDS[1.5]
     assert played.x("Ego")[-1] == pytest.approx(990.0, abs=0.3)
@@ -191,5 +195,5 @@ def test_end_of_road_is_over_after_backing_away(run: Any) -> None:
 ENDS: dict[float, bool] = {}
 
 
-def _note_end(simulation: Any, frame: Any) -> None:
+def _record_end(simulation: Simulation, frame: Frame) -> None:
     ENDS[round(frame.view.time, 3)] = simulation.storyboard.context.actors["Ego"].end_of_road_since is not None

@@ -1,11 +1,10 @@
-"""Routes, controllers, values, signals, environment and what is handed on."""
+"""Actions on routes, controllers, values, signals, environment and appearance, and custom commands."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
+from recorded_scene import RunScene
 
 from eidrive_scenario.api.actions import CustomCommand, LightState, Override, Visibility
 from eidrive_scenario.errors import ScenarioError
@@ -24,20 +23,22 @@ def everywhere(action: str) -> str:
 
 
 @pytest.mark.element("AssignRouteAction")
-def test_a_route_becomes_the_path_of_who_drives_itself(scene: Any) -> None:
+def test_assigned_route_is_the_path_of_a_driven_vehicle(scene: RunScene) -> None:
     position = '<Position><LanePosition roadId="1" laneId="-1" s="{}"/></Position>'
     waypoint = f'<Waypoint routeStrategy="shortest">{position}</Waypoint>'
     route = f'<Route name="way" closed="false">{waypoint.format(120)}{waypoint.format(400)}</Route>'
     action = private(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
     path = scene(0.2, ("Ego", action), driven=True).commands[0].goals["Ego"].path
+    assert path is not None
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [400.0, -2.0]])
 
 
 @pytest.mark.element("AcquirePositionAction")
-def test_a_position_to_acquire_is_a_route_from_here(scene: Any) -> None:
+def test_acquire_position_assigns_a_route_from_the_actor(scene: RunScene) -> None:
     position = '<Position><LanePosition roadId="1" laneId="-1" s="300"/></Position>'
     action = private(f"<RoutingAction><AcquirePositionAction>{position}</AcquirePositionAction></RoutingAction>")
     path = scene(0.2, ("Ego", action), driven=True).commands[0].goals["Ego"].path
+    assert path is not None
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [300.0, -2.0]])
 
 
@@ -49,15 +50,15 @@ def test_a_position_to_acquire_is_a_route_from_here(scene: Any) -> None:
         '<Waypoint routeStrategy="shortest">{}</Waypoint></Route></AssignRouteAction>',
     ],
 )
-def test_a_position_to_which_no_lanes_lead_is_told_with_its_line(scene: Any, action: str) -> None:
-    """It lies behind, in a lane of the same direction."""
+def test_route_to_unreachable_position_is_rejected_with_its_line(scene: RunScene, action: str) -> None:
+    """The position is behind the actor, in a lane of the same direction."""
     behind, further = (f'<Position><LanePosition roadId="1" laneId="-2" s="{s}"/></Position>' for s in (50, 20))
     with pytest.raises(ScenarioError, match=r"scene\.xosc:\d+: .*no way over the lanes from road '1' lane -"):
         scene(0.2, ("Ego", private(f"<RoutingAction>{action.format(behind, further)}</RoutingAction>")))
 
 
 @pytest.mark.element("ActivateControllerAction")
-def test_a_controller_that_is_turned_off_leaves_the_actor_to_its_lane(scene: Any) -> None:
+def test_deactivated_controller_leaves_the_actor_in_its_lane(scene: RunScene) -> None:
     off = private(
         '<ControllerAction><ActivateControllerAction lateral="false" longitudinal="false"/></ControllerAction>'
     )
@@ -68,16 +69,16 @@ def test_a_controller_that_is_turned_off_leaves_the_actor_to_its_lane(scene: Any
     assert played.at(0.5).x == pytest.approx(104.0)
 
 
-def test_who_drives_itself_starts_with_the_speed_that_init_gives_it(scene: Any) -> None:
+def test_driven_vehicle_starts_with_the_speed_of_init(scene: RunScene) -> None:
     assert scene(0.1, driven=True).at(0.0).speed == 20.0
 
 
-def test_one_domain_alone_is_not_driving(scene: Any) -> None:
+def test_controller_with_one_active_domain_is_not_driving(scene: RunScene) -> None:
     off = private('<ControllerAction><ActivateControllerAction lateral="false"/></ControllerAction>')
     assert scene(0.3, ("Ego", off), driven=True).commands[-1].driven == frozenset()
 
 
-def test_a_controller_of_ours_is_not_given_during_the_run(scene: Any) -> None:
+def test_assignment_of_eidrive_controller_during_the_run_is_rejected(scene: RunScene) -> None:
     action = private("""<ControllerAction><AssignControllerAction activateLateral="true"><ObjectController>
       <Controller name="late" controllerType="movement"><Properties>
       <Property name="module" value="eidrive"/></Properties></Controller></ObjectController></AssignControllerAction>
@@ -86,7 +87,7 @@ def test_a_controller_of_ours_is_not_given_during_the_run(scene: Any) -> None:
         scene(0.2, ("Ego", action))
 
 
-def test_pedals_are_held_until_they_are_given_back(scene: Any) -> None:
+def test_pedal_override_lasts_until_its_release(scene: RunScene) -> None:
     hold = private(
         '<ControllerAction><OverrideControllerValueAction><Brake active="{}"><BrakePercent value="0.5"/></Brake>'
         "</OverrideControllerValueAction></ControllerAction>"
@@ -97,7 +98,7 @@ def test_pedals_are_held_until_they_are_given_back(scene: Any) -> None:
 
 
 @pytest.mark.element("VariableSetAction", "VariableModifyAction", "VariableCondition", "VariableDeclaration")
-def test_variables_and_parameters_are_set_and_calculated_with(scene: Any) -> None:
+def test_variable_set_and_modify_apply_to_conditions(scene: RunScene) -> None:
     triple = everywhere(
         '<VariableAction variableRef="Mood"><ModifyAction><Rule><MultiplyByValue value="3"/></Rule></ModifyAction>'
         "</VariableAction>"
@@ -118,8 +119,8 @@ def test_variables_and_parameters_are_set_and_calculated_with(scene: Any) -> Non
 
 
 @pytest.mark.element("ParameterSetAction", "ParameterModifyAction", "ParameterCondition")
-def test_a_parameter_that_is_set_and_modified_is_seen_by_conditions(scene: Any) -> None:
-    """Level is declared as 2: set to 7 at 0.2 s, times 3 at 0.4 s, less 1 at 0.6 s."""
+def test_parameter_set_and_modify_apply_to_conditions(scene: RunScene) -> None:
+    """Level is declared as 2: set to 7 at 0.2 s, times 3 at 0.4 s, minus 1 at 0.6 s."""
     action = '<ParameterAction parameterRef="Level">{}</ParameterAction>'
     rule = "<ModifyAction><Rule>{}</Rule></ModifyAction>"
     changes = (
@@ -140,7 +141,7 @@ def test_a_parameter_that_is_set_and_modified_is_seen_by_conditions(scene: Any) 
     assert [played.when(f"event {n}", "runningState") for n in (3, 4, 5, 6)] == pytest.approx([0.0, 0.2, 0.4, 0.6])
 
 
-def test_to_calculate_with_a_word_is_an_error(scene: Any) -> None:
+def test_variable_modify_of_text_is_rejected(scene: RunScene) -> None:
     rule = '<Rule><AddValue value="3"/></Rule>'
     add = f'<VariableAction variableRef="Mood"><ModifyAction>{rule}</ModifyAction></VariableAction>'
     with pytest.raises(ScenarioError, match=r"Mood is not a number \(got 'calm'; expected a number\)"):
@@ -148,7 +149,7 @@ def test_to_calculate_with_a_word_is_an_error(scene: Any) -> None:
 
 
 @pytest.mark.element("TrafficSignalStateAction", "TrafficSignalCondition")
-def test_a_signal_changes_and_conditions_below_see_it_in_the_same_tick(scene: Any) -> None:
+def test_signal_state_applies_to_conditions_in_the_same_tick(scene: RunScene) -> None:
     change = everywhere(
         "<InfrastructureAction><TrafficSignalAction>"
         '<TrafficSignalStateAction name="17" state="green"/></TrafficSignalAction></InfrastructureAction>'
@@ -162,7 +163,7 @@ def test_a_signal_changes_and_conditions_below_see_it_in_the_same_tick(scene: An
 
 
 @pytest.mark.element("TimeOfDayCondition")
-def test_the_environment_and_its_clock(scene: Any) -> None:
+def test_time_of_day_condition_follows_the_environment_clock(scene: RunScene) -> None:
     environment = everywhere(
         '<EnvironmentAction><Environment name="noon"><TimeOfDay animation="true" dateTime="2024-06-01T12:00:00"/>'
         "</Environment></EnvironmentAction>"
@@ -171,12 +172,14 @@ def test_the_environment_and_its_clock(scene: Any) -> None:
     noon = f"<ByValueCondition>{past}</ByValueCondition>"
     nothing = private('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
     played = scene(1, ("Ego", environment, after(0.15)), ("Ego", nothing, noon))
-    assert played.commands[2].environment.name == "noon"
+    noon_environment = played.commands[2].environment
+    assert noon_environment is not None
+    assert noon_environment.name == "noon"
     assert played.when("event 1", "runningState") == pytest.approx(0.7)
 
 
 @pytest.mark.element("LightStateAction")
-def test_lights_of_different_kinds_do_not_displace_each_other(scene: Any) -> None:
+def test_light_actions_on_different_lights_do_not_preempt(scene: RunScene) -> None:
     light = private(
         '<AppearanceAction><LightStateAction transitionTime="{}"><LightType><VehicleLight vehicleLightType="{}"/>'
         '</LightType><LightState mode="{}"/></LightStateAction></AppearanceAction>'
@@ -194,7 +197,7 @@ def test_lights_of_different_kinds_do_not_displace_each_other(scene: Any) -> Non
 
 
 @pytest.mark.element("CustomCommandAction")
-def test_a_command_is_handed_on_once(scene: Any) -> None:
+def test_custom_command_is_emitted_once(scene: RunScene) -> None:
     command = (
         '<UserDefinedAction><CustomCommandAction type="eidrive.channel">ideal</CustomCommandAction></UserDefinedAction>'
     )

@@ -1,13 +1,12 @@
-"""RandomRouteAction: at a fork into three roads, which part by 30° to each side."""
+"""RandomRouteAction at a junction with three branches that diverge by 30°."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import pytest
 from street_scene import CAR, GROUP, private
-from whole_run import FILE
+from whole_run import FILE, Run
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
@@ -15,7 +14,7 @@ from eidrive_scenario.storyboard.storyboard import Storyboard
 
 RANDOM = private("<RoutingAction><RandomRouteAction/></RoutingAction>")
 LONG, TURN = 40.0, math.pi / 6
-"""Length of the junction's roads [m], and the turn of those that bend [rad]."""
+"""Length of the connecting roads [m], and turning angle of the curved ones [rad]."""
 
 
 def road(number: int, pose: tuple[float, float, float], length: float, shape: str, links: str, lane: str = "") -> str:
@@ -29,7 +28,9 @@ def road(number: int, pose: tuple[float, float, float], length: float, shape: st
 
 
 def fork() -> str:
-    """Road 1 leads into the junction's roads 11 (left), 12 (straight on), 13 (right), those into roads 2, 3, 4."""
+    """Return a junction: road 1 leads into connecting roads 11 (left), 12 (straight), 13 (right), those into roads 2,
+    3, 4.
+    """
     roads = road(1, (0, 0, 0), 50, "<line/>", '<successor elementType="junction" elementId="9"/>')
     for number, curvature in ((11, TURN / LONG), (12, 0.0), (13, -TURN / LONG)):
         shape = f'<arc curvature="{curvature}"/>' if curvature else "<line/>"
@@ -52,7 +53,7 @@ def fork() -> str:
 
 @pytest.mark.element("RandomRouteAction")
 @pytest.mark.parametrize("driven", [False, True], ids=["scripted", "driven"])
-def test_over_the_seeds_all_branches_are_taken_and_one_seed_takes_one(run: Any, driven: bool) -> None:
+def test_random_route_over_seeds_takes_all_branches_reproducibly(run: Run, driven: bool) -> None:
     def turn(seed: int) -> float:
         played = run(7.5, ("Ego", RANDOM), street=fork(), ego=(-1, 20.0, 15.0), seed=seed, driven=driven)
         return round(played.of("Ego", "yaw")[-1] / TURN, 1)
@@ -64,7 +65,7 @@ def test_over_the_seeds_all_branches_are_taken_and_one_seed_takes_one(run: Any, 
 
 
 @pytest.mark.element("AssignRouteAction")
-def test_a_route_that_is_assigned_later_ends_the_wandering(run: Any) -> None:
+def test_random_route_ends_with_an_assigned_route(run: Run) -> None:
     waypoint = '<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="{}" laneId="-1" s="{}"/></Position>'
     waypoints = "".join(waypoint.format(*place) + "</Waypoint>" for place in ((1, 25), (4, 150)))
     route = f'<Route name="to the right" closed="false">{waypoints}</Route>'
@@ -76,7 +77,7 @@ def test_a_route_that_is_assigned_later_ends_the_wandering(run: Any) -> None:
         assert played.of("Ego", "yaw")[-1] == pytest.approx(-TURN)
 
 
-def test_without_roads_there_is_nothing_to_choose() -> None:
+def test_random_route_without_roads_is_rejected() -> None:
     text = FILE.format(
         cars=CAR.format(name="Ego", controller=""),
         more="",

@@ -1,7 +1,8 @@
-"""The performance models of UN R157 against numbers of the regulation, and others worked out by hand."""
+"""Performance models of UN R157 compared with values of the regulation and with values calculated by hand."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -13,7 +14,7 @@ DT = 0.01
 
 
 def ahead(**more: Any) -> LeadObject:
-    """Somebody in the own lane, 30 m ahead, 5 m/s slower."""
+    """Return a lead object in the own lane, 30 m ahead, 5 m/s slower."""
     values: dict[str, Any] = {
         "name": "lead",
         "gap": 30.0,
@@ -33,51 +34,53 @@ def ahead(**more: Any) -> LeadObject:
     return LeadObject(**{**values, **more})
 
 
-def own(speed: float = 20.0, acceleration: float = 0.0) -> EgoKinematics:
+def ego(speed: float = 20.0, acceleration: float = 0.0) -> EgoKinematics:
     return EgoKinematics(speed, acceleration, DT)
 
 
 @pytest.mark.parametrize(
     ("kmh", "distance"), [(7.2, 2.0), (10, 3.1), (20, 6.7), (30, 10.8), (40, 15.6), (50, 20.8), (60, 26.7)]
 )
-def test_following_distances_are_those_of_the_table(kmh: float, distance: float) -> None:
+def test_regulation_following_distances_match_the_table(kmh: float, distance: float) -> None:
     """R157, 5.2.3.3; the table is rounded to 0.1 m."""
-    assert Regulation().following_distance(own(kmh / 3.6), ahead()) == pytest.approx(distance, abs=0.06)
+    assert Regulation().following_distance(ego(kmh / 3.6), ahead()) == pytest.approx(distance, abs=0.06)
 
 
-def test_a_cut_in_is_critical_below_the_time_to_collision_of_the_regulation() -> None:
-    """At 10 m/s: 10 / 12 + 0.35 s, and the tenth of a second of sampling: 1.283 s or 12.83 m."""
+def test_regulation_cut_in_is_critical_below_its_time_to_collision() -> None:
+    """At 10 m/s: 10 / 12 + 0.35 s, plus 0.1 s of sampling: 1.283 s or 12.83 m."""
     model = Regulation()
-    assert model.decide(own(), [ahead(closing=10.0, gap=12.9)]) is None
-    assert model.decide(own(), [ahead(closing=10.0, gap=12.8)]) == -6.0
+    assert model.decide(ego(), [ahead(closing=10.0, gap=12.9)]) is None
+    assert model.decide(ego(), [ahead(closing=10.0, gap=12.8)]) == -6.0
 
 
-def test_beside_the_lane_it_counts_once_its_wheel_is_0_3_m_inside() -> None:
+def test_regulation_cut_in_counts_from_0_3_m_of_intrusion() -> None:
     model = Regulation()
-    assert model.decide(own(), [ahead(closing=10.0, gap=5.0, lanes=1, intrusion=0.29)]) is None
-    assert model.decide(own(), [ahead(closing=10.0, gap=5.0, lanes=1, intrusion=0.31)]) == -6.0
+    assert model.decide(ego(), [ahead(closing=10.0, gap=5.0, lanes=1, intrusion=0.29)]) is None
+    assert model.decide(ego(), [ahead(closing=10.0, gap=5.0, lanes=1, intrusion=0.31)]) == -6.0
 
 
-def test_with_full_stop_it_brakes_on_when_the_danger_is_over() -> None:
+def test_regulation_with_full_stop_continues_braking() -> None:
     for full_stop, expected in ((False, None), (True, -6.0)):
         model = Regulation(full_stop=full_stop)
-        model.decide(own(), [ahead(closing=10.0, gap=5.0)])
-        assert model.decide(own(), []) == expected
+        model.decide(ego(), [ahead(closing=10.0, gap=5.0)])
+        assert model.decide(ego(), []) == expected
 
 
-def test_rss_keeps_the_safe_distances_of_its_lemmas() -> None:
-    """20 m/s behind 20 m/s: 0.5 (20 + 22.25) 0.75 + 22.25² / (2 · 7.593) - 20² / (2 · 7.593) = 22.10 m. Beside one that
-    comes at 1 m/s: 0.3 + 0.5 (1 + 1.75) 0.75 + 1.75² / 2 = 2.86 m."""
+def test_rss_safe_distances_match_its_lemmas() -> None:
+    """20 m/s behind 20 m/s: 0.5 (20 + 22.25) 0.75 + 22.25² / (2 · 7.593) - 20² / (2 · 7.593) = 22.10 m.
+
+    Beside an object with a lateral speed of 1 m/s: 0.3 + 0.5 (1 + 1.75) 0.75 + 1.75² / 2 = 2.86 m.
+    """
     model = Rss()
-    assert model.following_distance(own(), ahead(speed=20.0)) == pytest.approx(22.10, abs=0.005)
-    assert model.matters(own(), ahead(lanes=1, aside=2.86, sideways=1.0))
-    assert not model.matters(own(), ahead(lanes=1, aside=2.87, sideways=1.0))
+    assert model.following_distance(ego(), ahead(speed=20.0)) == pytest.approx(22.10, abs=0.005)
+    assert model.matters(ego(), ahead(lanes=1, aside=2.86, sideways=1.0))
+    assert not model.matters(ego(), ahead(lanes=1, aside=2.87, sideways=1.0))
 
 
-def test_rss_reacts_after_0_75_s_and_reaches_0_774_g_in_0_6_s() -> None:
+def test_rss_braking_starts_after_the_reaction_time_and_is_jerk_limited() -> None:
     model, acceleration, course = Rss(), 0.0, []
     for _ in range(150):
-        acceleration = model.decide(own(20.0, acceleration), [ahead(gap=10.0)]) or 0.0
+        acceleration = model.decide(ego(20.0, acceleration), [ahead(gap=10.0)]) or 0.0
         course.append(acceleration)
     assert course[74] == 0.0
     assert course[75] == pytest.approx(-0.774 * 9.81 / 0.6 * DT)
@@ -85,36 +88,39 @@ def test_rss_reacts_after_0_75_s_and_reaches_0_774_g_in_0_6_s() -> None:
     assert course[149] == pytest.approx(-0.774 * 9.81)
 
 
-def test_the_metrics_of_the_fuzzy_model_are_a_half_half_way() -> None:
-    """Proactive, 20 m/s behind 15 m/s: unsafe at 15 + 33.33 - 16.07 = 32.26 m, safe at 15 + 50 - 16.07 + 2 = 50.93 m,
-    each 2 m further as it stands. Critical, closing by 10 m/s: 7.5 + 100 / 12 = 15.83 m and 7.5 + 100 / 8 = 20 m."""
+def test_fsm_metrics_halfway_are_one_half() -> None:
+    """Both metrics are 0.5 halfway between the unsafe and the safe distance.
+
+    Proactive, 20 m/s behind 15 m/s: unsafe at 15 + 33.33 - 16.07 = 32.26 m, safe at 15 + 50 - 16.07 + 2 = 50.93 m, each
+    plus 2 m of standstill distance. Critical, closing by 10 m/s: 7.5 + 100 / 12 = 15.83 m and 7.5 + 100 / 8 = 20 m.
+    """
     model = Fsm()
     proactive = (32.262 + 50.929) / 2 + 2.0
-    assert model.proactive_safety(own(), ahead(gap=proactive)) == pytest.approx(0.5, abs=1e-3)
-    assert model.critical_safety(own(), ahead(gap=(15.8333 + 20.0) / 2, closing=10.0)) == pytest.approx(0.5, abs=1e-3)
-    assert model.critical_safety(own(), ahead(gap=1.0, closing=-1.0)) == 0.0
+    assert model.proactive_safety(ego(), ahead(gap=proactive)) == pytest.approx(0.5, abs=1e-3)
+    assert model.critical_safety(ego(), ahead(gap=(15.8333 + 20.0) / 2, closing=10.0)) == pytest.approx(0.5, abs=1e-3)
+    assert model.critical_safety(ego(), ahead(gap=1.0, closing=-1.0)) == 0.0
 
 
-def test_the_fuzzy_model_ignores_a_cut_in_that_comes_too_late() -> None:
-    """3 m aside at 1 m/s: in 3 s. It is met in 2.9 s (and 0.1 s) or passed before."""
+def test_fsm_ignores_a_cut_in_that_is_too_late() -> None:
+    """3 m lateral gap at 1 m/s takes 3 s. The object is met within 2.9 s (plus 0.1 s) or passed before."""
     model = Fsm()
     near = {"lanes": 1, "aside": 3.0, "nearing": 1.0, "closing": 10.0}
-    assert model.matters(own(), ahead(gap=29.1, **near))
-    assert not model.matters(own(), ahead(gap=28.9, **near))
+    assert model.matters(ego(), ahead(gap=29.1, **near))
+    assert not model.matters(ego(), ahead(gap=28.9, **near))
 
 
-def course(driver: ReferenceDriver, steps: int, lead: Any) -> list[float | None]:
-    """What the driver decides in each step; `lead(step)` says whom it sees."""
+def course(driver: ReferenceDriver, steps: int, lead: Callable[[int], LeadObject]) -> list[float | None]:
+    """Return the decision of the driver in each step; `lead(step)` returns the object ahead."""
     acceleration, found = 0.0, []
     for step in range(steps):
-        decided = driver.decide(own(20.0, acceleration), [lead(step)])
+        decided = driver.decide(ego(20.0, acceleration), [lead(step)])
         acceleration = decided or 0.0
         found.append(decided)
     return found
 
 
-def test_the_driver_evaluates_a_braking_lead_for_0_4_s_and_reacts_after_0_75_s() -> None:
-    """Table 1; seen in step 0, the foot is on the brake in step 115, and brakes fully 0.6 s later."""
+def test_reference_driver_brakes_after_evaluation_and_reaction_time() -> None:
+    """Table 1: perceived in step 0, braking from step 115, full deceleration 0.6 s later."""
     driver = ReferenceDriver()
     decided = course(driver, 200, lambda _: ahead(change=-6.0))
     assert decided[:115] == [None] * 115
@@ -123,12 +129,12 @@ def test_the_driver_evaluates_a_braking_lead_for_0_4_s_and_reacts_after_0_75_s()
     assert decided[199] == pytest.approx(-0.774 * 9.81)
 
 
-def test_a_lead_that_brakes_softly_or_far_away_is_no_danger() -> None:
+def test_reference_driver_ignores_soft_or_distant_braking() -> None:
     assert set(course(ReferenceDriver(), 200, lambda _: ahead(change=-4.9))) == {None}
     assert set(course(ReferenceDriver(), 200, lambda _: ahead(change=-6.0, gap=41.0))) == {None}
 
 
-def test_a_cut_in_begins_at_0_375_m_and_is_dangerous_below_2_s() -> None:
+def test_reference_driver_cut_in_thresholds_are_0_375_m_and_2_s() -> None:
     near = {"lanes": 1, "nearing": 1.0, "closing": 10.0, "gap": 19.0, "aside": 1.0}
     decided = course(ReferenceDriver(), 200, lambda step: ahead(towards=0.3 + 0.01 * step, **near))
     assert decided.index(next(one for one in decided if one is not None)) == 8 + 115
@@ -136,26 +142,26 @@ def test_a_cut_in_begins_at_0_375_m_and_is_dangerous_below_2_s() -> None:
     assert set(course(ReferenceDriver(), 200, lambda step: ahead(towards=0.3 + 0.01 * step, **later))) == {None}
 
 
-def test_by_distance_it_evaluates_a_cut_in_over_0_72_m() -> None:
-    """At 2 m/s that takes 0.36 s in place of 0.4 s."""
+def test_reference_driver_by_distance_evaluates_over_0_72_m() -> None:
+    """At 2 m/s that takes 0.36 s instead of 0.4 s."""
     near = {"lanes": 1, "nearing": 2.0, "closing": 10.0, "gap": 19.0, "aside": 1.0, "towards": 0.5}
     driver = ReferenceDriver(ReferenceDriverSettings(distance=0.72))
     decided = course(driver, 200, lambda step: ahead(across=3.0 - 0.02 * step, **near))
     assert decided.index(next(one for one in decided if one is not None)) == 37 + 75
 
 
-def test_who_leaves_the_lane_reveals_who_stands_there() -> None:
+def test_reference_driver_cut_out_reveals_a_standing_object() -> None:
     driver = ReferenceDriver()
     leaving = ahead(name="leaving", gap=15.0, closing=0.1, towards=-0.4, nearing=-1.0)
     standing = ahead(name="standing", gap=35.0, closing=20.0, speed=0.0)
     for _ in range(116):
-        decided = driver.decide(own(), [leaving, standing])
+        decided = driver.decide(ego(), [leaving, standing])
     assert driver.lead is standing
     assert driver.phase is DriverPhase.BRAKING
     assert decided is not None
 
 
-def test_after_full_wrap_the_emergency_brake_helps() -> None:
+def test_reference_driver_after_full_wrap_uses_the_emergency_brake() -> None:
     """0.85 G in 0.6 s, below 1.5 s to collision."""
     driver = ReferenceDriver()
     decided = course(driver, 61, lambda _: ahead(gap=20.0, closing=14.0, covers=True))

@@ -1,12 +1,12 @@
-"""Traffic signals in whole runs, and in their recordings."""
+"""Traffic signals in simulation runs and in their recordings."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from street_scene import NOTHING, after, everywhere
+from whole_run import Run
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording
@@ -19,17 +19,17 @@ LIGHTS = """<TrafficSignals><TrafficSignalController name="crossing">
 
 
 @pytest.mark.element("TrafficSignalControllerAction", "TrafficSignalControllerCondition", "TrafficSignalController")
-def test_signals_run_through_their_phases_and_are_recorded(run: Any, tmp_path: Path) -> None:
+def test_signal_phases_are_executed_and_recorded(run: Run, tmp_path: Path) -> None:
     go = '<ByValueCondition><TrafficSignalControllerCondition trafficSignalControllerRef="crossing" phase="stop"/>'
     red = '<ByValueCondition><TrafficSignalCondition name="7" state="ON;OFF;OFF"/></ByValueCondition>'
-    again = everywhere(
+    restart = everywhere(
         "<InfrastructureAction><TrafficSignalAction><TrafficSignalControllerAction "
         'trafficSignalControllerRef="crossing" phase="go"/></TrafficSignalAction></InfrastructureAction>'
     )
     played = run(
         1.5,
         ("Ego", NOTHING, f"{go}</ByValueCondition>"),
-        ("Ego", again, after(0.62)),
+        ("Ego", restart, after(0.62)),
         ("Ego", NOTHING, red),
         signals=LIGHTS,
     )
@@ -54,7 +54,7 @@ def test_signals_run_through_their_phases_and_are_recorded(run: Any, tmp_path: P
 @pytest.mark.parametrize(
     ("phase", "expected"), [("gone", "did you mean 'go'"), ("stop", "")], ids=["unknown phase", "known phase"]
 )
-def test_an_unknown_phase_is_an_error_before_the_run(run: Any, phase: str, expected: str) -> None:
+def test_unknown_signal_phase_is_rejected_before_the_run(run: Run, phase: str, expected: str) -> None:
     reference = f'trafficSignalControllerRef="crossing" phase="{phase}"'
     action = everywhere(
         f"<InfrastructureAction><TrafficSignalAction><TrafficSignalControllerAction {reference}/></TrafficSignalAction>"

@@ -1,4 +1,4 @@
-"""The traffic actions in whole runs: who enters the world, is seen, is touched, and leaves it."""
+"""Traffic actions in simulation runs: entry, detection, contact and removal of background traffic."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from traffic_scene import (
     swarm,
     traffic,
 )
-from whole_run import Watched
+from whole_run import RecordedRun
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 
-Run = Callable[..., Watched]
+Run = Callable[..., RecordedRun]
 
 
-def crowd(played: Watched, time: float, name: str = "crowd") -> list[str]:
-    """The cars of a traffic at a time."""
+def crowd(played: RecordedRun, time: float, name: str = "crowd") -> list[str]:
+    """Return the names of the road users of a traffic at a time."""
     frame = played.frames[round(time / 0.05)]
     return [one for one in frame.view.names if one.startswith(f"{name}.")]
 
 
 @pytest.mark.element("TrafficSwarmAction")
-def test_a_swarm_of_init_is_in_the_world_after_the_first_step(run: Run) -> None:
+def test_swarm_in_init_is_present_after_the_first_step(run: Run) -> None:
     played = run(8.0, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm()))
     assert crowd(played, 0.0) == []
     assert len(crowd(played, 0.05)) == 12
@@ -57,7 +57,7 @@ def test_a_swarm_of_init_is_in_the_world_after_the_first_step(run: Run) -> None:
     assert min(played.frames[40].view.speed[row] for row in moved.values()) > 5.0
 
 
-def test_velocity_is_the_speed_at_the_start(run: Run) -> None:
+def test_swarm_velocity_is_the_initial_speed(run: Run) -> None:
     played = run(
         0.1, globally=traffic(swarm(more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b")), velocity="21"))
     )
@@ -66,12 +66,12 @@ def test_velocity_is_the_speed_at_the_start(run: Run) -> None:
     assert speeds == pytest.approx([21.0] * 12, abs=0.5)
 
 
-def test_traffic_without_a_name_is_called_after_its_action(run: Run) -> None:
+def test_traffic_without_a_name_is_named_after_its_action(run: Run) -> None:
     played = run(0.1, globally=traffic(swarm(2), name=""))
     assert crowd(played, 0.05, "TrafficSwarm") == ["TrafficSwarm.0001", "TrafficSwarm.0002"]
 
 
-def test_sensors_of_an_agent_see_the_swarm(run: Run) -> None:
+def test_swarm_is_detected_by_the_sensors_of_an_agent(run: Run) -> None:
     seen: set[str] = set()
 
     def note(simulation: object, frame: object) -> None:
@@ -86,7 +86,7 @@ def test_sensors_of_an_agent_see_the_swarm(run: Run) -> None:
 
 
 @pytest.mark.element("TrafficSourceAction")
-def test_the_action_goes_on_until_it_is_stopped_and_the_cars_stay(run: Run) -> None:
+def test_source_runs_until_its_stop_and_the_vehicles_remain(run: Run) -> None:
     played = run(
         12.0,
         ("Ego", traffic(source(0.5, 500.0, speed=10.0))),
@@ -105,8 +105,8 @@ def test_the_action_goes_on_until_it_is_stopped_and_the_cars_stay(run: Run) -> N
 
 
 @pytest.mark.element("TrafficStopAction")
-def test_a_stop_is_for_the_traffic_of_its_name_or_for_all(run: Run) -> None:
-    def play(name: str) -> Watched:
+def test_traffic_stop_ends_the_named_or_all_traffic(run: Run) -> None:
+    def play(name: str) -> RecordedRun:
         return run(
             10.0,
             ("Ego", traffic("<TrafficStopAction/>", name=name), at_time(3.0)),
@@ -120,7 +120,7 @@ def test_a_stop_is_for_the_traffic_of_its_name_or_for_all(run: Run) -> None:
 
 
 @pytest.mark.element("TrafficSourceAction", "TrafficSinkAction")
-def test_a_source_feeds_a_sink(run: Run) -> None:
+def test_sink_removes_vehicles_of_a_source(run: Run) -> None:
     played = run(
         60.0,
         driven=False,
@@ -140,13 +140,13 @@ def test_a_source_feeds_a_sink(run: Run) -> None:
     assert max(xs) < 400.0
 
 
-def test_entities_of_the_scenario_pass_a_sink(run: Run) -> None:
+def test_sink_does_not_remove_scenario_entities(run: Run) -> None:
     played = run(10.0, driven=False, ego=(-1, 350.0, 20.0), globally=traffic(sink(400.0)))
     assert played.x("Ego")[-1] > 500.0
 
 
 @pytest.mark.element("TrafficAreaAction")
-def test_an_area_by_roads_and_lanes(run: Run) -> None:
+def test_area_by_road_range_is_filled(run: Run) -> None:
     where = road_range(300.0, 500.0, '<Lane id="-1"/>')
     played = run(5.0, driven=False, ego=(1, 900.0, 0.0), globally=traffic(area(6, "true", where)))
     for frame in played.frames[1:]:
@@ -159,7 +159,7 @@ def test_an_area_by_roads_and_lanes(run: Run) -> None:
 
 
 @pytest.mark.element("TrafficAreaAction")
-def test_an_area_by_a_polygon_is_filled_once_and_its_action_is_done(run: Run) -> None:
+def test_area_by_polygon_is_filled_once_and_completes(run: Run) -> None:
     corners = "".join(
         f'<Position><WorldPosition x="{x}" y="{y}"/></Position>' for x, y in ((300, -9), (500, -9), (500, 5), (300, 5))
     )
@@ -176,7 +176,7 @@ def test_an_area_by_a_polygon_is_filled_once_and_its_action_is_done(run: Run) ->
     assert done == [pytest.approx(0.0, abs=0.06)]
 
 
-def test_pedestrians_walk_on_sidewalks(run: Run) -> None:
+def test_area_pedestrians_walk_on_sidewalks(run: Run) -> None:
     walk = '<lane id="-3" type="sidewalk"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right>'
     entities = distribution((1.0, PEDESTRIAN))
     played = run(
@@ -194,7 +194,7 @@ def test_pedestrians_walk_on_sidewalks(run: Run) -> None:
 
 
 @pytest.mark.element("TrafficDefinition", "TrafficDistribution")
-def test_shares_of_categories_and_of_entities(run: Run) -> None:
+def test_traffic_mix_follows_shares_of_categories_and_entities(run: Run) -> None:
     categories = '<VehicleCategoryDistributionEntry category="{}" weight="{}"/>'
     mixed = categories.format("truck", 1) + categories.format("car", 1) + categories.format("bicycle", 0)
     played = run(0.1, globally=traffic(swarm(40, reach=400, more=DEFINITION.format(mixed, DRIVER.format("a", "b")))))
@@ -210,7 +210,7 @@ def test_shares_of_categories_and_of_entities(run: Run) -> None:
     assert max(frame.view.speed[rows]) <= 5.01
 
 
-def test_a_controller_of_ours_says_how_its_drivers_drive(run: Run) -> None:
+def test_traffic_controller_properties_set_the_driver_model(run: Run) -> None:
     def lead_gap(time_gap: float) -> float:
         properties = "".join(
             f'<Property name="{name}" value="{value}"/>'
@@ -258,28 +258,28 @@ def test_a_controller_of_ours_says_how_its_drivers_drive(run: Run) -> None:
         ),
     ],
 )
-def test_what_makes_no_sense_is_told_before_the_run(run: Run, inside: str, message: str) -> None:
+def test_invalid_traffic_action_is_rejected_before_the_run(run: Run, inside: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
         run(1.0, globally=traffic(inside))
     assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
 
 
-def test_a_source_far_from_all_lanes_is_told(run: Run) -> None:
+def test_source_far_from_lanes_is_rejected(run: Run) -> None:
     away = '<Position><WorldPosition x="300" y="200"/></Position>'
     inside = source(1.0, 100.0).replace(position(100.0), away)
     with pytest.raises(InputError, match=r"no lane is near x = 300\.0 m, y = 200\.0 m"):
         run(1.0, globally=traffic(inside))
 
 
-def test_traffic_needs_roads(run: Run, tmp_path: Path) -> None:
+def test_traffic_without_roads_is_rejected(run: Run, tmp_path: Path) -> None:
     run(0.1, globally=traffic(swarm(2)))
     text = (tmp_path / "scene.xosc").read_text().replace('<LogicFile filepath="street.xodr"/>', "")
     with pytest.raises(InputError, match="the scenario has no lanes"):
         Simulation(load_scenario(text.encode()))
 
 
-def test_a_collision_with_any_vehicle_counts_traffic_too(run: Run) -> None:
-    """Ego follows a car that has just come from a source at 5 m/s, and speeds up into it."""
+def test_collision_condition_by_type_includes_background_traffic(run: Run) -> None:
+    """Ego follows a car that has just come from a source at 5 m/s, and accelerates into it."""
     touch = (
         '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>'
         '</TriggeringEntities><EntityCondition><CollisionCondition><ByType type="vehicle"/></CollisionCondition>'
@@ -298,7 +298,7 @@ def test_a_collision_with_any_vehicle_counts_traffic_too(run: Run) -> None:
     assert played.begun("event 0") == [pytest.approx(contacts[0], abs=1e-9)]
 
 
-def test_the_same_seed_gives_the_same_trace_in_another_process(run: Run, tmp_path: Path) -> None:
+def test_traffic_with_equal_seed_has_equal_trace_in_another_process(run: Run, tmp_path: Path) -> None:
     played = run(4.0, driven=False, globally=traffic(swarm(15)), seed=3)
     other = run(4.0, driven=False, globally=traffic(swarm(15)), seed=4)
     assert played.result.trace_hash != other.result.trace_hash
@@ -331,7 +331,7 @@ def test_the_same_seed_gives_the_same_trace_in_another_process(run: Run, tmp_pat
         ("3", swarm(9, velocity="9", more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b"))), True),
     ],
 )
-def test_older_spellings_work_and_newer_versions_warn(
+def test_deprecated_traffic_elements_warn_in_newer_versions(
     run: Run, tmp_path: Path, version: str, inside: str, warned: bool
 ) -> None:
     run(0.2)

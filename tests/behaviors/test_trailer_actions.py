@@ -1,12 +1,13 @@
-"""Trailers that come and go during a run: the hitch is 1 m behind the truck's axle, the bar 3 m long."""
+"""Connection and disconnection of trailers: the hitch is 1 m behind the truck's axle, the drawbar 3 m long."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 from street_scene import STREET, after, everywhere, private
+from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
 
@@ -31,14 +32,14 @@ ASIDE = private("""<LateralAction><LaneChangeAction>
   <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
 
 
-def play(run: Any, end: float, *steps: tuple[str, ...]) -> Any:
+def play(run: Run, end: float, *steps: tuple[str, ...]) -> RecordedRun:
     placed = everywhere(PLACE.format("Truck", 200)) + everywhere(PLACE.format("Trailer", 196))
     return run(end, *steps, driven=False, ego=(1, 900.0, 0.0), more=TRAIN, globally=placed)
 
 
 @pytest.mark.element("ConnectTrailerAction", "DisconnectTrailerAction")
-def test_a_trailer_follows_from_its_coupling_to_its_uncoupling(run: Any) -> None:
-    """The trailer's axle is 1 m + 3 m behind the truck's; at 10 m/s from 1 s on, uncoupled just after 3 s."""
+def test_trailer_follows_from_connection_to_disconnection(run: Run) -> None:
+    """The trailer's axle is 1 m + 3 m behind the truck's; at 10 m/s from 1 s, disconnected just after 3 s."""
     played = play(
         run, 4, ("Truck", COUPLE, after(0.5)), ("Truck", DRIVE, after(0.975)), ("Truck", UNCOUPLE, after(3.0))
     )
@@ -51,14 +52,14 @@ def test_a_trailer_follows_from_its_coupling_to_its_uncoupling(run: Any) -> None
     assert played.of("Trailer", "speed")[-1] == 0.0
 
 
-def test_a_trailer_that_is_not_coupled_stays(run: Any) -> None:
+def test_unconnected_trailer_does_not_move(run: Run) -> None:
     played = play(run, 2, ("Truck", DRIVE))
     assert played.x("Trailer") == [196.0] * len(played.frames)
 
 
 @pytest.mark.element("ConnectTrailerAction")
-def test_the_bar_always_ends_at_the_hitch(run: Any) -> None:
-    """In a change of lanes too: hitch and coupler are one point, and the trailer cuts the corner."""
+def test_trailer_coupler_coincides_with_the_hitch(run: Run) -> None:
+    """Hitch and coupler coincide also in a lane change, and the trailer cuts the corner."""
     played = play(run, 5, ("Truck", COUPLE), ("Truck", DRIVE), ("Truck", ASIDE, after(0.5)))
     bent = 0.0
     for frame in played.frames[2:]:
@@ -73,14 +74,14 @@ def test_the_bar_always_ends_at_the_hitch(run: Any) -> None:
 
 
 def link(name: str, trailer: str = "") -> str:
-    """One of a train that can draw and be drawn."""
+    """Return a vehicle with hitch and coupler."""
     drawn = f'<Trailer><TrailerRef entityRef="{trailer}"/></Trailer>' if trailer else ""
     return f"""<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="trailer">{BODY.format(middle=1.5)}
       <TrailerHitch dx="-1"/><TrailerCoupler dx="3"/>{drawn}</Vehicle></ScenarioObject>"""
 
 
-def test_who_is_a_trailer_of_itself_is_refused(run: Any) -> None:
-    """Front draws A, A draws B, and B draws A."""
+def test_trailer_of_itself_is_rejected(run: Run) -> None:
+    """Front tows A, A tows B, and B tows A."""
     train = link("Front", "A") + link("A", "B") + link("B", "A")
     with pytest.raises(InputError) as caught:
         run(1, driven=False, more=train, globally=everywhere(PLACE.format("Front", 200)))
@@ -88,8 +89,8 @@ def test_who_is_a_trailer_of_itself_is_refused(run: Any) -> None:
     assert messages == ["'A' is a trailer of itself", "'B' is a trailer of itself"]
 
 
-def test_what_two_draw_follows_the_first_of_them(run: Any) -> None:
-    """Also once it draws the second one itself."""
+def test_trailer_of_two_vehicles_follows_the_first(run: Run) -> None:
+    """This also holds after it tows the second one itself."""
     train = link("First", "A") + link("Second", "A") + link("A")
     placed = everywhere(PLACE.format("First", 200)) + everywhere(PLACE.format("Second", 192))
     couple = COUPLE.replace('Trailer"', 'Second"')
@@ -107,7 +108,7 @@ def test_what_two_draw_follows_the_first_of_them(run: Any) -> None:
          lambda x: 0.004 * max(x - 210.0, 0.0) ** 2),
     ],
 )  # fmt: skip
-def test_trailer_on_a_slope_stands_on_the_road(run: Any, elevation: str, height: Any) -> None:
+def test_trailer_on_a_slope_stands_on_the_road(run: Run, elevation: str, height: Callable[[float], float]) -> None:
     street = STREET.replace("<lanes>", f"<elevationProfile>{elevation}</elevationProfile><lanes>")
     placed = everywhere(PLACE.format("Truck", 200)) + everywhere(PLACE.format("Trailer", 196))
     played = run(

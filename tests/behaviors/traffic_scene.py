@@ -1,4 +1,4 @@
-"""Parts of scenarios: background traffic, who is in it and where it drives."""
+"""Parts of scenarios: background traffic, its road users and its positions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plays a file by the simulation, and keeps what its frames show."""
+"""Simulation runs of generated scenario files, with their frames and results."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ FILE = """<OpenSCENARIO>
     </StopTrigger></Storyboard></OpenSCENARIO>"""
 
 
-class Watched:
-    """A played file: its frames and result."""
+class RecordedRun:
+    """Record of a run: its frames and result."""
 
     def __init__(self) -> None:
         self.frames: list[Frame] = []
@@ -56,11 +56,15 @@ class Watched:
         ]
 
 
-@pytest.fixture
-def run(tmp_path: Path) -> Callable[..., Watched]:
-    """Plays `run(end, (actor, action[, condition]), …)` with Ego in lane -1 at 100 m, driven unless told otherwise.
+Run = Callable[..., RecordedRun]
 
-    With a condition `start` the act begins by that, and whoever fulfils it acts in all groups.
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    """Return a function that runs `run(end, (actor, action[, condition]), …)` with Ego in lane -1 at 100 m, driven by
+    default.
+
+    With a condition `start` the act starts by that, and its triggering entities act in all groups.
     """
 
     def play(
@@ -80,7 +84,7 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
         init: str = "",
         edge: str = "none",
         delay: float = 0.0,
-    ) -> Watched:
+    ) -> RecordedRun:
         (tmp_path / "street.xodr").write_text(street)
         groups = "".join(
             GROUP.format(
@@ -109,11 +113,11 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
         )
         path = tmp_path / "scene.xosc"
         path.write_text(text)
-        watched = Watched()
-        simulation = Simulation(load_scenario(path), seed=seed, settings=settings or RunSettings(), observers=[watched])
-        watched.during = None if during is None else lambda frame: during(simulation, frame)
-        watched.result = simulation.run()
-        return watched
+        record = RecordedRun()
+        simulation = Simulation(load_scenario(path), seed=seed, settings=settings or RunSettings(), observers=[record])
+        record.during = None if during is None else lambda frame: during(simulation, frame)
+        record.result = simulation.run()
+        return record
 
     return play
 

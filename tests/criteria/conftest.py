@@ -1,4 +1,4 @@
-"""Frames with nothing but boxes that move."""
+"""Frames that contain only moving boxes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ def car() -> type[Car]:
 
 @pytest.fixture
 def frame() -> MakeFrame:
-    """`frame(time, {"Ego": Car(…)}, contacts=[…])`; the reference point is the box center on the ground."""
+    """Return a function `frame(time, {"Ego": Car(…)}, contacts=[…])`; the reference point is the box center on the
+    ground.
+    """
 
     def make(time: float, cars: Mapping[str, Car], contacts: Sequence[Contact] = ()) -> Frame:
         table = np.array(list(cars.values()), dtype=float).reshape(-1, 4)

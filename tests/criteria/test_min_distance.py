@@ -1,4 +1,4 @@
-"""Distances of boxes 4 m by 2 m, worked out by hand."""
+"""Criterion `min_distance`: distances of boxes 4 m by 2 m, calculated by hand."""
 
 import math
 from typing import Any
@@ -14,15 +14,15 @@ def criterion(**settings: Any) -> MinDistance:
 
 
 def passing(frame: Any, car: Any) -> list[Any]:
-    """Incoming crosses from left to right, 10 m ahead at first, 5 m ahead of the Ego's center at 2 s, then away."""
+    """Return frames in which Incoming crosses from left to right, 10 m ahead at first and 5 m ahead at 2 s."""
     places = [car(10, 10, -math.pi / 2), car(8, 4, -math.pi / 2), car(5, 0, -math.pi / 2), car(5, -8, -math.pi / 2)]
     return [frame(float(second), {"Ego": car(0), "Incoming": place}) for second, place in enumerate(places)]
 
 
-def test_center_and_box(frame: Any, car: Any) -> None:
+def test_min_distance_measures_center_and_box(frame: Any, car: Any) -> None:
     distance = criterion(measure="center")
     (verdict,) = evaluate_criteria(passing(frame, car), [distance])
-    # Square on at 2 s: half of Ego's length is 2 m, half of Incoming's width 1 m.
+    # Perpendicular at 2 s: half of Ego's length is 2 m, half of Incoming's width 1 m.
     assert verdict == Verdict(
         "min_distance", True, 5.0, None, "m", None, "Ego and Incoming came within 5.00 m (center to center) at 2.00 s"
     )
@@ -37,7 +37,9 @@ def test_center_and_box(frame: Any, car: Any) -> None:
     ("measure", "at_least", "violated"),
     [("center", 5.0, None), ("center", 5.01, 2.0), ("center", 9.0, 1.0), ("box", 1.99, None), ("box", 2.01, 2.0)],
 )
-def test_limit(frame: Any, car: Any, measure: str, at_least: float, violated: float | None) -> None:
+def test_min_distance_limit_is_violated_below_at_least(
+    frame: Any, car: Any, measure: str, at_least: float, violated: float | None
+) -> None:
     (verdict,) = evaluate_criteria(passing(frame, car), [criterion(measure=measure, at_least=at_least)])
     assert verdict.passed is (violated is None)
     assert verdict.first_violation == violated
@@ -52,7 +54,7 @@ def test_min_distance_by_default_measures_between_bodies(frame: Any, car: Any) -
 
 
 def test_min_distance_of_a_crash_fails_every_limit_by_default(frame: Any, car: Any) -> None:
-    """Square on the middle of the other's side: the centers stay 3 m apart."""
+    """Perpendicular impact on the center of the other's side: the centers are 3 m apart."""
     crash = [frame(0.0, {"Ego": car(0), "Incoming": car(3, 0, math.pi / 2)})]
     assert [verdict.passed for verdict in evaluate_criteria(crash, [criterion(at_least=0.01)])] == [False]
     assert [verdict.passed for verdict in evaluate_criteria(crash, [criterion(at_least=2.9, measure="center")])] == [
@@ -60,7 +62,7 @@ def test_min_distance_of_a_crash_fails_every_limit_by_default(frame: Any, car: A
     ]
 
 
-def test_boxes_that_overlap_are_at_zero(frame: Any, car: Any) -> None:
+def test_min_distance_of_overlapping_boxes_is_zero(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria(
         [frame(0.0, {"Ego": car(0), "Incoming": car(3, 1)})], [criterion(measure="box", at_least=0.1)]
     )
@@ -68,15 +70,15 @@ def test_boxes_that_overlap_are_at_zero(frame: Any, car: Any) -> None:
     assert verdict.value == 0.0
 
 
-def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any) -> None:
+def test_min_distance_of_absent_actor_fails(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [criterion(at_least=1.0)])
     assert (verdict.passed, verdict.value) == (False, None)
     assert verdict.reason == "Incoming was never present, so nothing was measured"
 
 
-def test_two_that_never_meet_in_the_world_fail_it(frame: Any, car: Any) -> None:
+def test_min_distance_without_common_presence_fails(frame: Any, car: Any) -> None:
     distance = criterion()
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Incoming": car(0)})], [distance])
     assert not verdict.passed
-    assert verdict.reason == "Ego and Incoming were never there together"
+    assert verdict.reason == "Ego and Incoming were never present at the same time"
     assert distance.metrics() == {}

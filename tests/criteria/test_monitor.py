@@ -1,4 +1,4 @@
-"""Monitors have a value at the end, or throughout."""
+"""Criterion `monitor`: value at the end, or throughout."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
 
 
 def verdict(frame: Any, values: list[bool | None], **settings: Any) -> Verdict:
-    """Over frames a second apart."""
+    """Return the verdict over frames 1 s apart."""
     frames = [
         replace(frame(float(time), {}), monitors={} if value is None else {"Seen": value})
         for time, value in enumerate(values)
@@ -32,18 +32,18 @@ def verdict(frame: Any, values: list[bool | None], **settings: Any) -> Verdict:
         ([None], {}, False, 0.0),
     ],
 )
-def test_the_value_counts(
+def test_monitor_value_at_the_end_or_throughout(
     frame: Any, values: list[bool | None], settings: dict[str, Any], passed: bool, violation: float | None
 ) -> None:
     found = verdict(frame, values, **settings)
     assert (found.passed, found.first_violation) == (passed, violation)
 
 
-def test_only_what_must_hold_throughout_can_end_a_run(frame: Any) -> None:
+def test_monitor_is_fatal_with_throughout_only(frame: Any) -> None:
     assert verdict(frame, [True, False], fatal=True, throughout=True).fatal
     assert not verdict(frame, [False, False], fatal=True).fatal
 
 
-def test_reasons(frame: Any) -> None:
+def test_monitor_reason_states_value_and_time(frame: Any) -> None:
     assert verdict(frame, [False, False, True]).reason == "Seen is true since 2.00 s"
     assert verdict(frame, [None]).reason == "the scenario has no monitor 'Seen'"

@@ -1,4 +1,4 @@
-"""Criteria on how far and how fast an actor came."""
+"""Criteria on position, driven distance and speed of an actor."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ def reach(**settings: Any) -> ReachPosition:
 
 
 def driving(frame: Any, car: Any) -> list[Any]:
-    """5 m/s along x from the origin, 4 s long."""
+    """Return frames at 5 m/s along x from the origin, 4 s long."""
     return [frame(float(second), {"Ego": car(5.0 * second, speed=5.0)}) for second in range(5)]
 
 
@@ -23,47 +23,51 @@ def driving(frame: Any, car: Any) -> list[Any]:
     ("settings", "passed", "nearest"),
     [({"within": 3}, True, 3.0), ({"within": 2.9}, False, 3.0), ({"within": 3, "by": 1.5}, False, 34**0.5)],
 )
-def test_reach_position(frame: Any, car: Any, settings: dict[str, Any], passed: bool, nearest: float) -> None:
-    judged = reach(**settings)
-    (verdict,) = evaluate_criteria(driving(frame, car), [judged])
-    assert (verdict.passed, verdict.value) == (passed, pytest.approx(nearest))
-    assert judged.metrics() == ({"reach_position.time": 2.0} if passed else {})
+def test_reach_position_depends_on_tolerance_and_deadline(
+    frame: Any, car: Any, settings: dict[str, Any], passed: bool, nearest: float
+) -> None:
+    criterion = reach(**settings)
+    (verdict,) = evaluate_criteria(driving(frame, car), [criterion])
+    assert verdict.passed is passed
+    assert verdict.value == pytest.approx(nearest)
+    assert criterion.metrics() == ({"reach_position.time": 2.0} if passed else {})
 
 
-def test_reaching_is_fatal_only_when_it_is_too_late(frame: Any, car: Any) -> None:
-    judged = reach(within=1, by=2.5, fatal=True)
+def test_reach_position_is_fatal_after_the_deadline_only(frame: Any, car: Any) -> None:
+    criterion = reach(within=1, by=2.5, fatal=True)
     frames = driving(frame, car)
-    assert [evaluate_criteria([each], [judged])[0].fatal for each in frames] == [False, False, False, True, True]
+    assert [evaluate_criteria([each], [criterion])[0].fatal for each in frames] == [False, False, False, True, True]
 
 
-def test_driven_distance(frame: Any, car: Any) -> None:
+def test_driven_distance_is_compared_with_at_least(frame: Any, car: Any) -> None:
     far, farther = (DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=meters)) for meters in (20.0, 20.1))
     verdicts = evaluate_criteria(driving(frame, car), [far, farther])
     assert [verdict.passed for verdict in verdicts] == [True, False]
     assert verdicts[0].value == pytest.approx(20.0)
 
 
-def test_a_jump_is_no_way_driven(frame: Any, car: Any) -> None:
-    judged = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=50))
-    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(100)})], [judged])
+def test_driven_distance_excludes_teleports(frame: Any, car: Any) -> None:
+    criterion = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=50))
+    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(100)})], [criterion])
     assert (verdict.passed, verdict.value) == (False, 0.0)
 
 
-def test_what_is_away_drives_no_way(frame: Any, car: Any) -> None:
-    """It drives 5 m, is out of the world for 8 s, and drives 10 m more."""
-    judged = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=20))
+def test_driven_distance_excludes_absence(frame: Any, car: Any) -> None:
+    """The actor drives 5 m, is absent for 8 s, and drives 10 m more."""
+    criterion = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=20))
     times, away = [0.0, 1.0, 2.0, 9.0, 10.0, 12.0], {"Other": car(0)}
     frames = [frame(time, away if 1.0 < time < 10.0 else {"Ego": car(0, speed=5.0)}) for time in times]
-    (verdict,) = evaluate_criteria(frames, [judged])
-    assert (verdict.passed, verdict.value) == (False, pytest.approx(15.0))
-    (verdict,) = evaluate_criteria([frame(13.0, away)], [judged])
+    (verdict,) = evaluate_criteria(frames, [criterion])
+    assert not verdict.passed
+    assert verdict.value == pytest.approx(15.0)
+    (verdict,) = evaluate_criteria([frame(13.0, away)], [criterion])
     assert verdict.value == pytest.approx(15.0)
 
 
-def test_max_speed_counts_backwards_too(frame: Any, car: Any) -> None:
-    judged = MaxSpeed(MaxSpeedSettings(of="Ego", at_most=6))
+def test_max_speed_includes_backward_motion(frame: Any, car: Any) -> None:
+    criterion = MaxSpeed(MaxSpeedSettings(of="Ego", at_most=6))
     frames = [*driving(frame, car), frame(5.0, {"Ego": car(0, speed=-7.0)})]
-    (verdict,) = evaluate_criteria(frames, [judged])
+    (verdict,) = evaluate_criteria(frames, [criterion])
     assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 7.0, 5.0)
 
 
@@ -76,7 +80,7 @@ def test_max_speed_counts_backwards_too(frame: Any, car: Any) -> None:
     ],
     ids=lambda criterion: criterion.name,
 )
-def test_an_actor_that_never_appears_fails_them(frame: Any, car: Any, criterion: Criterion) -> None:
+def test_progress_criteria_of_absent_actor_fail(frame: Any, car: Any, criterion: Criterion) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Bus": car(0)})], [criterion])
     assert (verdict.passed, verdict.value) == (False, None)
     assert verdict.reason == "Ego was never present, so nothing was measured"

@@ -1,4 +1,4 @@
-"""The run must end by itself."""
+"""Criterion `time_limit`: the run has to end in time."""
 
 from typing import Any
 
@@ -9,19 +9,19 @@ from eidrive_scenario.api.criteria import evaluate_criteria
 
 
 @pytest.mark.parametrize(("end", "passed"), [(1.0, True), (400 * 0.05, True), (20.05, False)])
-def test_it_passes_up_to_the_limit(frame: Any, car: Any, end: float, passed: bool) -> None:
+def test_time_limit_passes_up_to_the_limit(frame: Any, car: Any, end: float, passed: bool) -> None:
     frames = [frame(0.0, {"Ego": car(0)}), frame(end, {"Ego": car(0)})]
     (verdict,) = evaluate_criteria(frames, [TimeLimit(TimeLimitSettings(within=20))])
     assert (verdict.passed, verdict.value, verdict.limit, verdict.unit) == (passed, end, 20.0, "s")
     assert verdict.first_violation == (None if passed else end)
 
 
-def test_a_run_that_goes_on_was_too_long_from_the_limit_on(frame: Any, car: Any) -> None:
+def test_time_limit_violation_starts_at_the_limit(frame: Any, car: Any) -> None:
     frames = [frame(time, {"Ego": car(0)}) for time in (19.0, 21.0, 25.0)]
     (verdict,) = evaluate_criteria(frames, [TimeLimit(TimeLimitSettings(within=20, fatal=False))])
     assert (verdict.value, verdict.first_violation) == (25.0, 21.0)
 
 
-def test_it_ends_the_run_unless_told_otherwise() -> None:
+def test_time_limit_is_fatal_by_default() -> None:
     assert TimeLimit(TimeLimitSettings(within=1)).verdict().fatal
     assert not TimeLimit(TimeLimitSettings(within=1, fatal=False)).verdict().fatal

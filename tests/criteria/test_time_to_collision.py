@@ -1,4 +1,4 @@
-"""Boxes 4 m by 2 m on straight courses, times worked out by hand."""
+"""Criterion `time_to_collision`: boxes 4 m by 2 m on straight courses, times calculated by hand."""
 
 import math
 from typing import Any
@@ -36,24 +36,25 @@ def criterion(**settings: Any) -> TimeToCollision:
     return TimeToCollision(TimeToCollisionSettings.model_validate({"of": "Ego", "to": "Lead", **settings}))
 
 
-def test_the_smallest_one_is_judged(frame: Any, car: Any) -> None:
+def test_time_to_collision_minimum_is_compared(frame: Any, car: Any) -> None:
     frames = [
         frame(0.0, {"Ego": car(0, speed=10), "Lead": car(34, speed=5)}),  # 30 m at 5 m/s
         frame(1.0, {"Ego": car(10, speed=10), "Lead": car(24, speed=5)}),  # 10 m at 5 m/s
         frame(2.0, {"Ego": car(20, speed=4), "Lead": car(29, speed=5)}),  # opens
     ]
-    judged = criterion(at_least=2.5)
-    (verdict,) = evaluate_criteria(frames, [judged])
-    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, pytest.approx(2.0), 1.0)
-    assert judged.metrics() == {"time_to_collision.Ego.Lead": pytest.approx(2.0)}
+    minimum = criterion(at_least=2.5)
+    (verdict,) = evaluate_criteria(frames, [minimum])
+    assert (verdict.passed, verdict.first_violation) == (False, 1.0)
+    assert verdict.value == pytest.approx(2.0)
+    assert minimum.metrics() == {"time_to_collision.Ego.Lead": pytest.approx(2.0)}
 
 
-def test_no_collision_course_is_no_violation(frame: Any, car: Any) -> None:
+def test_time_to_collision_without_collision_course_passes(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0), "Lead": car(9)})], [criterion(at_least=2)])
     assert (verdict.passed, verdict.value) == (True, None)
 
 
-def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any) -> None:
+def test_time_to_collision_of_absent_actor_fails(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [criterion(at_least=2)])
     assert not verdict.passed
     assert verdict.reason.startswith("Lead was never present")

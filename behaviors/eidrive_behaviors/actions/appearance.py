@@ -29,7 +29,7 @@ MOTION = "motion"
 
 
 class VisibilityAction(ActionBehaviour):
-    """Set the visibility of an entity in images, in traffic and to sensors.
+    """Visibility of an entity in images, in traffic and to sensors.
 
     A SensorReferenceSet limits the value for sensors to sensors of the listed names, whichever entity carries them.
     """

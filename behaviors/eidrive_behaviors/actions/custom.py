@@ -8,7 +8,7 @@ from eidrive_scenario.api.actions import ActionBehaviour, CustomCommand, model
 
 
 class CustomCommandAction(ActionBehaviour):
-    """Pass type and content of the command on, once. It never starts a program."""
+    """Transfer of type and content of the command to its receiver, once. It never starts a program."""
 
     immediate = True
     action: model.CustomCommandAction

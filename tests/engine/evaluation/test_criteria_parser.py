@@ -126,9 +126,12 @@ def test_criterion_of_unknown_monitor_is_reported() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("min_distance: {of: Ego, to: Ego}", "of and to are both 'Ego': name two actors"),
-        ("collision: {of: Ego, with: Ego}", "'Ego' cannot hit itself: name another actor in 'with'"),
-        ("collision: {of: Ego, with: [Incoming, Ego]}", "'Ego' cannot hit itself: name another actor in 'with'"),
+        ("min_distance: {of: Ego, to: Ego}", "'of' and 'to' are equal (got 'Ego'; expected two actors)"),
+        ("collision: {of: Ego, with: Ego}", "'with' contains the actor itself (got 'Ego'; expected another actor)"),
+        (
+            "collision: {of: Ego, with: [Incoming, Ego]}",
+            "'with' contains the actor itself (got 'Ego'; expected another actor)",
+        ),
         ("max_speed: {of: Ego, at_most: 3, name: ''}", "setting 'name' is ''; string should have at least 1 character"),
     ],
 )

@@ -1,13 +1,13 @@
-"""Scenarios that the standard allows and nobody would write: played to the end, or refused by file and line."""
+"""Unusual scenarios that the standard allows: they run to the end, or are rejected with file and line."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from street_scene import NOTHING, after, everywhere, private
+from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
 
@@ -23,7 +23,7 @@ CLOTHOID = """<TrajectoryRef><Trajectory name="way" closed="false"><Shape><Cloth
   </TrajectoryRef>"""
 
 
-def assert_everybody_is_somewhere(played: Any) -> None:
+def assert_states_are_finite(played: RecordedRun) -> None:
     for frame in played.frames:
         view = frame.view
         for quantity in (view.position, view.yaw, view.pitch, view.roll, view.speed, view.velocity, view.acceleration):
@@ -31,20 +31,20 @@ def assert_everybody_is_somewhere(played: Any) -> None:
 
 
 @pytest.mark.parametrize("actors", [("Ego", "Ego"), ("Ego", "all"), ("all", "all")])
-def test_who_is_named_twice_acts_once(run: Any, actors: tuple[str, str]) -> None:
+def test_actor_listed_twice_acts_once(run: Run, actors: tuple[str, str]) -> None:
     played = run(3, ('"/><EntityRef entityRef="'.join(actors), PROFILE), driven=False, more=GROUPS)
     assert played.of("Ego", "speed")[-1] == 5
     assert played.of("Ego", "speed")[20] == pytest.approx(12.5)
 
 
-def test_a_trajectory_that_is_nowhere_is_refused_by_its_line(run: Any) -> None:
+def test_missing_trajectory_is_rejected_with_its_line(run: Run) -> None:
     with pytest.raises(
         InputError, match=r"scene\.xosc:\d+: FollowTrajectoryAction has no Trajectory; give it in place"
     ):
         run(1, ("Ego", private(FOLLOW.format(trajectory=""))), driven=False)
 
 
-def test_a_trajectory_of_a_thousand_kilometers_is_begun(run: Any) -> None:
+def test_trajectory_of_a_thousand_kilometers_starts(run: Run) -> None:
     played = run(1, ("Ego", private(FOLLOW.format(trajectory=CLOTHOID.format(length=1e6)))), driven=False)
     assert played.x("Ego")[-1] == pytest.approx(120.0)
 
@@ -53,16 +53,16 @@ WEATHER = """<EnvironmentAction><Environment name="storm"><Weather><Wind directi
   <Fog visualRange="{fog}"/></Weather></Environment></EnvironmentAction>"""
 
 
-def test_air_without_end_and_wind_without_example(run: Any) -> None:
-    """An infinite visual range is the standard's word for no fog."""
+def test_infinite_visual_range_and_extreme_wind_are_accepted(run: Run) -> None:
+    """An infinite visual range is the standard's notation for no fog."""
     played = run(0.2, ("Ego", everywhere(WEATHER.format(wind=300, fog="INF"))), driven=False)
     environment = played.frames[-1].environment
     assert environment is not None
     assert environment.fog_range == math.inf
-    assert_everybody_is_somewhere(played)
+    assert_states_are_finite(played)
 
 
-def test_a_negative_wind_is_refused(run: Any) -> None:
+def test_negative_wind_speed_is_rejected(run: Run) -> None:
     with pytest.raises(InputError, match=r"scene\.xosc:\d+: speed of Wind is -1; give a number that is not negative"):
         run(0.2, ("Ego", everywhere(WEATHER.format(wind=-1, fog=100))), driven=False)
 
@@ -74,9 +74,9 @@ ON_ROUTE = """<TeleportAction><Position><RoutePosition><RouteRef><Route name="wa
   </Position></TeleportAction>"""
 
 
-def test_a_lane_beside_the_route_is_refused_by_its_line(run: Any) -> None:
-    told = r"scene\.xosc:\d+: RoutePosition means no place: road '1' has no lane 7 at s = 150"
-    with pytest.raises(InputError, match=told):
+def test_route_position_in_missing_lane_is_rejected_with_its_line(run: Run) -> None:
+    message = r"scene\.xosc:\d+: RoutePosition means no place: road '1' has no lane 7 at s = 150"
+    with pytest.raises(InputError, match=message):
         run(1, ("Ego", private(ON_ROUTE)), driven=False)
 
 
@@ -91,8 +91,8 @@ CLOCK = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
 @pytest.mark.parametrize(
     ("timing", "start"), [("<None/>", 501.0), (CLOCK, 521.0)], ids=["own speed", "late by the clock"]
 )
-def test_who_is_put_on_a_trajectory_far_away_has_not_driven_there(run: Any, timing: str, start: float) -> None:
-    """At 20 m/s from x = 100 m; at 1 s on, by the clock, the place of that time: 500 m + 20 m."""
+def test_traveled_distance_excludes_the_teleport_to_a_trajectory(run: Run, timing: str, start: float) -> None:
+    """At 20 m/s from x = 100 m; by the clock the position at 1 s is 500 m + 20 m."""
     traveled = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
       </TriggeringEntities><EntityCondition><TraveledDistanceCondition value="50"/></EntityCondition>
       </ByEntityCondition>"""
@@ -104,8 +104,8 @@ def test_who_is_put_on_a_trajectory_far_away_has_not_driven_there(run: Any, timi
     assert played.begun("event 1")[0] == pytest.approx(2.55)
 
 
-def test_who_keeps_a_distance_drives_no_faster_than_it_can(run: Any) -> None:
-    """A time gap to oneself is never reached; the Performance of the car ends at 70 m/s."""
+def test_longitudinal_distance_is_limited_by_the_maximum_speed(run: Run) -> None:
+    """A time gap to the actor itself is never reached; the Performance of the car is limited to 70 m/s."""
     gap = private(
         '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="true" freespace="false" '
         'timeGap="10"><DynamicConstraints maxAcceleration="100"/></LongitudinalDistanceAction></LongitudinalAction>'
