@@ -34,36 +34,36 @@ class RoadAttributes:
         self.objects: tuple[RoadObject, ...] = road_map.objects
 
     def road(self, road_id: str) -> Road:
-        """The road with this id. Raises PositionError with the nearest right id."""
+        """Return the road with this id. Raise PositionError with the nearest right id."""
         road = self.roads.get(road_id)
         if road is None:
             raise poses.unknown_road(road_id, list(self.roads))
         return road
 
     def driving_direction(self, road_id: str, lane_id: int) -> int:
-        """+1 where the lane's traffic drives in the direction of s, -1 where against it."""
+        """Return +1 if the lane's traffic drives in the direction of s, -1 if against it."""
         return driving_direction(self.road(road_id), lane_id)
 
     def lane_ids(self, road_id: str, s: float, *, drivable: bool = False) -> tuple[int, ...]:
-        """The lanes at s from left to right, without lane 0; with `drivable` only those that cars drive on."""
+        """Return the lanes at s from left to right, without lane 0; with `drivable` only those that cars drive on."""
         lanes = self.road(road_id).section_at(s).lanes
         return tuple(number for number, lane in lanes.items() if number and (lane.drivable or not drivable))
 
     def lane_width(self, road_id: str, lane_id: int, s: float) -> float:
-        """Width of a lane at s [m]. Raises PositionError."""
+        """Return the width of a lane at s [m]. Raise PositionError."""
         section, lane = poses.lane_at(self.road(road_id), lane_id, s)
         return lane.width.value(s - section.s)
 
     def lane_type(self, road_id: str, lane_id: int, s: float) -> str:
-        """Type of a lane at s, as the standard names it. Raises PositionError."""
+        """Return the type of a lane at s, as the standard names it. Raise PositionError."""
         return poses.lane_at(self.road(road_id), lane_id, s)[1].type
 
     def curvature(self, road_id: str, s: float) -> float:
-        """Curvature of the reference line at s, left positive [1/m]."""
+        """Return the curvature of the reference line at s, left positive [1/m]."""
         return self.road(road_id).reference.at(s).curvature
 
     def speed_limit(self, road_id: str, s: float, lane_id: int | None = None) -> float | None:
-        """The limit at s [m/s]: the lane's own, else the road's; inf for no limit, None where the map is silent."""
+        """Return the limit at s [m/s]: the lane's own, else the road's; inf for no limit, None if the map is silent."""
         road = self.road(road_id)
         if lane_id is not None:
             section, lane = poses.lane_at(road, lane_id, s)
@@ -74,7 +74,7 @@ class RoadAttributes:
         return kinds[-1].speed if kinds else None
 
     def on_road(self, location: LaneLocation) -> bool:
-        """True where the location lies within its lane's width."""
+        """Return True if the location lies within its lane's width."""
         width = self.lane_width(location.road, location.lane, location.s)
         return abs(location.offset) <= 0.5 * width
 

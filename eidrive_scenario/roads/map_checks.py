@@ -128,7 +128,7 @@ def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning
 
 
 def _extremes(lane: Lane, length: float) -> Iterator[float]:
-    """The width of a lane at the ends of each of its pieces, and where it turns in between [m]."""
+    """Yield the width of a lane at the ends of each of its pieces, and where it turns in between [m]."""
     pieces = lane.width.pieces
     ends = [*lane.width.starts[1:], length]
     for (start, a, b, c, d), end in zip(pieces, ends, strict=True):

@@ -39,7 +39,7 @@ class Strip(NamedTuple):
 
 
 def lane_strips(road: Road, section: LaneSection, cuts: Array) -> Iterator[Strip]:
-    """The marks of a lane section; `cuts` are the s at which solid lines may bend."""
+    """Yield the marks of a lane section; `cuts` are the s at which solid lines may bend."""
     for lane in section.lanes.values():
         if road.junction_id is not None and lane.type == "none" and lane.id:
             continue
@@ -70,7 +70,7 @@ def _mark_strips(
 
 
 def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float, float]]:
-    """The lines of a mark: offset from the lane's edge in t, width, length of dash and gap (0 for solid), first s."""
+    """Return the lines of a mark: offset from the lane's edge in t, width, length of dash and gap (0 for solid), first s."""
     lines = [
         (line.t_offset, line.width, line.length, line.space, line.s_offset)
         for line in mark.lines

@@ -50,7 +50,7 @@ class RoadNetwork(RoadAttributes):
 
     @classmethod
     def load(cls, path: str | Path) -> RoadNetwork:
-        """The network of an OpenDRIVE file. Raises RoadError with all findings.
+        """Return the network of an OpenDRIVE file. Raise RoadError with all findings.
 
         A network does not change: the runs of a campaign share it, and what was once worked out from it, as long as
         the file says the same.
@@ -59,7 +59,7 @@ class RoadNetwork(RoadAttributes):
 
     @classmethod
     def parse(cls, text: str | bytes, source: str = "<memory>") -> RoadNetwork:
-        """The network of an OpenDRIVE text. Raises RoadError."""
+        """Return the network of an OpenDRIVE text. Raise RoadError."""
         return cls(parse_road_map(text.encode() if isinstance(text, str) else text, source))
 
     @cached_property
@@ -112,15 +112,15 @@ class RoadNetwork(RoadAttributes):
         return x * cos + y * sin, y * cos - x * sin
 
     def road_pose_at(self, road_id: str, s: float, t: float = 0.0) -> Pose:
-        """The pose at road coordinates; heading of the reference line. Raises PositionError."""
+        """Return the pose at road coordinates; heading of the reference line. Raise PositionError."""
         return poses.road_pose_at(self.road(road_id), s, t)
 
     def lane_pose_at(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> Pose:
-        """The pose at a lane's center line plus offset; heading of the lane, along growing s. Raises PositionError."""
+        """Return the pose at a lane's center line plus offset; heading of the lane, along growing s. Raise PositionError."""
         return poses.lane_pose_at(self.road(road_id), lane_id, s, offset)
 
     def centers(self, places: Sequence[LaneLocation]) -> Array:
-        """(N, 3) points of the lanes' center lines at places [m], wherever across the lanes those are."""
+        """Return (N, 3) points of the lanes' center lines at places [m], wherever across the lanes those are."""
         tables = self.tables
         road = np.array([tables.index[place.road] for place in places], dtype=np.int64)
         s = np.array([place.s for place in places])
@@ -128,13 +128,13 @@ class RoadNetwork(RoadAttributes):
         return np.column_stack(tables.lane_poses(row, s, np.zeros(len(s)))[:3])
 
     def pose(self, location: LaneLocation) -> Pose:
-        """The pose at a lane location; heading of the lane in its driving direction."""
+        """Return the pose at a lane location; heading of the lane in its driving direction."""
         road = self.road(location.road)
         found = poses.lane_pose_at(road, location.lane, location.s, location.offset)
         return found if driving_direction(road, location.lane) > 0 else found.turned(np.pi)
 
     def road_pose(self, road_id: str, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
-        """`road_pose_at` over arrays, broadcast against each other. Raises PositionError."""
+        """Return `road_pose_at` over arrays, broadcast against each other. Raise PositionError."""
         self.road(road_id)
         s, t = np.broadcast_arrays(np.asarray(s, dtype=np.float64), np.asarray(t, dtype=np.float64))
         road = np.full(s.size, self.tables.index[road_id])
@@ -143,7 +143,7 @@ class RoadNetwork(RoadAttributes):
         return Poses(*(part.reshape(s.shape) for part in found))
 
     def lane_pose(self, road_id: str, lane_id: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
-        """`lane_pose_at` over arrays, broadcast against each other. Raises PositionError."""
+        """Return `lane_pose_at` over arrays, broadcast against each other. Raise PositionError."""
         self.road(road_id)
         lane, s, offset = np.broadcast_arrays(
             np.asarray(lane_id, dtype=np.int64),
@@ -158,13 +158,13 @@ class RoadNetwork(RoadAttributes):
     # The world to road and lane coordinates
 
     def locate(self, x: ArrayLike, y: ArrayLike, z: ArrayLike | None = None, reach: float = REACH) -> LaneLocations:
-        """Lane locations of points (N,); where roads lie above each other, z decides."""
+        """Return lane locations of points (N,); where roads lie above each other, z decides."""
         px, py = np.atleast_1d(np.asarray(x, dtype=np.float64)), np.atleast_1d(np.asarray(y, dtype=np.float64))
         pz = None if z is None else np.atleast_1d(np.asarray(z, dtype=np.float64))
         return self._locator.locate(px, py, pz, reach)
 
     def touched(self, x: Array, y: Array, z: Array | None = None) -> tuple[Integers, Array, Integers]:
-        """Every lane that lies beneath points (N,): lane rows of `tables`, s on their roads, and whose point it is.
+        """Return every lane that lies beneath points (N,): lane rows of `tables`, s on their roads, and whose point it is.
 
         Outside junctions that is one lane at most; in a junction, one for each connecting road beneath the point.
         """
@@ -173,7 +173,7 @@ class RoadNetwork(RoadAttributes):
     def locate_at(
         self, x: float, y: float, hint: LaneLocation | None = None, z: float | None = None, reach: float = REACH
     ) -> LaneLocation | None:
-        """The lane location of a point, None where no road is within reach.
+        """Return the lane location of a point, None if no road is within reach.
 
         With a hint (where it was before) the point stays on that road, or on what the road leads to, as long as it
         lies on one of their lanes; so something that crosses a junction stays on its own connecting road.
@@ -186,13 +186,13 @@ class RoadNetwork(RoadAttributes):
         return found.location(0)
 
     def location(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> LaneLocation:
-        """The lane location with these coordinates, its t filled in. Raises PositionError."""
+        """Return the lane location with these coordinates, its t filled in. Raise PositionError."""
         road = self.road(road_id)
         section, lane = poses.lane_at(road, lane_id, s)
         return LaneLocation(road_id, lane_id, s, offset, poses.lane_t(road, section, lane, s)[0] + offset)
 
     def road_location(self, road_id: str, s: float, t: float) -> LaneLocation:
-        """The lane location of road coordinates, beyond the edge in the outermost lane. Raises PositionError."""
+        """Return the lane location of road coordinates, beyond the edge in the outermost lane. Raise PositionError."""
         road = self.road(road_id)
         if not -poses.BEYOND <= s <= road.length + poses.BEYOND:
             raise poses.off_road(road, s)
@@ -211,10 +211,10 @@ class RoadNetwork(RoadAttributes):
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
-        """The place `distance` meters further along the lane in its driving direction (back where negative).
+        """Return the place `distance` meters further along the lane in its driving direction (backwards if negative).
 
         Through links and junctions; at a fork the route decides, else `choose(branches)`, else the straightest way is
-        taken. None where the lane ends, or the place where it does with `to_end`. `visit` says where on a route that
+        taken. None if the lane ends, or the place where it does with `to_end`. `visit` says where on a route that
         comes by several times (`Route.visit`).
         """
         return self.movement.advance(location, distance, route, choose, visit, to_end)
@@ -226,7 +226,7 @@ class RoadNetwork(RoadAttributes):
         via: Sequence[LaneLocation] = (),
         costs: Sequence[Cost | None] | None = None,
     ) -> Route:
-        """The cheapest way over the lanes from start to end. Raises RouteError if there is none.
+        """Return the cheapest way over the lanes from start to end. Raise RouteError if there is none.
 
         `costs` says for the way to each place of `via` and to the end what counts; None is the length, as everywhere
         without `costs`.
@@ -252,9 +252,9 @@ class RoadNetwork(RoadAttributes):
         return route.distance(a, b)
 
     def orientation(self, a: LaneLocation, b: LaneLocation) -> int | None:
-        """Return +1 where the s of b's road runs as that of a's road does, seen along the road, -1 where against it.
+        """Return +1 if the s of b's road runs as that of a's road does, seen along the road, -1 if against it.
 
-        None where no chain of roads joins them.
+        None if no chain of roads joins them.
         """
         found = self._distances.placed(a, b)
         return None if found is None else found[2]
@@ -263,7 +263,7 @@ class RoadNetwork(RoadAttributes):
         return assumed_speed(self.speed_limit(road, 0.5 * self.road(road).length))
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """The smallest rectangle around all lane centers: least x, least y, greatest x, greatest y [m]."""
+        """Return the smallest rectangle around all lane centers: least x, least y, greatest x, greatest y [m]."""
         points: Array = self._locator.sample_points
         low, high = points.min(axis=0), points.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])

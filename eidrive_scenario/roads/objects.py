@@ -28,7 +28,7 @@ class PlacedObject(NamedTuple):
 
 
 def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
-    """All objects, repeated ones once for each repetition."""
+    """Yield all objects, repeated ones once for each repetition."""
     for item in network.objects:
         if item.repeats:
             yield from _repeated(network, item)
@@ -39,7 +39,7 @@ def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
 
 
 def outlines(network: RoadNetwork, item: RoadObject) -> list[Array]:
-    """The ground that an object covers, as polygons (M, 3) in the world; its length and width where it has none."""
+    """Return the ground that an object covers, as polygons (M, 3) in the world; its length and width where it has none."""
     if item.outlines:
         return [_corners(network, item, outline) for outline in item.outlines if len(outline) >= 3]
     if item.length <= 0.0 or item.width <= 0.0:

@@ -17,7 +17,7 @@ MOST_UNLIKELY = 10.0
 
 
 def fastest(network: RoadNetwork) -> Cost:
-    """Seconds at the speed limits."""
+    """Return seconds at the speed limits."""
     known: dict[LaneKey, float] = {}
 
     def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
@@ -31,7 +31,7 @@ def fastest(network: RoadNetwork) -> Cost:
 
 
 def fewest_junctions(network: RoadNetwork) -> Cost:
-    """Each junction that is entered counts more than any length; among equals the shortest way."""
+    """Return each junction that is entered counts more than any length; among equals the shortest way."""
 
     def cost(one: LaneKey, other: LaneKey, data: Mapping[str, Any]) -> float:
         before, after = network.road(one.road).junction_id, network.road(other.road).junction_id
@@ -41,7 +41,7 @@ def fewest_junctions(network: RoadNetwork) -> Cost:
 
 
 def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
-    """Meters, each road's times a factor that the generator draws: now one way is the cheapest, now another."""
+    """Return meters, each road's times a factor that the generator draws: now one way is the cheapest, now another."""
     draws = generator.uniform(0.0, math.log(MOST_UNLIKELY), len(network.roads)).tolist()
     factors = {road: math.exp(draw) for road, draw in zip(network.roads, draws, strict=True)}
 

@@ -80,7 +80,7 @@ class _Part(NamedTuple):
 
 
 def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMesh]:
-    """All road surfaces and markings, one mesh per kind.
+    """Return all road surfaces and markings, one mesh per kind.
 
     `spacing` is the distance between the cross sections that are looked at [m]; those that lie within a centimeter of
     a straight surface are left out.
@@ -103,7 +103,7 @@ def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMe
 
 
 def cross_sections(network: RoadNetwork, road: Road, section: LaneSection, spacing: float) -> Array:
-    """The s at which a section is cut for drawing: both ends and whatever its curves need in between."""
+    """Return the s at which a section is cut for drawing: both ends and whatever its curves need in between."""
     count = max(int(np.ceil(section.length / spacing)), 1) + 1
     s = section.s + np.linspace(0.0, max(section.length - 1e-9, 0.0), count)
     left, right = (
@@ -187,7 +187,7 @@ def _points(network: RoadNetwork, road: Road, s: Array, t: Array) -> Array:
 
 
 def _ribbon(count: int) -> Integers:
-    """Triangles between two rows of `count` points, the second row numbered after the first."""
+    """Return triangles between two rows of `count` points, the second row numbered after the first."""
     i = np.arange(count - 1)
     return np.concatenate([np.column_stack([i, i + 1, i + count]), np.column_stack([i + 1, i + count + 1, i + count])])
 
@@ -213,7 +213,7 @@ def _strip_part(network: RoadNetwork, road: Road, strip: Strip) -> _Part:
 
 
 def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
-    """The ground of junctions between and under their connecting lanes."""
+    """Yield the ground of junctions between and under their connecting lanes."""
     for lines in edges.values():
         points = np.concatenate(lines)
         try:
@@ -230,7 +230,7 @@ def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
 
 
 def _upwards(vertices: Array, faces: Integers) -> Integers:
-    """The faces, each in the order that is counter-clockwise from above."""
+    """Return the faces, each in the order that is counter-clockwise from above."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     up = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     return np.where((up < 0.0)[:, None], faces[:, ::-1], faces)

@@ -76,11 +76,11 @@ class BackgroundTraffic:
         return self.fleet.names
 
     def spec(self, name: str) -> ActorSpec:
-        """The body of a car."""
+        """Return the body of a car."""
         return self.fleet.spec(name)
 
     def key(self, name: str) -> int:
-        """The number of the next instance of this traffic."""
+        """Return the number of the next instance of this traffic."""
         self._started[name] = self._started.get(name, 0) + 1
         return self._started[name]
 
@@ -120,15 +120,15 @@ class BackgroundTraffic:
         self.instances = [instance for instance in self.instances if instance.active]
 
     def positions(self, names: list[str]) -> tuple[Array, Array]:
-        """x and y of cars [m]."""
+        """Return x and y of cars [m]."""
         return self.fleet.positions(names)
 
     def sites(self, names: list[str]) -> SpawnSites:
-        """The places on lanes where cars are."""
+        """Return the places on lanes where cars are."""
         return SpawnSites.at(self.fleet.lanes, *self.fleet.places(names))
 
     def starting_speed(self, sites: SpawnSites, participant: Participant) -> Array:
-        """(K,) the speeds at which traffic usually passes places [m/s]."""
+        """Return (K,) the speeds at which traffic usually passes places [m/s]."""
         if participant.walks:
             return np.full(len(sites), WALKING)
         lanes = self.fleet.lanes

@@ -64,7 +64,7 @@ class Cars:
     specs: list[ActorSpec] = field(default_factory=list)
 
     def append(self, spec: ActorSpec, driver: IntelligentDriver, **values: float | bool) -> int:
-        """A new row; what is not given is 0, no, or no lane at all. Its index."""
+        """Return a new row; what is not given is 0, no, or no lane at all. Its index."""
         for entry in fields(self):
             column = getattr(self, entry.name)
             if isinstance(column, np.ndarray):

@@ -39,12 +39,12 @@ class Crossings:
         """For each lane in a junction, who holds it and how far its rear has come on it [m]."""
 
     def junction_lanes(self, row: int) -> list[int]:
-        """All lanes of the junction in which a lane lies."""
+        """Return all lanes of the junction in which a lane lies."""
         junction = self._lanes.roads.roads[self._lanes.keys[row].road].junction_id
         return [] if junction is None else self._by_junction.get(junction, [])
 
     def meeting(self, row: int) -> dict[int, bool]:
-        """The lanes that a lane through a junction meets; True where they only begin together."""
+        """Return the lanes that a lane through a junction meets; True if they only begin together."""
         known = self._meeting.get(row)
         if known is not None:
             return known
@@ -82,7 +82,7 @@ class Crossings:
         return dict(zip(inside.tolist(), pieces, strict=True)), low, high
 
     def free(self, row: int, name: str, blocked: set[int]) -> bool:
-        """True where `name` may have a lane: nobody holds, and nothing stands on, a lane that it meets."""
+        """Return True if `name` may have a lane: nobody holds, and nothing stands on, a lane that it meets."""
         for other, only_fork in self.meeting(row).items():
             if other in blocked:
                 return False
@@ -96,7 +96,7 @@ class Crossings:
         self.holders.setdefault(row, {})[name] = -np.inf
 
     def holds(self, name: str, row: int) -> bool:
-        """Whether `name` holds a lane."""
+        """Return whether `name` holds a lane."""
         return name in self.holders.get(row, ())
 
     def release(self, name: str, row: int) -> None:

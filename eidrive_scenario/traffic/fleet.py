@@ -76,7 +76,7 @@ class Fleet:
         return self._until < 1e-9
 
     def interval(self, dt: float) -> float:
-        """The time between two decisions in steps of dt [s]."""
+        """Return the time between two decisions in steps of dt [s]."""
         return max(round(REACT_EACH / dt), 1) * dt
 
     @property
@@ -109,16 +109,16 @@ class Fleet:
         return np.column_stack([x, y, poses[:, 2] + body[:, 2], body[:, 3:], poses[:, 3]])
 
     def spec(self, name: str) -> ActorSpec:
-        """The body of a car."""
+        """Return the body of a car."""
         return self._cars.specs[self._index[name]]
 
     def positions(self, names: Sequence[str]) -> tuple[Array, Array]:
-        """x and y of cars [m]."""
+        """Return x and y of cars [m]."""
         rows = [self._index[name] for name in names]
         return self.poses[rows, 0], self.poses[rows, 1]
 
     def places(self, names: Sequence[str]) -> tuple[NDArray[np.int64], Array]:
-        """Lane rows and progress of cars [m]."""
+        """Return lane rows and progress of cars [m]."""
         rows = [self._index[name] for name in names]
         return self._cars.row[rows], self._cars.progress[rows]
 
@@ -139,7 +139,7 @@ class Fleet:
     ) -> Placement:
         """Bring a car in at a lane's center line; without a desired speed it drives at the limit.
 
-        Raises PositionError for a lane that does not exist, ValueError for a name that is taken.
+        Raise PositionError for a lane that does not exist, ValueError for a name that is taken.
         """
         row, progress = self.lanes.of(location)
         return self.add_at(spec, row, progress, speed=speed, desired_speed=desired_speed, driver=driver)
@@ -156,7 +156,7 @@ class Fleet:
         factor: float = 1.0,
         fallback: float = FREE,
     ) -> Placement:
-        """`add`, by the lane's row and the progress along it.
+        """Return `add`, by the lane's row and the progress along it.
 
         factor    of the speed limit that the car keeps to;  fallback  its desired speed where there is no limit [m/s]
         """
@@ -277,7 +277,7 @@ class Fleet:
         return Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
 
     def _leaders(self, occupants: Occupants) -> Leaders:
-        """The leaders of all cars; of those that change lanes, the nearer one of both lanes.
+        """Return the leaders of all cars; of those that change lanes, the nearer one of both lanes.
 
         The end of a lane does not stop a car that is leaving it: only by driving on it gets out of that lane.
         """

@@ -44,7 +44,7 @@ class IntelligentDriver:
         return Drivers.of([self]).response(speed, desired_speed, gap, approach)
 
     def equilibrium_gap(self, speed: float, desired_speed: float) -> float:
-        """The gap at which a string of cars keeps one speed (equation 5 of the paper) [m]."""
+        """Return the gap at which a string of cars keeps one speed (equation 5 of the paper) [m]."""
         free: float = 1.0 - (speed / desired_speed) ** self.exponent
         return (self.standstill_gap + speed * self.time_gap) / float(np.sqrt(free))
 
@@ -95,7 +95,7 @@ class Drivers:
 
 
 def ballistic(speed: Array, acceleration: Array, dt: float) -> tuple[Array, Array]:
-    """Distance covered in dt and the speed after it; a car that brakes stands still and does not back up.
+    """Return distance covered in dt and the speed after it; a car that brakes stands still and does not back up.
 
     The second-order step of Treiber and Kanagaraj, Physica A 419 (2015) 183.
     """

@@ -115,7 +115,7 @@ class LaneChanges:
 
     @staticmethod
     def length(speed: Array) -> Array:
-        """Meters that a lane change takes at speeds (N,) [m/s]."""
+        """Return meters that a lane change takes at speeds (N,) [m/s]."""
         return np.maximum(speed * DURATION, SHORTEST)
 
     def begin(self, cars: Cars, index: int, target: int) -> None:

@@ -24,9 +24,9 @@ WALKABLE = frozenset(("sidewalk", "walking"))
 class TrafficLanes:
     """Lanes by the running numbers of `RoadNetwork.tables`; progress u runs from 0 to `length` in driving direction.
 
-    left, right   the neighbor of the same direction to which the marking lets cars change, -1 where there is none
+    left, right   the neighbor of the same direction to which the marking lets cars change, -1 if there is none
     beside_left, beside_right  the same, whatever the marking
-    onward, backward  the first lane that a lane leads to, and that leads to it, -1 where there is none
+    onward, backward  the first lane that a lane leads to, and that leads to it, -1 if there is none
     ends_at       progress at which a lane comes to an end while one beside it goes on, inf for all others
     """
 
@@ -98,7 +98,7 @@ class TrafficLanes:
                         self.left[one], self.right[two] = (two if outward else -1), (one if inward else -1)
 
     def _may_cross(self, one: int, two: int) -> tuple[bool, bool]:
-        """Whether the marking between neighbors, `one` left of `two` along s, lets cars from one to two, and back.
+        """Return whether the marking between neighbors, `one` left of `two` along s, lets cars from one to two, and back.
 
         It is the marking on the outer edge of the lane nearer to lane 0. `increase` lets cars change to the higher id.
         """
@@ -124,11 +124,11 @@ class TrafficLanes:
         return self._origin[row] + self.direction[row] * progress
 
     def progress(self, row: Integers, s: Array) -> Array:
-        """The progress at which lanes pass an s of their road."""
+        """Return the progress at which lanes pass an s of their road."""
         return (s - self._origin[row]) * self.direction[row]
 
     def width(self, row: Integers, progress: Array) -> Array:
-        """Width of lanes at a progress [m]."""
+        """Return the width of lanes at a progress [m]."""
         ds = self.s(row, progress) - self.tables.section_start[self.tables.lane_section[row]]
         return self.tables.width.value(row, ds)
 
@@ -145,7 +145,7 @@ class TrafficLanes:
         return int(row[0]), float(self.progress(row, s)[0])
 
     def chain(self, row: Integers, depth: int) -> Integers:
-        """(N, depth) lanes that follow each other from rows (N,) on, the first way at each fork; -1 beyond an end."""
+        """Return (N, depth) lanes that follow each other from rows (N,) on, the first way at each fork; -1 beyond an end."""
         chain = np.full((len(row), depth), -1)
         chain[:, 0] = row
         for d in range(1, depth):
@@ -154,15 +154,15 @@ class TrafficLanes:
         return chain
 
     def following(self, row: int) -> list[int]:
-        """The lanes of the same kind that traffic may enter at the end of a lane, in the order of the map."""
+        """Return the lanes of the same kind that traffic may enter at the end of a lane, in the order of the map."""
         return self._ways[row]
 
     def stretch(self, row: Integers, progress: Array) -> Array:
-        """Meters of path per meter of progress, at the lanes' center lines."""
+        """Return meters of path per meter of progress, at the lanes' center lines."""
         return self.tables.stretch(row, self.s(row, progress))
 
     def tightest(self, row: Integers) -> Array:
-        """The largest curvature of lanes [1/m], of any shape of rows."""
+        """Return the largest curvature of lanes [1/m], of any shape of rows."""
         found = self._tightest[row]
         if np.isnan(found).any():
             for fresh in np.unique(row[np.isnan(found)]).tolist():
@@ -176,7 +176,7 @@ class TrafficLanes:
         return found
 
     def limits(self, row: Integers, progress: Array) -> Array:
-        """The speed limits at places (N,) [m/s]; NaN where the map gives none, inf where it gives `no limit`."""
+        """Return the speed limits at places (N,) [m/s]; NaN where the map gives none, inf where it gives `no limit`."""
         found = self._limit[row]
         fresh = np.isnan(found) | self._varying[row]
         for n in np.flatnonzero(fresh):
@@ -187,7 +187,7 @@ class TrafficLanes:
         return np.where(found < 0.0, np.nan, found)
 
     def _limit_at(self, row: int, progress: float) -> float:
-        """The limit at one place, -1 where the map gives none."""
+        """Return the limit at one place, -1 if the map gives none."""
         key = self.keys[row]
         s = float(self.s(np.array([row]), np.array([progress]))[0])
         limit = self.roads.speed_limit(key.road, min(max(s, 0.0), self.roads.roads[key.road].length), key.lane)

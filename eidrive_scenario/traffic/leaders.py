@@ -50,7 +50,7 @@ class Occupants:
         return order, place[order]
 
     def without(self, owner: int) -> Occupants:
-        """Those that belong to somebody else."""
+        """Return those that belong to somebody else."""
         kept = self.owner != owner
         return Occupants(
             self.row[kept], self.key[kept], self.rear[kept], self.front[kept], self.speed[kept], self.owner[kept]
@@ -70,7 +70,7 @@ class Leaders:
         return cls(np.full(count, np.inf), np.zeros(count))
 
     def or_nearer(self, other: Leaders) -> Leaders:
-        """The nearer one of two, for each car."""
+        """Return the nearer one of two, for each car."""
         nearer = other.gap < self.gap
         return Leaders(np.where(nearer, other.gap, self.gap), np.where(nearer, other.speed, self.speed))
 
@@ -92,9 +92,9 @@ def find_leaders(
     occupants: Occupants,
     own: Integers | None = None,
 ) -> Leaders:
-    """The next occupant ahead of each car on its plan.
+    """Return the next occupant ahead of each car on its plan.
 
-    plans     (N, D) rows of the lanes that each car takes, its own first, -1 where the plan ends
+    plans     (N, D) rows of the lanes that each car takes, its own first, -1 if the plan ends
     progress  (N,) of the cars' reference points; front  (N,) distance from there to the front bumper [m]
     own       (N,) the cars' numbers in the fleet, 0, 1, 2, … where not given
     """
@@ -128,7 +128,7 @@ def find_leaders(
 def find_followers(
     lanes: TrafficLanes, row: Integers, progress: Array, rear: Array, occupants: Occupants, own: Integers
 ) -> Followers:
-    """The next occupant that moves behind places on lanes, on the lane itself and those that lead to it.
+    """Return the next occupant that moves behind places on lanes, on the lane itself and those that lead to it.
 
     row, progress  (N,) of the reference points; rear  (N,) distance from there to the rear bumper, negative [m]
     own  (N,) numbers in the fleet of those who ask
@@ -168,7 +168,7 @@ def no_occupants() -> Occupants:
 def obstacles(
     lanes: TrafficLanes, view: WorldView, own: frozenset[str], near: Array | None = None
 ) -> tuple[Occupants, set[int]]:
-    """The outlines of all actors not in `own`, on every lane that they touch, and the lanes of those that move.
+    """Return the outlines of all actors not in `own`, on every lane that they touch, and the lanes of those that move.
 
     In a junction, where roads lie over each other, an actor stands on all the lanes that pass beneath it.
     near  (K, 2) places [m]: actors further away from all of them than anybody looks do not count
@@ -198,6 +198,6 @@ def obstacles(
 
 
 def concatenate_occupants(*parts: Occupants) -> Occupants:
-    """All of them, as one."""
+    """Return all of them, as one."""
     names = ("row", "key", "rear", "front", "speed", "owner")
     return Occupants(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

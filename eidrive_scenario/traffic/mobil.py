@@ -43,7 +43,7 @@ class Prospect:
 
 
 def safe(changer: LaneChanger, prospect: Prospect) -> NDArray[np.bool_]:
-    """The safety criterion (equation 1): neither the new follower nor the car itself has to brake too hard."""
+    """Return the safety criterion (equation 1): neither the new follower nor the car itself has to brake too hard."""
     hardest = np.minimum(prospect.new_follower_after, prospect.own_after)
     return np.asarray(hardest >= -changer.safe_deceleration)
 

@@ -61,7 +61,7 @@ class Plans:
         return gone
 
     def desired_speeds(self, cars: Cars, begins: Array) -> Array:
-        """Each car's own speed or the limit, less before bends so that comfortable braking suffices (N,) [m/s].
+        """Return each car's own speed or the limit, less before bends so that comfortable braking suffices (N,) [m/s].
 
         begins  (N, D) how far ahead of each car the lanes of its plan begin [m]
         """

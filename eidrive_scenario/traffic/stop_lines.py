@@ -60,7 +60,7 @@ class StopLines:
         return found
 
     def closed(self) -> Occupants:
-        """The lines at which traffic has to stop now, as things that stand there."""
+        """Return the lines at which traffic has to stop now, as things that stand there."""
         shown = tuple(self._must_stop(signal) for signal in self._signals)
         if shown != self._shown:
             self._shown = shown
@@ -71,7 +71,7 @@ class StopLines:
         return self._closed
 
     def ahead(self, cars: Cars) -> Leaders:
-        """The lines at which cars have to stop, those left out that would have to brake too hard."""
+        """Return the lines at which cars have to stop, those left out that would have to brake too hard."""
         none = np.zeros(len(cars))
         lines = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, none, self.closed())
         late = cars.speed**2 > 2.0 * TOO_LATE * np.maximum(lines.gap, 0.0)

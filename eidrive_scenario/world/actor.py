@@ -66,7 +66,7 @@ class Placement:
     roll: float = 0.0
     speed: float = 0.0
     teleport: bool = False
-    """True where the actor jumps: velocity and acceleration then follow `speed`, not the distance covered."""
+    """True if the actor jumps: velocity and acceleration then follow `speed`, not the distance covered."""
     across: bool = True
     """False where it goes where it points, so that the velocity is the speed along the heading; else the distance
     covered in the step says how fast it moves across."""

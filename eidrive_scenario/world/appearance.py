@@ -46,8 +46,8 @@ class AnimationState:
 
     kind   component, user component, motion, file or user animation
     what   the part, the motion or the file, as the scenario names it
-    state  how far it has to go, in [0, 1]; None where the scenario does not say
-    since, duration  when it began, and how long it takes [s]; None where the scenario does not say
+    state  how far it has to go, in [0, 1]; None if the scenario does not say
+    since, duration  when it began, and how long it takes [s]; None if the scenario does not say
     gestures  of a pedestrian, as the standard names them
     """
 
@@ -70,7 +70,7 @@ class Visibility:
     named: Mapping[str, bool] = field(default_factory=dict)
 
     def by(self, sensor: str) -> bool:
-        """Whether the sensor of this name sees it."""
+        """Return whether the sensor of this name sees it."""
         return self.named.get(sensor, self.sensors)
 
 

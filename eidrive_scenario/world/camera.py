@@ -44,7 +44,7 @@ class Pinhole:
         return cls(width, height, width / 2 / math.tan(fov / 2), width / 2, height / 2, near, far)
 
     def finer(self, times: float) -> Pinhole:
-        """The same view on `times` as many pixels along each axis."""
+        """Return the same view on `times` as many pixels along each axis."""
         lens = (self.focal * times, self.center_x * times, self.center_y * times)
         return Pinhole(round(self.width * times), round(self.height * times), *lens, self.near, self.far)
 

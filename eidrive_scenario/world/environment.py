@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 
 @dataclass(frozen=True)
 class Environment:
-    """What holds now; None where the scenario has not said it.
+    """What holds now; None if the scenario has not said it.
 
     date_time      ISO 8601, of the instant `clock_since` [s] of the run
     clock_runs     False: the time of day stands still
@@ -41,7 +41,7 @@ class Environment:
     dome_image: str | None = None
 
     def clock(self, time: float) -> datetime | None:
-        """The date and time in the simulated world at a time of the run [s]."""
+        """Return the date and time in the simulated world at a time of the run [s]."""
         if self.date_time is None:
             return None
         start = datetime.fromisoformat(self.date_time)

@@ -90,7 +90,7 @@ class SignalHead(NamedTuple):
 
 
 def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[RoadObjectBody]:
-    """All furniture of a road network, posts of signals included, but for objects with some ids."""
+    """Yield all furniture of a road network, posts of signals included, but for objects with some ids."""
     for placed in placed_objects(roads):
         found = _fixture(roads, placed) if placed.object.id not in without else None
         if found is not None:
@@ -173,7 +173,7 @@ def _fixture(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | None:
 
 
 def _around(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:
-    """The box around an object's outlines: pose of the middle of its foot, length and width [m]."""
+    """Return the box around an object's outlines: pose of the middle of its foot, length and width [m]."""
     pose = placed.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)
     offset = np.concatenate(outlines(roads, placed.object))[:, :2] - (pose.x, pose.y)

@@ -66,11 +66,11 @@ _USUAL_SIZE: dict[str, Vector3] = {
 
 
 def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpec:
-    """The body of the actor `name`, as its Vehicle, Pedestrian or MiscObject says.
+    """Return the body of the actor `name`, as its Vehicle, Pedestrian or MiscObject says.
 
     Its shape is the Property `eidrive.shape`, or else follows from the category, the name and the 3D model; its paint
     is the Property `eidrive.color` (`#rrggbb`). A dimension of 0, with which some catalogs leave the box open, becomes
-    that of a common body of this shape. Raises ScenarioError with the line of the wrong Property or dimension.
+    that of a common body of this shape. Raise ScenarioError with the line of the wrong Property or dimension.
     """
     properties = {entry.name: entry.value for entry in entity.properties.property} if entity.properties else {}
     shape = _shape(entity, properties)
@@ -143,7 +143,7 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
 
 
 def _words(entity: Vehicle | MiscObject) -> set[str]:
-    """The words in the entity's name and 3D model, single and in neighboring pairs."""
+    """Return the words in the entity's name and 3D model, single and in neighboring pairs."""
     words: set[str] = set()
     for text in (entity.name, (entity.model3d or "").rsplit("/", 1)[-1]):
         parts = [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", text)]

@@ -85,7 +85,7 @@ class WorldView:
     unseen_by: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:
-        """The actors that the sensor of this name does not see, as the scenario says."""
+        """Return the actors that the sensor of this name does not see, as the scenario says."""
         return self.unseen_by.get(sensor, self.unseen)
 
     @cached_property
@@ -106,7 +106,7 @@ class WorldView:
         return [ActorState(*row) for row in np.concatenate(motion, axis=1).tolist()]
 
     def without(self, names: Collection[str]) -> WorldView:
-        """The same instant without some actors."""
+        """Return the same instant without some actors."""
         kept = [row for row, name in enumerate(self.names) if name not in names]
         if len(kept) == len(self.names):
             return self
@@ -126,7 +126,7 @@ class WorldView:
         return name in self.rows
 
     def row(self, name: str) -> int:
-        """The row of an actor. Raises KeyError, naming the actor, if it is not in the world."""
+        """Return the row of an actor. Raise KeyError, naming the actor, if it is not in the world."""
         try:
             return self.rows[name]
         except KeyError:

@@ -118,9 +118,9 @@ class Weather(Settings):
 
 
 def load_weather(source: str | Path, *, origin: str = "") -> Weather:
-    """A preset of the library by name, or a YAML file; `origin` says where the name was given, such as an option.
+    """Return a preset of the library by name, or a YAML file; `origin` says where the name was given, such as an option.
 
-    Raises SettingError with the file and line of each mistake, or with `origin` where there is no such file.
+    Raise SettingError with the file and line of each mistake, or with `origin` where there is no such file.
     """
     try:
         path = resolve("weather", source)

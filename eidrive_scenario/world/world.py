@@ -99,18 +99,18 @@ class World:
         return tuple(self._bodies)
 
     def spec(self, name: str) -> ActorSpec:
-        """The body of an actor. Raises SimulationError if it is not in the world."""
+        """Return the body of an actor. Raise SimulationError if it is not in the world."""
         return self._body(name).spec
 
     def add(self, spec: ActorSpec, placement: Placement, *, driven: bool = False) -> None:
-        """Bring an actor into the world. Raises SimulationError if one of that name is there already."""
+        """Bring an actor into the world. Raise SimulationError if one of that name is there already."""
         if spec.name in self._bodies:
             raise SimulationError(f"actor {spec.name!r} is in the world already")
         self._enter(spec, placement, driven)
         self._contacts = self._contacts + self._tracker.update(tuple(self._bodies.values()), {})
 
     def remove(self, name: str) -> None:
-        """Take an actor out of the world. Raises SimulationError if it is not there."""
+        """Take an actor out of the world. Raise SimulationError if it is not there."""
         self._body(name).remove()
         del self._bodies[name]
         self._driven.pop(name, None)
@@ -178,7 +178,7 @@ class World:
     def step(self, placements: Mapping[str, Placement], controls: Mapping[str, Control]) -> None:
         """Move on by one tick. A scripted actor without a placement stands, a driven one without control rolls.
 
-        A placement of a driven actor is a jump. Raises SimulationError for a name that is not in the world.
+        A placement of a driven actor is a jump. Raise SimulationError for a name that is not in the world.
         """
         for name in placements.keys() | controls.keys():
             self._body(name)
@@ -197,13 +197,13 @@ class World:
         self._contacts = self._tracker.update(self._actors.bodies, touches)
 
     def view(self) -> WorldView:
-        """The truth now; the same object until something changes."""
+        """Return the truth now; the same object until something changes."""
         if self._view is None:
             self._view = self._actors.view(self.time, self.tick, self._contacts, self._unseen, self._unseen_by)
         return self._view
 
     def distance(self, first: str, second: str) -> float:
-        """Distance between the boxes of two actors [m], 0 where they touch. Raises SimulationError."""
+        """Return distance between the boxes of two actors [m], 0 where they touch. Raise SimulationError."""
         return box_distance(self._body(first).box, self._body(second).box)
 
     def raycast(
@@ -222,7 +222,7 @@ class World:
         return cast_rays(self._client, begin, end, self._actors.row_of_handle, passed)
 
     def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
-        """The rows that rays meet first, as `raycast` has them: quicker for up to a thousand rays in plain numbers."""
+        """Return the rows that rays meet first, as `raycast` has them: quicker for up to a thousand rays in plain numbers."""
         self._refresh()
         if self._unseen:
             rows: list[int] = self.raycast(origins, targets).rows.tolist()
@@ -230,7 +230,7 @@ class World:
         return first_met(self._client, origins, targets, self._actors.row_in_list)
 
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
-        """(M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
+        """Return (M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
         clear: NDArray[np.bool_] = self.raycast(origin, targets, ignore).fraction >= 1.0
         return clear
 
@@ -256,7 +256,7 @@ class World:
         return CameraImage(rgb, seen.depth, seen.segmentation)
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
-        """The light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
+        """Return the light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
         if self._visuals is None:
             self._visuals = Visuals(self._scenery)
         rows = self.view().rows

@@ -43,7 +43,7 @@ class Locator:
         self._solid = cKDTree(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
 
     def locate(self, x: Array, y: Array, z: Array | None, reach: float = REACH) -> LaneLocations:
-        """Road and lane coordinates of points (N,); without z, the nearest in plan view counts."""
+        """Return road and lane coordinates of points (N,); without z, the nearest in plan view counts."""
         solid = z is not None and self._solid is not None
         tree = self._solid if solid and self._solid is not None else self._flat
         points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
@@ -62,7 +62,7 @@ class Locator:
         return found
 
     def _located(self, tree: cKDTree, points: Array, nearest: Integers, reach: float) -> LaneLocations:
-        """Points (N, 2), or (N, 3) where height counts, by the samples of `tree` that are nearest to them."""
+        """Return points (N, 2), or (N, 3) where height counts, by the samples of `tree` that are nearest to them."""
         x, y, z = points[:, 0], points[:, 1], points[:, 2] if points.shape[1] > 2 else None
         road, s = self._road[nearest], self._s[nearest]
         s, t, beyond = self._refine(road, s, x, y)
@@ -89,7 +89,7 @@ class Locator:
         )
 
     def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
-        """Every lane beneath points (N,): its row, s on its road, and the point's number."""
+        """Return every lane beneath points (N,): its row, s on its road, and the point's number."""
         found = self.locate(x, y, z)
         on = np.flatnonzero((found.road >= 0) & (found.outside <= 0.0))
         pair, other, guess = self._overlaps.beneath(found.road[on], x[on], y[on])
@@ -107,7 +107,7 @@ class Locator:
     def _compare(
         self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None, limit: Array
     ) -> tuple[Integers, Array, Array, Integers, Array]:
-        """The best of the roads of the nearest samples: the one whose surface is nearest.
+        """Return the best of the roads of the nearest samples: the one whose surface is nearest.
 
         limit  (N,) distance beyond which a sample's road cannot be nearer than what is known already [m]
         """
@@ -162,13 +162,13 @@ class Locator:
 
 
 def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:
-    """The columns of LaneLocations for places that no road is near."""
+    """Return the columns of LaneLocations for places that no road is near."""
     s, t, offset, heading = np.zeros((4, count))
     return np.full(count, -1), np.zeros(count, dtype=np.int64), s, t, offset, heading, np.full(count, np.inf)
 
 
 def _samples(tables: RoadTables) -> tuple[Integers, Array]:
-    """Lane rows and s of the samples: along every lane that is not narrow, and along the widest of each section."""
+    """Return lane rows and s of the samples: along every lane that is not narrow, and along the widest of each section."""
     lanes = np.flatnonzero(tables.lane_id != 0)
     section = tables.lane_section[lanes]
     length = tables.section_length[section]

@@ -21,7 +21,7 @@ per meter of s."""
 
 
 def road_pose_at(road: Road, s: float, t: float) -> Pose:
-    """The pose at road coordinates; its heading is that of the reference line. Raises PositionError."""
+    """Return the pose at road coordinates; its heading is that of the reference line. Raise PositionError."""
     if not -BEYOND <= s <= road.length + BEYOND:
         raise off_road(road, s)
     x, y, h, _, _ = road.reference.at(s)
@@ -84,9 +84,9 @@ def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: f
 
 
 def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pose:
-    """The pose at a lane's center line plus `offset`; heading and pitch are the lane's, in the direction of growing s.
+    """Return the pose at a lane's center line plus `offset`; heading and pitch are the lane's, in the direction of growing s.
 
-    A lane that the map lifts (a sidewalk) is higher than the road beneath it. Raises PositionError.
+    A lane that the map lifts (a sidewalk) is higher than the road beneath it. Raise PositionError.
     """
     section, lane = lane_at(road, lane_id, s)
     t, sideways = lane_t(road, section, lane, s)
@@ -139,7 +139,7 @@ def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[floa
 
 
 def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
-    """The lane with this id at s. Raises PositionError if the road is shorter, or has no such lane there."""
+    """Return the lane with this id at s. Raise PositionError if the road is shorter, or has no such lane there."""
     if not -BEYOND <= s <= road.length + BEYOND:
         raise off_road(road, s)
     section = road.section_at(s)
@@ -153,7 +153,7 @@ def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
 
 
 def lane_beside(road: Road, s: float, t: float) -> tuple[LaneSection, Lane, float]:
-    """The lane at road coordinates and the distance from the road's edge (0 on the road); beyond it, the last lane."""
+    """Return the lane at road coordinates and the distance from the road's edge (0 on the road); beyond it, the last lane."""
     section = road.section_at(s)
     offset = t - road.lane_offset.value(s)
     ds = s - section.s
@@ -173,7 +173,7 @@ def lane_beside(road: Road, s: float, t: float) -> tuple[LaneSection, Lane, floa
 
 
 def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, float]:
-    """Road coordinates s, t of a point, searched from a first guess, and how far it lies beyond an end of the road.
+    """Return road coordinates s, t of a point, searched from a first guess, and how far it lies beyond an end of the road.
 
     Newton's method on the distance to the reference line.
     """
@@ -201,12 +201,12 @@ def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, flo
 
 
 def off_road(road: Road, s: float) -> PositionError:
-    """The error for a place beyond the ends of a road."""
+    """Return the error for a place beyond the ends of a road."""
     return PositionError(
         Diagnostic(f"s = {s:g} m is not on road {road.id!r}", f"the road runs from 0 to {road.length:g} m")
     )
 
 
 def unknown_road(number: str, known: list[str]) -> PositionError:
-    """The error for a road that does not exist."""
+    """Return the error for a road that does not exist."""
     return PositionError(Diagnostic(f"there is no road {number!r}", suggestion(number, known)))

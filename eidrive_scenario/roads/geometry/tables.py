@@ -77,7 +77,7 @@ class RoadTables:
         return np.maximum(found, first)
 
     def lane_row(self, road: Integers, s: Array, lane: Integers) -> Integers:
-        """Running number of lanes by their id (N,) at s (N,). Raises PositionError for one that does not exist."""
+        """Running number of lanes by their id (N,) at s (N,). Raise PositionError for one that does not exist."""
         section = self.section_of(road, s)
         left, right = self.left_count[section], self.right_count[section]
         row = self.first_lane[section] + np.where(lane >= 0, np.minimum(lane, left), left + np.minimum(-lane, right))
@@ -96,7 +96,7 @@ class RoadTables:
         return np.asarray(row, dtype=np.int64)
 
     def row_of(self, key: LaneKey) -> int:
-        """Running number of the lane of a lane section. Raises KeyError if there is none."""
+        """Running number of the lane of a lane section. Raise KeyError if there is none."""
         section = self.first_section[self.index[key.road]] + key.section
         first = int(self.first_lane[section])
         for row in range(first, first + int(self.left_count[section] + self.right_count[section]) + 1):
@@ -105,7 +105,7 @@ class RoadTables:
         raise KeyError(key)
 
     def check(self, road: Integers, s: Array) -> None:
-        """Raises PositionError for the first place beyond the ends of its road."""
+        """Raise PositionError for the first place beyond the ends of its road."""
         wrong = np.flatnonzero((s < -BEYOND) | (s > self.length[road] + BEYOND))
         if wrong.size:
             first = wrong[0]
@@ -160,7 +160,7 @@ class RoadTables:
     def _banked_tangent(
         self, road: Integers, s: Array, t: Array, sideways: Array, curvature: Array, speed: Array
     ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-        """`poses.banked_tangent` over arrays."""
+        """Return `poses.banked_tangent` over arrays."""
         z, slope, bend = self.elevation.to_second_order(road, s)
         roll, twist = self.superelevation.value_and_slope(road, s)
         sin, cos = np.sin(roll), np.cos(roll)
@@ -183,14 +183,14 @@ class RoadTables:
         return self._banked_tangent(road, s, t, np.zeros_like(s), curvature, speed)[3]
 
     def stretch(self, row: Integers, s: Array) -> Array:
-        """Meters of path per meter of s along lanes' center lines, in plan view."""
+        """Return meters of path per meter of s along lanes' center lines, in plan view."""
         t, slope = self.lane_t(row, s)
         road = self.section_road[self.lane_section[row]]
         curvature, speed = self.curves.bend(road, s)
         return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), LEAST_STRETCH))
 
     def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:
-        """All lanes with their running numbers."""
+        """Yield all lanes with their running numbers."""
         for row, (section, lane) in enumerate(zip(self.lane_section.tolist(), self.lane_id.tolist(), strict=True)):
             road = int(self.section_road[section])
             yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row

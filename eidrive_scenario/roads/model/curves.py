@@ -56,10 +56,10 @@ class Curve(ABC):
 
     @abstractmethod
     def at(self, ds: float) -> CurvePoint:
-        """The point `ds` meters behind the start."""
+        """Return the point `ds` meters behind the start."""
 
     def bend(self, ds: float) -> tuple[float, float]:
-        """Curvature and meters of path per meter of s there: `at` without the place."""
+        """Return the curvature and meters of path per meter of s there: `at` without the place."""
         point = self.at(ds)
         return point.curvature, point.speed
 
@@ -160,7 +160,7 @@ class Cubic(Curve):
 def spiral(
     s: float, x: float, y: float, h: float, length: float, start: float, end: float, line: int | None = None
 ) -> Curve:
-    """The curve whose curvature runs linearly from `start` to `end` [1/m]; an arc where it hardly changes."""
+    """Return the curve whose curvature runs linearly from `start` to `end` [1/m]; an arc where it hardly changes."""
     rate = (end - start) / length
     if rate == 0.0 or max(start * start, end * end) / (2.0 * abs(rate)) > FLAT_PHASE:
         return Arc(s, x, y, h, length, 0.5 * (start + end), line=line)
@@ -170,7 +170,7 @@ def spiral(
 def poly3(
     s: float, x: float, y: float, h: float, length: float, v: tuple[float, float, float, float], line: int | None = None
 ) -> list[Cubic]:
-    """The curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
+    """Return the curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
 
     The arc length is integrated by Gauss-Legendre quadrature; each cubic meets the curve's points and tangents at both
     of its ends (Hermite), so the error falls with the fourth power of its length and stays far below a millimeter.
@@ -224,12 +224,12 @@ class ReferenceLine:
         self.length = length
 
     def at(self, s: float) -> CurvePoint:
-        """The point at s [m]; the first and last curve go on beyond the ends."""
+        """Return the point at s [m]; the first and last curve go on beyond the ends."""
         curve = self.curves[bisect_right(self.starts, s, 1) - 1]
         return curve.at(s - curve.s)
 
     def ahead(self, s: float, direction: int) -> tuple[Curve, float]:
-        """The curve on which one goes on from s, with s growing (+1) or falling (-1), and to which s it holds [m]."""
+        """Return the curve on which one goes on from s, with s growing (+1) or falling (-1), and to which s it holds [m]."""
         starts = self.starts
         index = bisect_right(starts, s, 1) - 1
         if direction > 0:
@@ -239,7 +239,7 @@ class ReferenceLine:
         return self.curves[index], starts[index] if index > 0 else -math.inf
 
     def bend(self, s: float) -> tuple[float, float]:
-        """Curvature [1/m] and meters of path per meter of s at s [m]."""
+        """Return the curvature [1/m] and meters of path per meter of s at s [m]."""
         curve = self.curves[bisect_right(self.starts, s, 1) - 1]
         return curve.bend(s - curve.s)
 
@@ -283,7 +283,7 @@ class CurveTable:
         return self._x[curve] + cos * u - sin * v, self._y[curve] + sin * u + cos * v, h + turn, curvature, speed
 
     def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
-        """Curvature and meters of path per meter of s at s (N,) of lines (N,): `at` without the places."""
+        """Return the curvature and meters of path per meter of s at s (N,) of lines (N,): `at` without the places."""
         curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
         ds = s - self._starts[curve]
         curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)

@@ -29,7 +29,7 @@ class Pose(NamedTuple):
     r: float
 
     def turned(self, angle: float) -> Pose:
-        """The pose of something that stands on the same spot of the same surface, turned left by `angle` [rad].
+        """Return the pose of something that stands on the same spot of the same surface, turned left by `angle` [rad].
 
         Pitch and roll follow: what climbs in one direction descends in the other.
         """
@@ -85,7 +85,7 @@ class LaneKey(NamedTuple):
 class LaneLocations:
     """Places in lane coordinates, as arrays of one shape (N,). Without a road within reach, only road and lane count.
 
-    road      index into `roads`, -1 where no road is within reach
+    road      index into `roads`, -1 if no road is within reach
     lane      lane id; 0 where no road is within reach
     s, t      road coordinates [m]; offset  from the lane's center line, positive in the direction of t [m]
     heading   of the reference line at s [rad]
@@ -103,11 +103,11 @@ class LaneLocations:
 
     @property
     def found(self) -> NDArray[np.bool_]:
-        """True where a road is within reach."""
+        """True if a road is within reach."""
         return self.road >= 0
 
     def location(self, index: int) -> LaneLocation | None:
-        """One of them, None where no road is within reach."""
+        """Return one of them, None if no road is within reach."""
         road = int(self.road[index])
         if road < 0:
             return None

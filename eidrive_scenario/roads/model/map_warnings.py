@@ -58,7 +58,7 @@ class MapWarning(NamedTuple):
 
 
 def group_map_warnings(flaws: Iterable[MapWarning], source: str) -> tuple[Diagnostic, ...]:
-    """One finding for each kind of flaw, with its rule of `eidrive check`."""
+    """Return one finding for each kind of flaw, with its rule of `eidrive check`."""
     kinds: dict[tuple[MapRule, str], list[MapWarning]] = {}
     for flaw in flaws:
         kinds.setdefault((flaw.rule, flaw.kind), []).append(flaw)

@@ -34,7 +34,7 @@ class Polynomials:
 
     @classmethod
     def constant(cls, value: float) -> Polynomials:
-        """The function that is `value` everywhere."""
+        """Return the function that is `value` everywhere."""
         return cls([(0.0, value, 0.0, 0.0, 0.0)])
 
     @property
@@ -48,7 +48,7 @@ class Polynomials:
         return self._constant is not None
 
     def value(self, s: float) -> float:
-        """The function at s."""
+        """Return the function at s."""
         if self._constant is not None:
             return self._constant
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
@@ -56,7 +56,7 @@ class Polynomials:
         return a + ds * (b + ds * (c + ds * d))
 
     def value_and_slope(self, s: float) -> tuple[float, float]:
-        """The function and its derivative at s."""
+        """Return the function and its derivative at s."""
         if self._constant is not None:
             return self._constant, 0.0
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
@@ -69,7 +69,7 @@ class Polynomials:
         return value, slope, 2.0 * half_bend
 
     def coefficients_at(self, s: float) -> tuple[float, float, float, float]:
-        """The coefficients of the function as seen from s: of the same polynomial with ds counted from s."""
+        """Return the coefficients of the function as seen from s: of the same polynomial with ds counted from s."""
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
         return (
@@ -80,13 +80,13 @@ class Polynomials:
         )
 
     def shifted(self, origin: float) -> Polynomials:
-        """The same function with s counted from `origin`; what lies before it is dropped."""
+        """Return the same function with s counted from `origin`; what lies before it is dropped."""
         first = (0.0, *self.coefficients_at(origin))
         return Polynomials([first, *((p[0] - origin, *p[1:]) for p in self.pieces if p[0] > origin)])
 
 
 def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:
-    """The sum of factor times function, exactly, over the union of their pieces."""
+    """Return the sum of factor times function, exactly, over the union of their pieces."""
     starts = sorted({start for _, function in terms for start in function.starts})
     pieces: list[Piece] = []
     for start in starts:
@@ -130,7 +130,7 @@ class PolynomialTable:
         return found
 
     def value(self, function: Integers, s: Array) -> Array:
-        """The functions number `function` (N,) at s (N,)."""
+        """Return the functions number `function` (N,) at s (N,)."""
         piece = self._piece(function, s)
         if self._constant:
             return self._a[piece]
@@ -138,7 +138,7 @@ class PolynomialTable:
         return np.asarray(self._a[piece] + ds * (self._b[piece] + ds * (self._c[piece] + ds * self._d[piece])))
 
     def value_and_slope(self, function: Integers, s: Array) -> tuple[Array, Array]:
-        """The functions and their derivatives."""
+        """Return the functions and their derivatives."""
         piece = self._piece(function, s)
         if self._constant:
             return self._a[piece], np.zeros(piece.shape)

@@ -110,7 +110,7 @@ class Lane:
 
     @property
     def drivable(self) -> bool:
-        """True where cars drive."""
+        """True if cars drive."""
         return self.type in DRIVABLE
 
 
@@ -141,7 +141,7 @@ class RoadLink:
 
 @dataclass(frozen=True)
 class RoadType:
-    """The kind of road from s on, with its speed limit [m/s]; None where none is given, inf for no limit."""
+    """The kind of road from s on, with its speed limit [m/s]; None if none is given, inf for no limit."""
 
     s: float
     type: str
@@ -170,7 +170,7 @@ class Road:
 
     @cached_property
     def directions(self) -> Mapping[int, int]:
-        """By lane id, +1 where traffic of the lane drives in the direction of s, -1 where against it; +1 for lane 0."""
+        """By lane id, +1 if traffic of the lane drives in the direction of s, -1 if against it; +1 for lane 0."""
         found = {0: 1}
         for section in self.sections:
             for number, lane in section.lanes.items():
@@ -179,7 +179,7 @@ class Road:
         return found
 
     def section_at(self, s: float) -> LaneSection:
-        """The lane section at s."""
+        """Return the lane section at s."""
         return self.sections[bisect_right(self.section_starts, s, 1) - 1]
 
 

@@ -36,13 +36,13 @@ _FLASHES = frozenset({"flashing", "flash", "blinking", "blink"})
 
 
 def lamp_colors(signal: Signal) -> tuple[str, ...]:
-    """The lamps of a traffic light, from top to bottom; none for a sign."""
+    """Return the lamps of a traffic light, from top to bottom; none for a sign."""
     return _TYPES.get(signal.type, USUAL) if signal.dynamic else ()
 
 
 @lru_cache(maxsize=1024)
 def lamps(state: str, colors: tuple[str, ...] = USUAL) -> tuple[tuple[str, str], ...]:
-    """Color and mode (on, off, flashing) of each lamp in a state, from top to bottom.
+    """Return the color and mode (on, off, flashing) of each lamp in a state, from top to bottom.
 
     A state that lists another number of lamps than the light is known to have is believed. A state that is not
     understood leaves the lamps dark.
@@ -63,20 +63,20 @@ def lit(state: str, colors: tuple[str, ...], time: float) -> tuple[bool, ...]:
 
 
 def must_stop(state: str, colors: tuple[str, ...] = USUAL) -> bool:
-    """Whether a light in this state tells traffic to stop: red, or yellow alone, unless the yellow flashes."""
+    """Return whether a light in this state tells traffic to stop: red, or yellow alone, unless the yellow flashes."""
     shown = dict(lamps(state, colors))
     red, yellow, green = (shown.get(color, OFF) for color in (RED, YELLOW, GREEN))
     return red != OFF or (yellow == ON and green == OFF)
 
 
 def _listed(state: str) -> list[str] | None:
-    """The modes of a list of lamps, None if the state is no such list."""
+    """Return the modes of a list of lamps, None if the state is no such list."""
     words = [word.strip().lower() for word in re.split("[;,]", state)]
     return [_MODES[word] for word in words] if all(word in _MODES for word in words) else None
 
 
 def _named(state: str) -> dict[str, str]:
-    """The lamps that a state in words lights, with their mode."""
+    """Return the lamps that a state in words lights, with their mode."""
     found: dict[str, str] = {}
     for part in re.split("[;,]", state):
         words = [word.lower() for word in re.findall("[A-Z]+(?![a-z])|[A-Z]?[a-z]+", part)]

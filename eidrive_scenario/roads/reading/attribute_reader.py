@@ -38,7 +38,7 @@ class AttributeReader:
         self.append_diagnostic(Diagnostic(message, hint, self.source, line_of(element)))
 
     def append_diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Remember a problem. Raises RoadError with all of them once there are too many."""
+        """Remember a problem. Raise RoadError with all of them once there are too many."""
         self.errors.append(diagnostic)
         if len(self.errors) >= MOST:
             last = Diagnostic(f"reading ends after {MOST} errors", "", self.source, diagnostic.line)
@@ -63,7 +63,7 @@ class AttributeReader:
     @overload
     def number(self, element: etree._Element, name: str, default: None) -> float | None: ...
     def number(self, element: etree._Element, name: str, default: float | None = math.nan) -> float | None:
-        """A number up to LARGEST. Missing without a default, or not such a number, is a problem and gives 0."""
+        """Return a number up to LARGEST. Missing without a default, or not such a number, is a problem and gives 0."""
         text = element.get(name)
         if text is None:
             if default is not None and math.isnan(default):
@@ -94,7 +94,7 @@ class AttributeReader:
         self.report_warning(element, ROAD_MARK, "road marks that are not complete", message, hint)
 
     def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
-        """A piece of a cubic: its start and a, b, c, d."""
+        """Return a piece of a cubic: its start and a, b, c, d."""
         return (
             self.number(element, start),
             self.number(element, "a"),
@@ -104,7 +104,7 @@ class AttributeReader:
         )
 
     def text(self, element: etree._Element, name: str, default: str | None = None) -> str:
-        """A text. Missing without a default is a problem and gives ''."""
+        """Return a text. Missing without a default is a problem and gives ''."""
         text = element.get(name)
         if text is not None:
             return text
@@ -114,7 +114,7 @@ class AttributeReader:
         return default
 
     def integer(self, element: etree._Element, name: str) -> int:
-        """A whole number. Missing, or not one, is a problem and gives 0."""
+        """Return a whole number. Missing, or not one, is a problem and gives 0."""
         text = element.get(name)
         if text is None:
             self._missing(element, name)
@@ -129,7 +129,7 @@ class AttributeReader:
         return 0
 
     def contact(self, element: etree._Element, name: str) -> Literal["start", "end"] | None:
-        """Which end of a road; None where the attribute is missing."""
+        """Which end of a road; None if the attribute is missing."""
         text = element.get(name)
         if text == "start":
             return "start"

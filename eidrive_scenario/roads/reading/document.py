@@ -35,7 +35,7 @@ LIMITS = XmlLimits(max_bytes=256 * MIB, max_nodes=4_000_000)
 
 
 def read_road_text(path: Path) -> bytes:
-    """The text of an OpenDRIVE file. Raises RoadError if it cannot be read."""
+    """Return the text of an OpenDRIVE file. Raise RoadError if it cannot be read."""
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
@@ -44,7 +44,7 @@ def read_road_text(path: Path) -> bytes:
 
 
 def parse_road_map(text: bytes, source: str) -> RoadMap:
-    """OpenDRIVE; `source` names it in errors. Raises RoadError with every finding, its line and what would be right."""
+    """OpenDRIVE; `source` names it in errors. Raise RoadError with every finding, its line and what would be right."""
     root = _parse(text, source)
     collector = AttributeReader(source)
     elements = [(collector.text(element, "id"), element) for element in root.iterfind("road")]
@@ -75,7 +75,7 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
 
 
 def _parse(text: bytes, source: str) -> etree._Element:
-    """The root element, without namespaces."""
+    """Return the root element, without namespaces."""
     root = parse_untrusted(text, source, LIMITS, RoadError, remove_comments=True)
     if root.tag.startswith("{"):
         for element in root.iter():
@@ -210,7 +210,7 @@ def _read_junction(element: etree._Element, roads: dict[str, Road], collector: A
 
 
 def _ends_at(road: Road, junction: str) -> bool:
-    """Whether an end of the road lies at the junction; what a virtual one joins in between is no way."""
+    """Return whether an end of the road lies at the junction; what a virtual one joins in between is no way."""
     ends = (road.predecessor, road.successor)
     return any(link is not None and (link.element_type, link.element_id) == ("junction", junction) for link in ends)
 
@@ -239,7 +239,7 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], collector:
 def _with_sound_links(
     road: Road, roads: dict[str, Road], junctions: dict[str, Junction], collector: AttributeReader
 ) -> Road:
-    """The road, which ends where it links to a junction that does not exist: SUMO writes dead ends like that."""
+    """Return the road, which ends where it links to a junction that does not exist: SUMO writes dead ends like that."""
 
     def sound(link: RoadLink | None) -> RoadLink | None:
         known = {} if link is None else roads if link.element_type == "road" else junctions

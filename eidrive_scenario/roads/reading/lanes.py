@@ -24,7 +24,7 @@ CENTER = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, center=ZERO
 
 
 def read_speed(element: etree._Element, collector: AttributeReader) -> float | None:
-    """The limit of a <speed> in m/s; inf for 'no limit', None for 'undefined'."""
+    """Return the limit of a <speed> in m/s; inf for 'no limit', None for 'undefined'."""
     text = collector.text(element, "max")
     if text in ("no limit", "undefined"):
         return math.inf if text == "no limit" else None
@@ -35,14 +35,14 @@ def read_speed(element: etree._Element, collector: AttributeReader) -> float | N
 
 
 def read_lane_offset(lanes: etree._Element, collector: AttributeReader) -> Polynomials:
-    """The distance of lane 0 from the reference line."""
+    """Return the distance of lane 0 from the reference line."""
     return Polynomials(collector.polynomial(element, "s") for element in lanes.iterfind("laneOffset"))
 
 
 def read_sections(
     lanes: etree._Element, length: float, lane_offset: Polynomials, collector: AttributeReader
 ) -> tuple[LaneSection, ...]:
-    """The lane sections of a road in the order of s; a section of no length is left out."""
+    """Return the lane sections of a road in the order of s; a section of no length is left out."""
     found = sorted(
         ((min(max(collector.number(element, "s"), 0.0), length), element) for element in lanes.iterfind("laneSection")),
         key=lambda pair: pair[0],
@@ -205,7 +205,7 @@ def _lane(
 def _read_width(
     element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, collector: AttributeReader
 ) -> tuple[Polynomials, float]:
-    """Width over ds, and the ds from which on the file gives it.
+    """Return the width over ds, and the ds from which on the file gives it.
 
     A <border> counts from the reference line; <width> wins where both are given (clause 11.7).
     """
@@ -247,7 +247,7 @@ def _read_marks(element: etree._Element, begin: float, collector: AttributeReade
 
 
 def _read_line(line: etree._Element, usual: float, collector: AttributeReader) -> RoadMarkLine | None:
-    """A line of a road mark; None where its dashes are not given, as the type of the mark then says how it looks."""
+    """Return a line of a road mark; None if its dashes are not given, as the type of the mark then says how it looks."""
     length, space = (collector.mark_number(line, name, None) for name in ("length", "space"))
     missing = [name for name in ("length", "space") if line.get(name) is None]
     if missing:

@@ -33,7 +33,7 @@ FURTHEST = 1e6
 def read_signals(
     elements: list[tuple[str, etree._Element]], roads: Mapping[str, Road], collector: AttributeReader
 ) -> dict[str, Signal]:
-    """The signals of all roads by id, with the references that other roads make to them.
+    """Return the signals of all roads by id, with the references that other roads make to them.
 
     Some maps give one id to several signals: the second of them is found under 'id#2', and so on.
     """
@@ -115,7 +115,7 @@ def read_controllers(
 
 
 def read_objects(road: str, element: etree._Element, collector: AttributeReader) -> list[RoadObject]:
-    """The objects of one road."""
+    """Return the objects of one road."""
     return [_read_object(road, item, collector) for item in element.iterfind("objects/object")]
 
 

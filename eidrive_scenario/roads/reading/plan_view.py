@@ -22,7 +22,7 @@ SHORTEST = 1e-9
 
 
 def read_reference_line(road: etree._Element, length: float, collector: AttributeReader) -> ReferenceLine:
-    """The reference line of a <road>.
+    """Return the reference line of a <road>.
 
     Its length is that of the geometry where the road states one that differs by more than 1 %.
     """

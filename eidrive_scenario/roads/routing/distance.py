@@ -29,13 +29,13 @@ class RoadDistances:
     def between(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float] | None:
         """How far b lies ahead of a (behind where negative) and to its left, seen in the traffic direction of a's lane.
 
-        Along the reference lines of the chain of roads that `by` asks for [m]. None where no chain of roads joins them.
+        Along the reference lines of the chain of roads that `by` asks for [m]. None if no chain of roads joins them.
         """
         found = self.placed(a, b, by)
         return None if found is None else found[:2]
 
     def placed(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float, int] | None:
-        """Return `between`, and +1 where the s of both roads runs the same way along the chain, else -1."""
+        """Return `between`, and +1 if the s of both roads runs the same way along the chain, else -1."""
         direction = driving_direction(self._roads[a.road], a.lane)
         if a.road == b.road:
             return (b.s - a.s) * direction, (b.t - a.t) * direction, 1
@@ -63,7 +63,7 @@ class RoadDistances:
         return JUNCTION_COST if by == "leastIntersections" and enters else 0.0
 
     def _from(self, road: str, direction: int, by: Chain) -> dict[str, tuple[float, float, int]]:
-        """For each road reached by leaving `road` in `direction`: cost and meters between, and direction entered."""
+        """Return for each road reached by leaving `road` in `direction`: cost and meters between, and direction entered."""
         known = self._found.get((road, direction, by))
         if known is not None:
             return known

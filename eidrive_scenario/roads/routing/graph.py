@@ -90,7 +90,7 @@ def _measure(graph: LaneGraph, tables: RoadTables, directions: Mapping[tuple[str
 
 
 def _neighbors(section: LaneSection) -> Iterator[tuple[int, int]]:
-    """Pairs of drivable lanes side by side, across lane 0 too."""
+    """Yield pairs of drivable lanes side by side, across lane 0 too."""
     lanes = [lane for number, lane in section.lanes.items() if number]
     for one, two in pairwise(lanes):
         if _usable(one, section) and _usable(two, section):
@@ -104,9 +104,9 @@ def _usable(lane: Lane, section: LaneSection) -> bool:
 def find_lanes(
     graph: LaneGraph, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation, cost: Cost | None = None
 ) -> tuple[LaneKey, ...]:
-    """The lanes of the cheapest way: by A*, the straight line to the end as the bound; by Dijkstra with a `cost`.
+    """Return the lanes of the cheapest way: by A*, the straight line to the end as the bound; by Dijkstra with a `cost`.
 
-    Raises RouteError.
+    Raise RouteError.
     """
     source, target = _key(roads, start), _key(roads, end)
     goal = graph.nodes[target]["end"] if target in graph else (0.0, 0.0)
@@ -138,7 +138,7 @@ def find_lanes(
 
 
 def _started(graph: LaneGraph, source: LaneKey) -> tuple[LaneGraph, LaneKey]:
-    """A graph with a second copy of the source's section: one that can be left, but not yet reached as a target."""
+    """Return a graph with a second copy of the source's section: one that can be left, but not yet reached as a target."""
     copy: LaneGraph = LaneGraph(graph)
     group = [key for key in graph if key[:2] == source[:2]]
 

@@ -14,14 +14,14 @@ from eidrive_scenario.roads.model.road_map import Connection, Contact, Junction,
 
 
 class LaneEnd(NamedTuple):
-    """An end of a lane of a lane section; side +1 is where s ends, -1 where it starts."""
+    """An end of a lane of a lane section; side +1 is where s ends, -1 if it starts."""
 
     lane: LaneKey
     side: int
 
 
 class RoadEnd(NamedTuple):
-    """An end of a road; side +1 is where s ends, -1 where it starts."""
+    """An end of a road; side +1 is where s ends, -1 if it starts."""
 
     road: str
     side: int
@@ -44,12 +44,12 @@ class LaneLinks:
             self._link_road(road, road.successor, 1)
 
     def beyond(self, lane: LaneKey, direction: int) -> Iterator[tuple[LaneKey, int]]:
-        """The lanes reached by leaving a lane in `direction` (+1 growing s), with the direction in which they begin."""
+        """Yield the lanes reached by leaving a lane in `direction` (+1 growing s), with the direction in which they begin."""
         for other in self._lanes.get(LaneEnd(lane, direction), ()):
             yield other.lane, -other.side
 
     def beyond_road(self, road: str, direction: int) -> Iterator[tuple[str, int]]:
-        """The roads reached by leaving a road in `direction`, with the direction in which they begin."""
+        """Yield the roads reached by leaving a road in `direction`, with the direction in which they begin."""
         for other in self._ends.get(RoadEnd(road, direction), ()):
             yield other.road, -other.side
 
@@ -108,12 +108,12 @@ class LaneLinks:
 
 
 def end_section(road: Road, side: int) -> LaneSection:
-    """The lane section at an end of a road: side +1 is where s ends."""
+    """Return the lane section at an end of a road: side +1 is where s ends."""
     return road.sections[-1 if side > 0 else 0]
 
 
 def side_at(incoming: Road, junction: Junction, connecting: Road, contact: Contact) -> int:
-    """The end of the incoming road that lies at the junction."""
+    """Return the end of the incoming road that lies at the junction."""
     sides = [
         side
         for side, link in ((-1, incoming.predecessor), (1, incoming.successor))
@@ -125,7 +125,7 @@ def side_at(incoming: Road, junction: Junction, connecting: Road, contact: Conta
 
 
 def _nearest_end(road: Road, side: int, other: Road) -> Contact:
-    """The end of `other` that lies nearest to an end of `road`."""
+    """Return the end of `other` that lies nearest to an end of `road`."""
     x, y, *_ = road.reference.at(road.length if side > 0 else 0.0)
     start, end = other.reference.at(0.0), other.reference.at(other.length)
     return "start" if math.hypot(start.x - x, start.y - y) <= math.hypot(end.x - x, end.y - y) else "end"

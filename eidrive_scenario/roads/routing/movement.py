@@ -46,7 +46,7 @@ class BranchGuide(Protocol):
 
 
 def driving_direction(road: Road, lane_id: int) -> int:
-    """+1 where traffic of the lane drives in the direction of s, -1 where against it; +1 for lane 0."""
+    """Return +1 if traffic of the lane drives in the direction of s, -1 if against it; +1 for lane 0."""
     known = road.directions.get(lane_id)
     if known is not None:
         return known
@@ -69,7 +69,7 @@ class Movement:
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
-        """The place `distance` meters further in the lane's driving direction (back where negative), or None.
+        """Return the place `distance` meters further in the lane's driving direction (backwards if negative), or None.
 
         The distance is measured on the path, at the location's offset. Where the lane forks, the route decides, else
         `choose`, else the straightest way on is taken. None says that the lane ends; with `to_end` the result is the
@@ -139,7 +139,7 @@ class Movement:
         return chosen.lane, chosen.direction, 0.0
 
     def branches(self, key: LaneKey, direction: int, with_traffic: bool = True) -> list[Branch]:
-        """The ways on from a lane's end, in the order of the file; those with the traffic if there are any."""
+        """Return the ways on from a lane's end, in the order of the file; those with the traffic if there are any."""
         found = list(self._links.beyond(key, direction))
         wanted = 1 if with_traffic else -1
         along = [(k, d) for k, d in found if driving_direction(self._roads[k.road], k.lane) * d == wanted]
@@ -177,7 +177,7 @@ class Movement:
 
 
 def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, direction: int) -> tuple[LaneSection, Lane]:
-    """The section that lies before s where one moves against s and stands on a section's very start."""
+    """Return the section that lies before s where one moves against s and stands on a section's very start."""
     if direction < 0 and s == section.s and section.index > 0:
         before = road.sections[section.index - 1]
         for number in lane.predecessors or (lane.id,):
@@ -229,7 +229,7 @@ def _along(
 
 
 def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: float) -> float:
-    """Meters of path at an offset from a lane's center per meter of s; in banked bends as if they were level."""
+    """Return meters of path at an offset from a lane's center per meter of s; in banked bends as if they were level."""
     t, slope = lane_t(road, section, lane, s)
     curvature, speed = road.reference.bend(s)
     across = speed * (1.0 - curvature * (t + offset))

@@ -14,7 +14,7 @@ from eidrive_scenario.roads.routing.movement import driving_direction
 def locate_near(
     roads: Mapping[str, Road], links: LaneLinks, x: float, y: float, hint: LaneLocation
 ) -> LaneLocation | None:
-    """The lane location of a point on the road of `hint`, or on one behind its ends; None where it lies on neither."""
+    """Return the lane location of a point on the road of `hint`, or on one behind its ends; None if it lies on neither."""
     road = roads[hint.road]
     here = _on(road, x, y, hint.s)
     if here is not None:

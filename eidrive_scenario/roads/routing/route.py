@@ -96,7 +96,7 @@ class Route:
         return float(self._course[1][-1])
 
     def polyline(self, spacing: float = 1.0) -> Array:
-        """(M, 3) points of the lanes' center lines from start to end, at most `spacing` apart [m].
+        """Return (M, 3) points of the lanes' center lines from start to end, at most `spacing` apart [m].
 
         Where a broken map has lanes jump, there are no more points than the lanes have in themselves.
         """
@@ -105,12 +105,12 @@ class Route:
         return self.points_at(np.linspace(0.0, self.length, count))
 
     def points_at(self, distance: Array) -> Array:
-        """(M, 3) points at distances (M,) along the route."""
+        """Return (M, 3) points at distances (M,) along the route."""
         points, along, _, _ = self._course
         return np.column_stack([np.interp(distance, along, points[:, axis]) for axis in range(3)])
 
     def location_at(self, distance: float) -> LaneLocation:
-        """The place at a distance along the route, on its center line."""
+        """Return the place at a distance along the route, on its center line."""
         _, along, owner, places = self._course
         index = min(max(bisect_right(along, distance) - 1, 0), len(along) - 2)
         leg = self.legs[int(owner[index + 1])]
@@ -125,7 +125,7 @@ class Route:
         return LaneLocation(leg.road, lane, s, t - lane_t(road, section, section.lanes[lane], s)[0], t)
 
     def pose_at(self, distance: float) -> Pose:
-        """The pose at a distance along the route, heading in the direction of travel."""
+        """Return the pose at a distance along the route, heading in the direction of travel."""
         place = self.location_at(distance)
         pose = lane_pose_at(self.roads[place.road], place.lane, place.s, place.offset)
         x, y, _ = self.points_at(np.array([distance - 0.25, distance + 0.25])).T
@@ -135,7 +135,7 @@ class Route:
         return pose.turned(_wrap(heading - pose.h))
 
     def s_along(self, location: LaneLocation) -> float | None:
-        """The distance along the route at which it passes a place's road and s, None where it does not."""
+        """Return the distance along the route at which it passes a place's road and s, None if it does not."""
         _, along, owner, places = self._course
         for number, leg in enumerate(self.legs):
             low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
@@ -172,7 +172,7 @@ class Route:
         return None if onward is None else (done + onward[0], onward[1])
 
     def project(self, x: float, y: float, near: float | None = None, window: float = 30.0) -> tuple[float, float]:
-        """The distance along the route that is nearest to a point, and how far left of the route the point lies [m].
+        """Return the distance along the route that is nearest to a point, and how far left of the route the point lies [m].
 
         `near` narrows the search to `window` meters around a distance known before.
         """
@@ -199,7 +199,7 @@ class Route:
         return best[1], float(best[2])
 
     def pick(self, branches: Sequence[Branch], road: str, visit: int = 0) -> Branch | None:
-        """The branch that the route takes where it leaves a road; None if it takes none of them.
+        """Return the branch that the route takes where it leaves a road; None if it takes none of them.
 
         `visit` is the number of the road among those of the route, as `visit` gives it: a route may come by twice.
         """
@@ -221,13 +221,13 @@ class Route:
         return next((number for number in self._later(visit) if self._visits[number][0] == road), visit)
 
     def passes(self, visit: int) -> str | None:
-        """The road of a visit, None beyond the route's end."""
+        """Return the road of a visit, None beyond the route's end."""
         if self.closed:
             visit %= len(self._visits)
         return self._visits[visit][0] if visit < len(self._visits) else None
 
     def _later(self, visit: int) -> Iterator[int]:
-        """The roads from a visit on, and on a closed route those before it after all others."""
+        """Yield the roads from a visit on, and on a closed route those before it after all others."""
         yield from range(visit, len(self._visits))
         if self.closed:
             yield from range(min(visit, len(self._visits)))
@@ -286,7 +286,7 @@ def smoothstep(part: Share) -> Share:
 
 
 def concatenate_routes(routes: Sequence[Route]) -> Route:
-    """Several routes, each beginning where the one before ends, as one."""
+    """Return several routes, each beginning where the one before ends, as one."""
     lanes = list(routes[0].lanes)
     for route in routes[1:]:
         lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)

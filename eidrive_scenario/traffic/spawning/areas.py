@@ -68,11 +68,11 @@ def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers
 
 
 def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | None = None) -> list[Stretch]:
-    """The stretches of a range from its first cursor over the others to its last one.
+    """Return the stretches of a range from its first cursor over the others to its last one.
 
     A cursor's lanes count up to the next cursor. Between cursors on different roads the range follows the shortest
     chain of linked roads, with all their lanes. `length` cuts the range off, counted from the first cursor [m].
-    Raises PositionError for roads that do not exist or are not linked.
+    Raise PositionError for roads that do not exist or are not linked.
     """
     ends = _links(roads)
     parts: list[tuple[Stretch, bool]] = []

@@ -52,7 +52,7 @@ class DriverSettings(Settings):
     speed_factor: PositiveFloat = 1.0
 
     def driver(self, usual: IntelligentDriver) -> IntelligentDriver:
-        """The usual driver with these parameters."""
+        """Return the usual driver with these parameters."""
         names = ("time_gap", "standstill_gap", "acceleration", "deceleration")
         return replace(usual, **{name: value for name in names if (value := getattr(self, name)) is not None})
 
@@ -79,7 +79,7 @@ class WeightedChoice(Generic[T]):
     weights: Sequence[float]
 
     def draw(self, rng: np.random.Generator) -> T:
-        """One of them."""
+        """Return one of them."""
         shares = np.cumsum(self.weights)
         return self.things[int(np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))]
 
@@ -114,7 +114,7 @@ class TrafficMix:
             self._drivers = self._weighted([self._settings(entry) for entry in controllers], controllers)
 
     def draw(self, rng: np.random.Generator) -> Participant:
-        """One participant."""
+        """Return one participant."""
         if self._groups is not None:
             return self._groups.draw(rng).draw(rng)
         category, role, settings = self._categories.draw(rng), self._roles.draw(rng), self._drivers.draw(rng)
@@ -149,7 +149,7 @@ class TrafficMix:
         return _participant(actor_spec(entity.name, entity), settings)
 
     def _settings(self, holder: model.ControllerDistributionEntry | model.ObjectController) -> DriverSettings:
-        """The driver that a controller of ours describes, the usual one for a controller of others."""
+        """Return the driver that a controller of ours describes, the usual one for a controller of others."""
         controller: model.Element | None = holder.controller
         if holder.catalog_reference is not None:
             controller = self._scenario.resolved(holder.catalog_reference)
@@ -176,14 +176,14 @@ def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:
 
 
 def _driver_of(spec: ActorSpec) -> IntelligentDriver:
-    """The usual driver, with no more acceleration than the vehicle has."""
+    """Return the usual driver, with no more acceleration than the vehicle has."""
     usual = IntelligentDriver()
     return replace(usual, acceleration=min(usual.acceleration, spec.max_acceleration))
 
 
 @cache
 def library_bodies(category: VehicleCategory) -> tuple[tuple[ActorSpec, Role], ...]:
-    """The vehicles of a category in the library's catalog, each with its role (NONE for everyday vehicles)."""
+    """Return the vehicles of a category in the library's catalog, each with its role (NONE for everyday vehicles)."""
     document = read_document(library_path() / "catalogs" / "vehicles.xosc")
     vehicles = document.catalog.vehicle if document.catalog is not None else ()
     return tuple(

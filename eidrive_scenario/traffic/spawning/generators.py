@@ -104,10 +104,10 @@ class TrafficGenerator(ABC):
 
     @abstractmethod
     def is_due(self, traffic: GeneratorContext) -> bool:
-        """Whether it may bring in a car now."""
+        """Return whether it may bring in a car now."""
 
     def rng(self, traffic: GeneratorContext) -> np.random.Generator:
-        """The random numbers of the next attempt to bring in a car."""
+        """Return the random numbers of the next attempt to bring in a car."""
         self._draws += 1
         return generator(traffic.seed, "traffic", self.name, self.key, self._draws)
 
@@ -161,7 +161,7 @@ class Swarm(TrafficGenerator):
         self._filled = True
 
     def _place(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
-        """Distance from the middle [m], and the share of the ellipse's axes at which places lie."""
+        """Return distance from the middle [m], and the share of the ellipse's axes at which places lie."""
         cos, sin = math.cos(center.heading), math.sin(center.heading)
         dx, dy = x - center.x - self.offset * cos, y - center.y - self.offset * sin
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx

@@ -58,7 +58,7 @@ class SpawnSites:
         return len(self.row)
 
     def subset(self, which: Integers | Bools) -> SpawnSites:
-        """A part of them."""
+        """Return a part of them."""
         return SpawnSites(
             self.row[which],
             self.progress[which],
@@ -103,14 +103,14 @@ class SpawnAreas:
         return SpawnSites.along(self._lanes, np.flatnonzero(self._lanes.walkable & ~self._lanes.in_junction))
 
     def for_body(self, participant: Participant) -> SpawnSites:
-        """The places where this one fits."""
+        """Return the places where this one fits."""
         return self.walking if participant.walks else self.driving
 
 
 def sites_within_radius(
     lanes: TrafficLanes, sites: SpawnSites, x: float, y: float, radius: float, location: LaneLocation | None
 ) -> SpawnSites:
-    """The places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
+    """Return the places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
 
     Where that is none at all, the nearest place that is no further away than a point may lie from its road.
     """
@@ -127,7 +127,7 @@ def sites_within_radius(
 
 
 def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Bools:
-    """(K,) where a participant can appear with a speed (K,) [m/s].
+    """Return (K,) where a participant can appear with a speed (K,) [m/s].
 
     It touches nobody, has a gap ahead in which it need not brake harder than is comfortable, and leaves its follower as
     much.  foreign  (M, 7) boxes of all that is not of the fleet

@@ -50,7 +50,7 @@ def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
 
 
 def shadow(spec: ActorSpec) -> Array:
-    """The dark patch under an actor, triangles (K, 3, 3) in the same frame: it ties the body to the ground."""
+    """Return the dark patch under an actor, triangles (K, 3, 3) in the same frame: it ties the body to the ground."""
     half_length, half_width = spec.size[0] / 2 + 0.12, spec.size[1] / 2 + 0.12
     corner = min(0.5, half_length / 2, half_width / 2)
     outline = [

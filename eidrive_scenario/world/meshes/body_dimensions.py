@@ -27,7 +27,7 @@ class BodyDimensions:
     """The others; their x as those of front and rear."""
 
     def x(self, share: float) -> float:
-        """x at a share of the length, 0 at the rear end and 1 at the front."""
+        """Return x at a share of the length, 0 at the rear end and 1 at the front."""
         return (share - 0.5) * self.length
 
     def z(self, share: float) -> float:

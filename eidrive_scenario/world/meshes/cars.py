@@ -13,7 +13,7 @@ _TALL = 0.37
 
 
 def car(frame: BodyDimensions) -> Mesh:
-    """A saloon with bonnet and boot; a tall or short one gets an upright tail instead."""
+    """Return a saloon with bonnet and boot; a tall or short one gets an upright tail instead."""
     mesh = Mesh()
     upright = frame.height / frame.length > _TALL or frame.length < 4.3
     belt, side = (0.60, 0.97) if upright else (0.635, 0.97)
@@ -27,7 +27,7 @@ def car(frame: BodyDimensions) -> Mesh:
 
 
 def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, waist: float, top: float) -> Array:
-    """A section of the shell at a share x of the length: shares of half the width and of the height."""
+    """Return a section of the shell at a share x of the length: shares of half the width and of the height."""
     y, tilt = width * frame.side, 0.9
     half = [(y * 0.86, bottom), (y, bottom + 0.07), (y * 1.0, waist), (y * tilt, top - 0.015), (y * 0.55, top)]
     points = [(-a, b) for a, b in half] + [(a, b) for a, b in reversed(half)]
@@ -77,12 +77,12 @@ def _cabin(
 
 
 def _face(bottom: Array, top: Array) -> Array:
-    """The four corners of a face: bottom from left to right as seen from outside, then the top in the same way."""
+    """Return the four corners of a face: bottom from left to right as seen from outside, then the top in the same way."""
     return np.stack([bottom[0], bottom[1], top[0], top[1]])
 
 
 def _pane(face: Array, left: float, right: float, low: float, high: float) -> Array:
-    """A window in a face, between shares of its width and height, lifted off the face by a centimeter."""
+    """Return a window in a face, between shares of its width and height, lifted off the face by a centimeter."""
     p00, p10, p01, p11 = face
     normal = np.cross(p10 - p00, p01 - p00)
     lift = 0.012 * normal / np.linalg.norm(normal)

@@ -7,7 +7,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, ball, bevelled_box, box, 
 
 
 def motorbike(frame: BodyDimensions) -> Mesh:
-    """A motorbike and a rider with helmet, as high as the frame."""
+    """Return a motorbike and a rider with helmet, as high as the frame."""
     mesh = Mesh()
     radius, x0, x1 = min(frame.wheel_radius, 0.34), frame.rear, frame.front
     base = x1 - x0
@@ -34,7 +34,7 @@ def motorbike(frame: BodyDimensions) -> Mesh:
 
 
 def bicycle(frame: BodyDimensions) -> Mesh:
-    """A bicycle and a rider."""
+    """Return a bicycle and a rider."""
     mesh = Mesh()
     radius, x0, x1 = min(frame.wheel_radius, 0.36), frame.rear, frame.front
     base = x1 - x0

@@ -7,7 +7,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, cylind
 
 
 def roadside_unit(frame: BodyDimensions) -> Mesh:
-    """A mast with a cabinet at its foot and a head of camera, LiDAR and antenna."""
+    """Return a mast with a cabinet at its foot and a head of camera, LiDAR and antenna."""
     mesh = Mesh()
     z, side = frame.z, frame.side
     half = frame.length / 2
@@ -30,7 +30,7 @@ def roadside_unit(frame: BodyDimensions) -> Mesh:
 
 
 def crate(frame: BodyDimensions) -> Mesh:
-    """A box with battens, for whatever has no shape of its own."""
+    """Return a box with battens, for whatever has no shape of its own."""
     mesh = Mesh()
     length, width, height = frame.length, frame.width, frame.height
     batten = 0.06 * min(length, width, height)

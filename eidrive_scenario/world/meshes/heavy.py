@@ -7,7 +7,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, cylind
 
 
 def truck(frame: BodyDimensions) -> Mesh:
-    """A cab over the engine and a closed cargo body."""
+    """Return a cab over the engine and a closed cargo body."""
     mesh = Mesh()
     x, z, side = frame.x, frame.z, frame.side
     cab = min(2.2, 0.30 * frame.length)
@@ -26,7 +26,7 @@ def truck(frame: BodyDimensions) -> Mesh:
 
 
 def trailer(frame: BodyDimensions) -> Mesh:
-    """A closed cargo body on its own axles, with legs to stand on."""
+    """Return a closed cargo body on its own axles, with legs to stand on."""
     mesh = Mesh()
     radius = max((axle.wheel_radius for axle in frame.extra_axles), default=0.0) or frame.wheel_radius
     floor = min(2 * radius + 0.12, 0.5 * frame.height)
@@ -55,7 +55,7 @@ def _cargo(mesh: Mesh, frame: BodyDimensions, cargo: float, floor: float) -> Non
 
 
 def firetruck(frame: BodyDimensions) -> Mesh:
-    """A crew cab, lockers with roller shutters, a ladder on the roof and blue lights."""
+    """Return a crew cab, lockers with roller shutters, a ladder on the roof and blue lights."""
     mesh = Mesh()
     x, z, side = frame.x, frame.z, frame.side
     cab = 0.40 * frame.length
@@ -96,7 +96,7 @@ def firetruck(frame: BodyDimensions) -> Mesh:
 
 
 def bus(frame: BodyDimensions) -> Mesh:
-    """A bus with a band of windows, doors on the right and a sign above the windscreen."""
+    """Return a bus with a band of windows, doors on the right and a sign above the windscreen."""
     mesh = Mesh()
     x, z, side = frame.x, frame.z, frame.side
     floor = 0.085

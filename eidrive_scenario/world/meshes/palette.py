@@ -79,12 +79,12 @@ FIXED_PAINT: dict[str, Color] = {
 
 
 def paint(name: str, shape: str) -> Color:
-    """The paint of an actor without a color of its own, the same in every process."""
+    """Return the paint of an actor without a color of its own, the same in every process."""
     if shape in FIXED_PAINT:
         return FIXED_PAINT[shape]
     return by_name(name, CLOTHES if shape in ("pedestrian", "bicycle", "motorbike") else PAINTS)
 
 
 def by_name(name: str, colors: tuple[Color, ...]) -> Color:
-    """One of the colors, by a hash of the name."""
+    """Return one of the colors, by a hash of the name."""
     return colors[int.from_bytes(hashlib.blake2b(name.encode(), digest_size=4).digest(), "little") % len(colors)]

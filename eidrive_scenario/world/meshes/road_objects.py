@@ -23,7 +23,7 @@ def road_object_mesh(
 
 @lru_cache(maxsize=64)
 def traffic_light(colors: tuple[str, ...], width: float, height: float) -> Mapping[str, Array]:
-    """A head with lamps from top to bottom, looking along +x; origin at the middle of its lower edge.
+    """Return a head with lamps from top to bottom, looking along +x; origin at the middle of its lower edge.
 
     The lamps are materials of their own: `lamp_red 0`, … numbered from the top.
     """
@@ -39,7 +39,7 @@ def traffic_light(colors: tuple[str, ...], width: float, height: float) -> Mappi
 
 
 def _visor(z: float, lens: float) -> Array:
-    """A small roof over a lamp."""
+    """Return a small roof over a lamp."""
     return tapered_box((0.07, 0, z + 1.12 * lens), (0.14, 2.0 * lens, 0.02), (0.14, 1.6 * lens))
 
 

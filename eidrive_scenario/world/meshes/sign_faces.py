@@ -66,7 +66,7 @@ LIMITS = ("274", "R2-1", "c31", "jin", "maximum speed")
 
 
 def sign_face(signal: Signal) -> SignFace:
-    """The face of a sign; a speed limit shows its number."""
+    """Return the face of a sign; a speed limit shows its number."""
     kind, country = signal.type.strip(), signal.country.strip().upper()
     subtype = signal.subtype.strip()
     whole = f"{kind.lower()}{subtype}"
@@ -84,7 +84,7 @@ def sign_face(signal: Signal) -> SignFace:
 
 
 def _limit(signal: Signal) -> str:
-    """The number on a speed limit, as it is painted; Swedish maps give it in tens."""
+    """Return the number on a speed limit, as it is painted; Swedish maps give it in tens."""
     numbers = [float(text) for text in re.findall("[0-9]+", signal.name) if 5 <= float(text) <= 140]
     value = signal.value
     if value is not None and 5.0 <= value <= 140.0 and not (value <= 12.0 and numbers):

@@ -50,7 +50,7 @@ def sign(face: SignFace, width: float, height: float) -> dict[str, Array]:
 
 
 def _outline(shape: str, width: float, height: float) -> Array:
-    """(M, 2) corners, counter-clockwise as the traffic sees it."""
+    """Return (M, 2) corners, counter-clockwise as the traffic sees it."""
     half, tall = width / 2, height / 2
     if shape == "board":
         return np.array([(-half, 0.0), (half, 0.0), (half, height), (-half, height)])
@@ -67,7 +67,7 @@ def _outline(shape: str, width: float, height: float) -> Array:
 
 
 def _inner(shape: str, height: float) -> float:
-    """Height of a triangle's center."""
+    """Return the height of a triangle's center."""
     return height / 3 if shape == "triangle" else 2 * height / 3
 
 

@@ -39,30 +39,30 @@ class Mesh:
 
 
 def mirrored(solid: Array) -> Array:
-    """The mirror image at the plane y = 0, its faces still looking outwards."""
+    """Return the mirror image at the plane y = 0, its faces still looking outwards."""
     flipped: Array = (solid * (1.0, -1.0, 1.0))[:, ::-1]
     return flipped
 
 
 def polygon(points: Sequence[Point] | Array) -> Array:
-    """A flat convex face (M, 3), given counter-clockwise as seen from outside."""
+    """Return a flat convex face (M, 3), given counter-clockwise as seen from outside."""
     corners = np.asarray(points, dtype=float)
     return np.stack([[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)])
 
 
 def hexahedron(corners: Sequence[Point] | Array) -> Array:
-    """A body with six faces: four corners of the bottom counter-clockwise from above, then four of the top."""
+    """Return a body with six faces: four corners of the bottom counter-clockwise from above, then four of the top."""
     points = np.asarray(corners, dtype=float)
     return np.concatenate([polygon(points[list(face)]) for face in _BOX_FACES])
 
 
 def box(center: Point, size: Point) -> Array:
-    """An upright cuboid."""
+    """Return an upright cuboid."""
     return tapered_box(center, size, size[:2])
 
 
 def tapered_box(center: Point, size: Point, top: Point, shift: float = 0.0) -> Array:
-    """A frustum of length, width and height `size` whose top is `top` long and wide and `shift` further ahead."""
+    """Return a frustum of length, width and height `size` whose top is `top` long and wide and `shift` further ahead."""
     x, y, z = center
     length, width, height = size
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -72,7 +72,7 @@ def tapered_box(center: Point, size: Point, top: Point, shift: float = 0.0) -> A
 
 
 def bevelled_box(center: Point, size: Point, bevel: float) -> Array:
-    """An upright cuboid whose edges are cut off by `bevel`, as sheet metal looks from some way off."""
+    """Return an upright cuboid whose edges are cut off by `bevel`, as sheet metal looks from some way off."""
     x, y, z = center
     length, width, height = (extent / 2 for extent in size)
 
@@ -94,7 +94,7 @@ def bevelled_box(center: Point, size: Point, bevel: float) -> Array:
 
 
 def loft(rings: Sequence[Array] | Array) -> Array:
-    """A skin over rings (S, M, 3), closed by a fan at each end.
+    """Return a skin over rings (S, M, 3), closed by a fan at each end.
 
     The rings run counter-clockwise as seen from the first ring's side.
     """
@@ -106,7 +106,7 @@ def loft(rings: Sequence[Array] | Array) -> Array:
 
 
 def cylinder(start: Point, end: Point, radius: float, end_radius: float | None = None, sides: int = 14) -> Array:
-    """A cylinder, or the frustum of a cone, between two points."""
+    """Return a cylinder, or the frustum of a cone, between two points."""
     begin, finish = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     axis = (finish - begin) / np.linalg.norm(finish - begin)
     across = np.cross(axis, (0.0, 0.0, 1.0) if abs(axis[2]) < 0.9 else (1.0, 0.0, 0.0))
@@ -119,7 +119,7 @@ def cylinder(start: Point, end: Point, radius: float, end_radius: float | None =
 
 
 def ball(center: Point, radius: Point, rings: int = 6, sides: int = 10) -> Array:
-    """An ellipsoid with its half-axes along x, y, z."""
+    """Return an ellipsoid with its half-axes along x, y, z."""
     tilt = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)[:, None, None]
     turn = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)[None, :, None]
     level = np.cos(tilt)
@@ -128,7 +128,7 @@ def ball(center: Point, radius: Point, rings: int = 6, sides: int = 10) -> Array
 
 
 def moved(solid: Array, by: Point) -> Array:
-    """The same solid elsewhere."""
+    """Return the same solid elsewhere."""
     elsewhere: Array = solid + np.asarray(by, dtype=float)
     return elsewhere
 

@@ -10,7 +10,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, loft, 
 
 
 def van(frame: BodyDimensions) -> Mesh:
-    """A delivery van with a closed body."""
+    """Return a delivery van with a closed body."""
     mesh = Mesh()
     _body(mesh, frame, roof_from=0.0)
     _cab_details(mesh, frame)
@@ -24,7 +24,7 @@ def van(frame: BodyDimensions) -> Mesh:
 
 
 def ambulance(frame: BodyDimensions) -> Mesh:
-    """A van with a box behind the cab, stripes and blue lights."""
+    """Return a van with a box behind the cab, stripes and blue lights."""
     mesh = Mesh()
     _body(mesh, frame, roof_from=0.60)
     _cab_details(mesh, frame)
@@ -57,7 +57,7 @@ def ambulance(frame: BodyDimensions) -> Mesh:
 
 
 def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, shoulder: float, top: float) -> Array:
-    """A section of the body: `width` is a share of half the width, the others of the height."""
+    """Return a section of the body: `width` is a share of half the width, the others of the height."""
     y = width * frame.side
     half = [(0.94 * y, bottom), (y, bottom + 0.05), (y, shoulder), (0.90 * y, top - 0.04), (0.80 * y, top)]
     points = [(-a, b) for a, b in half] + [(a, b) for a, b in reversed(half)]

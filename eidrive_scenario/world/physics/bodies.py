@@ -212,7 +212,7 @@ class ScriptedBody(Body):
 
 
 def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
-    """x y z w of the rotation yaw, pitch, roll (z-y'-x'')."""
+    """Return x y z w of the rotation yaw, pitch, roll (z-y'-x'')."""
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
     if pitch == 0.0 and roll == 0.0:
         return 0.0, 0.0, sy, cy

@@ -43,7 +43,7 @@ bullet: Any = _import_silently()
 
 
 def connect() -> int:
-    """A new client without a window. Raises SimulationError when pybullet has no more to give."""
+    """Return a new client without a window. Raise SimulationError when pybullet has no more to give."""
     client: int = bullet.connect(bullet.DIRECT)
     if client < 0:
         raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")

@@ -38,7 +38,7 @@ class ContactTracker:
         self._touching = {pair: None for pair in self._touching if name not in pair}
 
     def update(self, bodies: Sequence[Body], touches: dict[tuple[str, str], Touch]) -> tuple[Contact, ...]:
-        """The contacts that began since the last call; `touches` are pybullet's by the names of the pair."""
+        """Return the contacts that began since the last call; `touches` are pybullet's by the names of the pair."""
         if not self._touching and not touches and not any(body.moved for body in bodies):
             return ()
         begun: list[Contact] = []
@@ -69,7 +69,7 @@ class ContactTracker:
 
 
 def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
-    """Pairs of which one has moved and whose circles, with the hysteresis, overlap; in the order of the bodies."""
+    """Yield pairs of which one has moved and whose circles, with the hysteresis, overlap; in the order of the bodies."""
     if len(bodies) > _FEW:
         yield from _near_pairs_of_many(bodies)
         return
@@ -84,7 +84,7 @@ def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
 
 
 def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
-    """The same by sweeping along x: only neighbors in the order of x can be near."""
+    """Yield the same by sweeping along x: only neighbors in the order of x can be near."""
     x, y, radius, moved = np.array([(b.center_x, b.center_y, b.radius, b.moved) for b in bodies]).T
     order = np.argsort(x, kind="stable")
     sorted_x = x[order]
@@ -101,7 +101,7 @@ def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
 
 
 def _shared_point(first: Body, second: Body) -> Vector3:
-    """The middle of the corners of each box inside the other; of the centers, where boxes cross without such."""
+    """Return the middle of the corners of each box inside the other; of the centers, where boxes cross without such."""
     boxes = np.array([first.box, second.box])
     corners = box_corners(boxes)
     inside = [corners[0][points_in_box(corners[0], boxes[1])], corners[1][points_in_box(corners[1], boxes[0])]]

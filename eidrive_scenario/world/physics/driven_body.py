@@ -112,7 +112,7 @@ class DrivenBody(Body):
         self.stale = self.stale or self.moved or self._motion != before
 
     def _stays(self, demand: Demand) -> bool:
-        """Whether it stands, and each step leaves it so."""
+        """Return whether it stands, and each step leaves it so."""
         track = self.track
         still = self._motion == STILL and track.steering == demand.steering
         return still and track.advance(0.0, 0.0, 0.0, demand) == STILL

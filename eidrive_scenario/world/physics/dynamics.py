@@ -97,7 +97,7 @@ class VehicleParameters:
 
     @classmethod
     def of(cls, spec: ActorSpec) -> VehicleParameters:
-        """The parameters in a vehicle's specification. Raises SettingError for a Property that makes no sense."""
+        """Return the parameters in a vehicle's specification. Raise SettingError for a Property that makes no sense."""
         if spec.wheelbase <= 0.0:
             what = f"{spec.name!r} cannot be driven: its axles are not apart"
             raise SettingError(Diagnostic(what, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's"))

@@ -36,7 +36,7 @@ MAX_TICK = 100.0
 
 
 def substeps_per_tick(dt: float, physics_rate: float) -> int:
-    """Physics steps in one tick. Raises SettingError unless the tick is a whole number of them, of at most MAX_TICK."""
+    """Physics steps in one tick. Raise SettingError unless the tick is a whole number of them, of at most MAX_TICK."""
     exact = dt * physics_rate
     if not abs(dt) <= MAX_TICK or not math.isfinite(exact):
         raise SettingError(Diagnostic(f"a tick is {dt:g} s long", f"give a dt of at most {MAX_TICK:g} s"))
@@ -88,7 +88,7 @@ class Physics:
         controls: Mapping[str, Control],
         friction: float,
     ) -> Touches:
-        """All steps of one tick, the scripted bodies being at their new places; returns what pybullet resolved."""
+        """Return all steps of one tick, the scripted bodies being at their new places; returns what pybullet resolved."""
         self.changed()
         if not driven:
             return {}
@@ -156,7 +156,7 @@ class Physics:
         return list(passing.values()), watched
 
     def _may_meet(self, body: DrivenBody, bodies: Mapping[str, Body], travels: Mapping[str, float]) -> bool:
-        """Whether a driven body may touch anything in this tick."""
+        """Return whether a driven body may touch anything in this tick."""
         x, y, radius, own = body.center_x, body.center_y, body.radius, travels[body.name]
         if self._stands_near(body.name, x, y, radius + own):
             return True
@@ -168,7 +168,7 @@ class Physics:
         return False
 
     def _stands_near(self, name: str, x: float, y: float, reach: float) -> bool:
-        """Whether anything that does not move may be within reach of a body's middle [m]."""
+        """Return whether anything that does not move may be within reach of a body's middle [m]."""
         there, free = self._free.get(name, ((x, y), -math.inf))
         if reach + math.dist(there, (x, y)) < free:
             return False

@@ -14,7 +14,7 @@ class GroundUnder:
         self._height = height
 
     def at(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
-        """Height z [m], pitch and roll [rad] of something at x, y with that heading.
+        """Return the height z [m], pitch and roll [rad] of something at x, y with that heading.
 
         Beside the road the ground is level, at the height at which the road was left.
         """
@@ -30,5 +30,5 @@ class GroundUnder:
 
 
 def is_level(roads: RoadNetwork | None) -> bool:
-    """Whether all roads lie in the plane z = 0."""
+    """Return whether all roads lie in the plane z = 0."""
     return roads is None or all(road.elevation.is_zero and road.superelevation.is_zero for road in roads.roads.values())

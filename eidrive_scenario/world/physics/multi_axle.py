@@ -114,7 +114,7 @@ class MultiAxleTrack(SingleTrack):
 
 def turning_wheelbase(vehicle: Vehicle) -> float:
     """On which a vehicle turns at low speed [m]: from the rear to the front axle, more with further axles; 0 without
-    a front axle. Raises InputError if something in the vehicle is wrong."""
+    a front axle. Raise InputError if something in the vehicle is wrong."""
     spec = actor_spec(vehicle.name, vehicle)
     if spec.wheelbase <= 0.0 or not spec.extra_axles:
         return max(spec.wheelbase, 0.0)
@@ -122,5 +122,5 @@ def turning_wheelbase(vehicle: Vehicle) -> float:
 
 
 def track_of(parameters: VehicleParameters, step: float) -> SingleTrack:
-    """The model for a vehicle of these parameters."""
+    """Return the model for a vehicle of these parameters."""
     return MultiAxleTrack(parameters, step) if parameters.axles else SingleTrack(parameters, step)

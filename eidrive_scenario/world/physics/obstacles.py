@@ -86,7 +86,7 @@ def _merged_rails(solid: Sequence[RoadObjectBody]) -> list[RoadObjectBody]:
 
 
 def _follows(before: RoadObjectBody, piece: RoadObjectBody) -> bool:
-    """Whether a piece begins where the one before ends."""
+    """Return whether a piece begins where the one before ends."""
     step = (before.length + piece.length) / 2
     cos, sin = math.cos(before.pose.h), math.sin(before.pose.h)
     dx, dy = piece.pose.x - before.pose.x - step * cos, piece.pose.y - before.pose.y - step * sin
@@ -132,7 +132,7 @@ def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterat
 
 
 def _corners(boxes: Array) -> Array:
-    """(N, 8, 3) of boxes (N, 7)."""
+    """Return (N, 8, 3) of boxes (N, 7)."""
     along, aside = boxes[:, 3:4] / 2 * _SIGNS[:, 0], boxes[:, 4:5] / 2 * _SIGNS[:, 1]
     cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
     x, y = boxes[:, 0:1] + cos * along - sin * aside, boxes[:, 1:2] + sin * along + cos * aside
@@ -141,7 +141,7 @@ def _corners(boxes: Array) -> Array:
 
 
 def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
-    """The squares that a piece may touch."""
+    """Yield the squares that a piece may touch."""
     steps = max(math.ceil(max(piece.length, piece.width) / SQUARE), 1)
     cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
     dx, dy = (cos, sin) if piece.length >= piece.width else (-sin, cos)

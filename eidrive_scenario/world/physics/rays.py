@@ -64,7 +64,7 @@ def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Intege
 
 
 def first_met(client: int, origins: Sequence[Point], targets: Sequence[Point], row_of_handle: list[int]) -> list[int]:
-    """The rows that rays meet first, as of `cast_rays` but without arrays: for a few rays, one batch at most."""
+    """Return the rows that rays meet first, as of `cast_rays` but without arrays: for a few rays, one batch at most."""
     hits = bullet.rayTestBatch(origins, targets, numThreads=1, physicsClientId=client)
     return [row_of_handle[hit[0]] for hit in hits]
 

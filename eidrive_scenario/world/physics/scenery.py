@@ -109,7 +109,7 @@ class Scenery:
         return bool(handles)
 
     def name_of(self, handle: int, position: Vector3) -> str:
-        """The name of what has this body in pybullet, touched at a point."""
+        """Return the name of what has this body in pybullet, touched at a point."""
         if handle in self._obstacle_handles and self._obstacles is not None:
             return self._obstacles.name_at(position[0], position[1])
         return self._names[handle]
@@ -140,7 +140,7 @@ class Scenery:
 
 
 def _building(roads: RoadNetwork, placed: PlacedObject) -> Building:
-    """The box around an object of the road network."""
+    """Return the box around an object of the road network."""
     entry, pose = placed.object, placed.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)
     length, width, height = placed.length or 1.0, placed.width or 1.0, placed.height or STOREY

@@ -27,7 +27,7 @@ class SpatialGrid(Generic[Thing]):
             self._in_cell.setdefault(cell, []).append(thing)
 
     def query(self, x: float, y: float, reach: float) -> list[Thing]:
-        """Those in the squares within reach of a point [m]; one may come several times."""
+        """Return those in the squares within reach of a point [m]; one may come several times."""
         found: list[Thing] = []
         if reach > _FAR:
             side = reach + SQUARE
@@ -42,7 +42,7 @@ class SpatialGrid(Generic[Thing]):
 
 
 def grid_cells(x: float, y: float, reach: float) -> list[Cell]:
-    """The squares that touch the square around a point that reaches as far to each side [m]."""
+    """Return the squares that touch the square around a point that reaches as far to each side [m]."""
     left, right = math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE)
     low, high = math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE)
     if left == right and low == high:

@@ -35,7 +35,7 @@ class CameraView:
         return rx, ry, rz
 
     def directions(self, pixels: Pixels) -> tuple[Floats, Floats, Floats]:
-        """The same through pixels, of length 1."""
+        """Return the same through pixels, of length 1."""
         length = self.length[pixels]
         rx, ry, rz = self.rays(self.x[pixels], self.y[pixels])
         return rx / length, ry / length, rz / length

@@ -64,7 +64,7 @@ class _Chosen(NamedTuple):
 
 
 def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole) -> VisibleGeometry:
-    """Triangles that face the camera and may lie in its picture, cut off at its near plane."""
+    """Return triangles that face the camera and may lie in its picture, cut off at its near plane."""
     sides = _sides(pinhole)
     chosen = []
     for instance, pixels in _in_sight(instances, pose, pinhole, sides):
@@ -95,7 +95,7 @@ _NOTHING = _Chosen(
 
 
 def _sides(pinhole: Pinhole) -> Array:
-    """(5, 3) inward unit normals of the planes through the eye and the picture's edges, and of the near plane."""
+    """Return (5, 3) inward unit normals of the planes through the eye and the picture's edges, and of the near plane."""
     left, right = -pinhole.center_x / pinhole.focal, (pinhole.width - pinhole.center_x) / pinhole.focal
     top, bottom = -pinhole.center_y / pinhole.focal, (pinhole.height - pinhole.center_y) / pinhole.focal
     planes = np.array([(1, 0, -left), (-1, 0, right), (0, 1, -top), (0, -1, bottom), (0, 0, 1)], dtype=float)
@@ -106,7 +106,7 @@ def _sides(pinhole: Pinhole) -> Array:
 def _in_sight(
     instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole, sides: Array
 ) -> list[tuple[MeshInstance, float]]:
-    """The instances whose spheres reach into the picture, and how many pixels these cover across."""
+    """Return the instances whose spheres reach into the picture, and how many pixels these cover across."""
     if not instances:
         return []
     centers = (np.array([instance.center for instance in instances]) - pose[:3, 3]) @ pose[:3, :3]
@@ -118,7 +118,7 @@ def _in_sight(
 
 
 def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array, pixels: float) -> _Chosen | None:
-    """The triangles of one instance that face the camera, corners in its frame; None where there are none."""
+    """Return the triangles of one instance that face the camera, corners in its frame; None if there are none."""
     model = instance.model
     to_camera = pose[:3, :3].T @ instance.rotation
     shift = pose[:3, :3].T @ (instance.position - pose[:3, 3])
@@ -152,7 +152,7 @@ def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array,
 
 
 def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
-    """Triangles, (3, 3, N) by axis and corner, without what is nearer than the near plane, and the rows they had.
+    """Return triangles, (3, 3, N) by axis and corner, without what is nearer than the near plane, and the rows they had.
 
     Of one with one corner behind the plane two are left, of one with two corners behind it one.
     """

@@ -61,5 +61,5 @@ RETURNS: Floats = np.array([finish.returns for finish in FINISHES.values()], dty
 
 
 def finish_of(material: str) -> int:
-    """The number of a material's finish; matt where nothing is said."""
+    """Return the number of a material's finish; matt where nothing is said."""
     return _NUMBERS[_BY_MATERIAL.get(material, "matt")]

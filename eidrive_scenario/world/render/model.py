@@ -64,7 +64,7 @@ class Cells(NamedTuple):
     radius: Array
 
     def rows(self, chosen: NDArray[np.bool_]) -> Integers:
-        """The triangles of the chosen cells."""
+        """Return the triangles of the chosen cells."""
         first, count = self.first[chosen], self.counts[chosen]
         ends = np.cumsum(count)
         found: Integers = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
@@ -92,13 +92,13 @@ class MeshInstance:
 
 
 def linear(color: Color) -> Light:
-    """A color as screens show it, as a share of reflected light: the inverse of sRGB's curve (IEC 61966-2-1)."""
+    """Return a color as screens show it, as a share of reflected light: the inverse of sRGB's curve (IEC 61966-2-1)."""
     red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return red, green, blue
 
 
 def model(mesh: Mapping[str, Array], colors: Mapping[str, Color]) -> Model:
-    """A model of triangles (K, 3, 3) by material; colors not given are those of the palette."""
+    """Return a model of triangles (K, 3, 3) by material; colors not given are those of the palette."""
     triangles, albedo, finish, material = [], [], [], []
     for number, (name, solid) in enumerate(mesh.items()):
         color = linear(colors[name] if name in colors else MATERIALS[name])
@@ -121,7 +121,7 @@ def model(mesh: Mapping[str, Array], colors: Mapping[str, Color]) -> Model:
 
 
 def merged(models: Iterable[Model]) -> Model:
-    """Several models in one frame as one; materials of one name count as one."""
+    """Return several models in one frame as one; materials of one name count as one."""
     parts = list(models)
     names = tuple(dict.fromkeys(name for part in parts for name in part.materials))
     numbers = [np.array([names.index(name) for name in part.materials], dtype=np.int16) for part in parts]
@@ -136,7 +136,7 @@ def merged(models: Iterable[Model]) -> Model:
 
 
 def gridded(whole: Model) -> Model:
-    """The same model, cut along a grid, so that what is out of sight costs little."""
+    """Return the same model, cut along a grid, so that what is out of sight costs little."""
     squares = np.floor(whole.triangles.mean(axis=1)[:, :2] / _CELL).astype(np.int64)
     _, cell = np.unique(squares, axis=0, return_inverse=True)
     cell = cell.ravel()
@@ -158,7 +158,7 @@ def gridded(whole: Model) -> Model:
 
 
 def placed(part: Model, rotation: Array, position: Array) -> Model:
-    """The model in the frame in which it stands at this rotation and position."""
+    """Return the model in the frame in which it stands at this rotation and position."""
     turn = rotation.T
     return _model(
         (part.triangles.astype(np.float64) @ turn + position).astype(np.float32),

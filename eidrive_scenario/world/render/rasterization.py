@@ -22,7 +22,7 @@ _LEAST = 1e-30
 class Cover(NamedTuple):
     """What each pixel of a window of the picture shows, from line `top` and column `left` on.
 
-    triangle (h, w) numbers, -1 where there is none; nearness (h, w) of it there, 0 where there is none
+    triangle (h, w) numbers, -1 if there is none; nearness (h, w) of it there, 0 where there is none
     """
 
     triangle: NDArray[np.int32]
@@ -70,7 +70,7 @@ def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> C
 
 
 def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
-    """The same for the part of the picture that holds all of them. What one triangle shows does not depend on others
+    """Return the same for the part of the picture that holds all of them. What one triangle shows does not depend on others
     but for what lies before it."""
     rows = _rows(x, y, nearness, width, height)
     if rows is None:
@@ -88,7 +88,7 @@ def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height:
 
 
 def greatest(x: Array, y: Array, nearness: Array, width: int, height: int) -> tuple[Floats, int, int]:
-    """The nearness alone, 0 where nothing is, of the part of the picture that holds all triangles, and its first line
+    """Return the nearness alone, 0 where nothing is, of the part of the picture that holds all triangles, and its first line
     and column."""
     rows = _rows(x, y, nearness, width, height)
     if rows is None:
@@ -135,7 +135,7 @@ class _Rows(NamedTuple):
 
 
 def _rows(x: Array, y: Array, nearness: Array, width: int, height: int) -> _Rows | None:
-    """Of triangles with corners (3, N); None where there are none."""
+    """Of triangles with corners (3, N); None if there are none."""
     # Over so short an axis, comparing rows is many times as fast as a reduction.
     low, high = np.minimum(np.minimum(y[0], y[1]), y[2]), np.maximum(np.maximum(y[0], y[1]), y[2])
     left_end, right_end = np.minimum(np.minimum(x[0], x[1]), x[2]), np.maximum(np.maximum(x[0], x[1]), x[2])
@@ -171,7 +171,7 @@ def _rows(x: Array, y: Array, nearness: Array, width: int, height: int) -> _Rows
 
 
 def _from_top(corners: Array) -> _Corners:
-    """(3, 3, N) x, y and nearness of corners in any order: the uppermost, the middle and the lowest."""
+    """Return (3, 3, N) x, y and nearness of corners in any order: the uppermost, the middle and the lowest."""
     for one, two in ((0, 1), (1, 2), (0, 1)):
         wrong = np.flatnonzero(corners[1, two] < corners[1, one])
         corners[:, one, wrong], corners[:, two, wrong] = corners[:, two, wrong], corners[:, one, wrong]
@@ -189,7 +189,7 @@ def _slopes(corners: _Corners) -> tuple[Array, Array]:
 
 
 def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _Spans:
-    """The rows of all triangles that hold centers of pixels."""
+    """Return the rows of all triangles that hold centers of pixels."""
     (x0, x1, x2), (y0, y1, y2), _ = corners
     counts = last - first
     whose = np.repeat(np.arange(len(counts)), counts)
@@ -207,7 +207,7 @@ def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _S
 
 
 def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Floats, NDArray[np.bool_]]:
-    """The lines and columns that a triangle spans, nearness there, and which of it lies inside."""
+    """Return the lines and columns that a triangle spans, nearness there, and which of it lies inside."""
     first, last = int(one.line[0]), int(one.line[-1]) + 1
     begin, end = int(one.left.min()), int(one.right.max())
     # Where a tip is thinner than a pixel, some of its lines hold no center of one.
@@ -226,7 +226,7 @@ def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Float
 
 
 def _fragments(few: _Small, top: int, left: int, width: int) -> tuple[Integers, Floats]:
-    """The pixels of a window of this width in which rows lie, one after the other, and nearness there."""
+    """Return the pixels of a window of this width in which rows lie, one after the other, and nearness there."""
     lengths = few.right - few.left
     step = np.arange(int(lengths.sum())) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     value = np.repeat(few.slope, lengths)

@@ -73,7 +73,7 @@ class _Canvas(NamedTuple):
         return cls(empty, np.full(pixels, np.inf, dtype=np.float32), np.full(pixels, -1, dtype=np.int32))
 
     def copy(self) -> _Canvas:
-        """One to draw on."""
+        """Return one to draw on."""
         return _Canvas(self.planes.copy(), self.depth.copy(), self.label.copy())
 
 
@@ -114,7 +114,7 @@ class Renderer:
         pinhole: Pinhole,
         ground: float,
     ) -> Radiance:
-        """The light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m].
+        """Return the light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m].
 
         Scenery is kept from the second picture on that shows the same.
         """
@@ -132,7 +132,7 @@ class Renderer:
         return Radiance(whole, canvas.depth.reshape(eye.shape), canvas.label.reshape(eye.shape))
 
     def _known(self, subjects: Subjects, at: _Circumstances) -> _Kept | None:
-        """The scenery of a picture, if the one before from there showed the same."""
+        """Return the scenery of a picture, if the one before from there showed the same."""
         looks = tuple(
             (each.model, each.position.tobytes(), each.label, tuple(each.glow.items())) for each in subjects.scenery
         )
@@ -155,7 +155,7 @@ def _forget_first(memory: dict[object, Any], most: int) -> None:
 
 
 def _whole(subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
-    """The picture, all drawn anew."""
+    """Return the picture, all drawn anew."""
     staged = cull_and_project([*subjects.scenery, *subjects.actors], at.eye.pose, at.eye.pinhole)
     cover = rasterize(staged.x, staged.y, staged.nearness, at.eye.pinhole.width, at.eye.pinhole.height)
     lit = lit_surfaces(staged.surfaces, at.light, at.weather)
@@ -233,7 +233,7 @@ def _through_air(luminance: Floats, distance: Floats, weather: Weather) -> Float
 
 
 def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
-    """The picture without actors, and what is needed to draw them into it."""
+    """Return the picture without actors, and what is needed to draw them into it."""
     eye = at.eye
     staged = cull_and_project(subjects.scenery, eye.pose, eye.pinhole)
     cover = rasterize(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)
@@ -253,7 +253,7 @@ def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
 
 
 def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
-    """The picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbors too."""
+    """Return the picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbors too."""
     eye = at.eye
     staged = cull_and_project(subjects.actors, eye.pose, eye.pinhole)
     seen = rasterize_reference(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)

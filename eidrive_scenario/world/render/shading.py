@@ -77,7 +77,7 @@ def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
 
 
 def together(first: Lit, second: Lit) -> Lit:
-    """The triangles of both, those of the second after those of the first."""
+    """Return the triangles of both, those of the second after those of the first."""
     one, other = first.surfaces, second.surfaces
     surfaces = Surfaces(
         np.concatenate([one.normal, other.normal], axis=1),
@@ -106,7 +106,7 @@ def shade(
     lamplight: Lamplight | None,
     open_sky: Floats,
 ) -> Floats:
-    """(3, n) luminance of the points as seen from near [cd/m²]: sun and sky, lamps, and what shines itself.
+    """Return (3, n) luminance of the points as seen from near [cd/m²]: sun and sky, lamps, and what shines itself.
 
     `place` is the camera's; lamplight and open_sky (n,), the share of the sky's light that bodies near by leave to
     them, are those of the points.
@@ -217,7 +217,7 @@ _ROW = 256
 
 
 def sampled(sky: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
-    """The sky (3, n) in directions (n,), which OpenCV wants as a picture."""
+    """Return the sky (3, n) in directions (n,), which OpenCV wants as a picture."""
     count = len(x)
     shape = (-(-count // _ROW), _ROW)
     grids = []

@@ -14,7 +14,7 @@ SIZE = 512
 
 
 def _blurred(draws: Floats, deviation: float) -> Floats:
-    """A table (SIZE, SIZE) that repeats, blurred by a Gaussian of this deviation without a seam."""
+    """Return a table (SIZE, SIZE) that repeats, blurred by a Gaussian of this deviation without a seam."""
     margin = int(np.ceil(4.5 * deviation)) + 1
     blurred = np.asarray(cv2.GaussianBlur(np.pad(draws, margin, mode="wrap"), (0, 0), deviation), dtype=np.float32)
     return blurred[margin:-margin, margin:-margin]
@@ -22,7 +22,7 @@ def _blurred(draws: Floats, deviation: float) -> Floats:
 
 @lru_cache(maxsize=1)
 def patches() -> Floats:
-    """(SIZE, SIZE) smooth noise of mean 0 and deviation 1 that repeats without a seam."""
+    """Return (SIZE, SIZE) smooth noise of mean 0 and deviation 1 that repeats without a seam."""
     draws = generator(0, "surfaces").standard_normal((SIZE, SIZE), dtype=np.float32)
     total = np.zeros((SIZE, SIZE), dtype=np.float32)
     for width, weight in ((3, 0.5), (9, 1.0), (27, 1.6)):
@@ -34,7 +34,7 @@ def patches() -> Floats:
 
 @lru_cache(maxsize=1)
 def grit() -> Floats:
-    """(SIZE, SIZE) noise of mean 0 and deviation 1 from one place to the next."""
+    """Return (SIZE, SIZE) noise of mean 0 and deviation 1 from one place to the next."""
     draws = generator(0, "grit").standard_normal((SIZE, SIZE), dtype=np.float32)
     layer = _blurred(draws, 0.7)
     found: Floats = (layer / layer.std()).astype(np.float32)
@@ -43,7 +43,7 @@ def grit() -> Floats:
 
 @lru_cache(maxsize=1)
 def hollows() -> Floats:
-    """(SIZE, SIZE) smooth noise of mean 0 and deviation 1, of greater extent than `patches`."""
+    """Return (SIZE, SIZE) smooth noise of mean 0 and deviation 1, of greater extent than `patches`."""
     draws = generator(0, "hollows").standard_normal((SIZE, SIZE), dtype=np.float32)
     total = np.zeros((SIZE, SIZE), dtype=np.float32)
     for width, weight in ((8.0, 0.35), (22.0, 1.0)):
@@ -65,7 +65,7 @@ def variation(x: Floats, y: Floats, distance: Floats) -> Floats:
 
 
 def _looked_up(table: Floats, x: Floats, y: Floats, per_meter: float) -> Floats:
-    """The values of a table that repeats, at places [m]."""
+    """Return the values of a table that repeats, at places [m]."""
     mask = np.int32(SIZE - 1)
     at = (y * np.float32(per_meter)).astype(np.int32)
     at &= mask

@@ -22,7 +22,7 @@ _STEPS = 8192
 
 
 def white_level(luminance: Floats) -> float:
-    """The luminance of a picture (H, W, 3) that shall come out as white [cd/m²].
+    """Return the luminance of a picture (H, W, 3) that shall come out as white [cd/m²].
 
     The mean of log luminance goes to a key that falls with darkness, so that a night looks like one:
     1.03 - 2 / (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
@@ -41,14 +41,14 @@ def _luma(luminance: Floats) -> Floats:
 
 
 def tone_map(signal: Floats) -> NDArray[np.uint8]:
-    """The numbers of a picture whose light is given as shares of white; what is brighter is white."""
+    """Return the numbers of a picture whose light is given as shares of white; what is brighter is white."""
     steps: Floats = np.clip(signal, np.float32(0.0), np.float32(1.0))
     steps *= np.float32(_STEPS - 1)
     return _TONES.take(steps.astype(np.uint16))
 
 
 def _tone_curve() -> NDArray[np.uint8]:
-    """A shoulder for highlights (Reinhard et al., Photographic tone reproduction, 2002, eq. 4), then sRGB's curve."""
+    """Return a shoulder for highlights (Reinhard et al., Photographic tone reproduction, 2002, eq. 4), then sRGB's curve."""
     scaled = np.linspace(0.0, HEADROOM, _STEPS)
     tone = scaled * (1.0 + scaled / HEADROOM**2) / (1.0 + scaled)
     encoded = np.where(tone <= 0.0031308, 12.92 * tone, 1.055 * tone ** (1 / 2.4) - 0.055)

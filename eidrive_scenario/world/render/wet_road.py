@@ -55,7 +55,7 @@ def add_reflections(
 def mirrored(
     light: Floats, places: tuple[Floats, Floats, Floats], sky: Floats, ground: float, pose: Array, pinhole: Pinhole
 ) -> Floats:
-    """(H, W, 3) what a mirror in the plane z = ground [m, relative to the camera] would show in each pixel.
+    """Return (H, W, 3) what a mirror in the plane z = ground [m, relative to the camera] would show in each pixel.
 
     light (3, n) of the points that the picture shows, at places x, y, z (n,) relative to the camera; sky (H, W, 3) is
     what the mirror shows where it has nothing else. Only what the picture shows is mirrored.
@@ -84,7 +84,7 @@ def mirrored(
 
 
 def blurred(image: Floats) -> Floats:
-    """The same picture (H, W, 3) in a rough surface: drawn out up and down, a little sideways."""
+    """Return the same picture (H, W, 3) in a rough surface: drawn out up and down, a little sideways."""
     height, width = image.shape[:2]
     tall = max(3, round(height / 24)) | 1
     wide = max(1, round(width / 160)) | 1

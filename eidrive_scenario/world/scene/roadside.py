@@ -39,7 +39,7 @@ class Roadside:
         self._places = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
 
     def instances(self, eye: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
-        """All that may be in sight of a camera at `eye` (3,), with the signals in their states at `time` [s]."""
+        """Return all that may be in sight of a camera at `eye` (3,), with the signals in their states at `time` [s]."""
         found = [] if self._still is None else [MeshInstance(self._still, np.eye(3), np.zeros(3))]
         near = np.flatnonzero(np.linalg.norm(self._places - eye, axis=1) < IN_SIGHT)
         for row in near.tolist():
@@ -50,7 +50,7 @@ class Roadside:
 
 
 def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:
-    """All furniture in one model; equal pieces are placed together."""
+    """Return all furniture in one model; equal pieces are placed together."""
     equal: dict[tuple[str, str, float, float, float, float], list[RoadObjectBody]] = {}
     for piece in pieces:
         key = (piece.kind, piece.name, piece.length, piece.width, piece.height, piece.radius)
@@ -66,7 +66,7 @@ def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:
 
 
 def _placed(part: Array, poses: Array) -> Array:
-    """(N K, 3, 3) triangles (K, 3, 3) at poses (N, 6), upright."""
+    """Return (N K, 3, 3) triangles (K, 3, 3) at poses (N, 6), upright."""
     cos, sin = np.cos(poses[:, 3])[:, None, None], np.sin(poses[:, 3])[:, None, None]
     x, y, z = part[None, ..., 0], part[None, ..., 1], part[None, ..., 2]
     px, py, pz = (poses[:, axis][:, None, None] for axis in range(3))

@@ -58,7 +58,7 @@ def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float)
 
 
 def beam(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float) -> tuple[float, bool] | None:
-    """How bright the headlamps are, in [0, 1], and whether on high beam; None where they are dark."""
+    """How bright the headlamps are, in [0, 1], and whether on high beam; None if they are dark."""
     lights = _lights(spec, appearance, weather)
     found = {name: lights[name].brightness(time) for name in _BEAMS if name in lights}
     brightest = max(found.values(), default=0.0)
@@ -66,7 +66,7 @@ def beam(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float)
 
 
 def _lights(spec: ActorSpec, appearance: Appearance, weather: Weather) -> Mapping[str, LightState]:
-    """The lights that were switched, and low beam by itself where it was not."""
+    """Return the lights that were switched, and low beam by itself where it was not."""
     lights = appearance.lights
     if weather.lamps_on and "lowBeam" not in lights and spec.wheelbase > 0.0 and spec.shape != "bicycle":
         return {"lowBeam": LightState("lowBeam", "on"), **lights}

@@ -71,7 +71,7 @@ class Visuals:
         weather: Weather,
         shown: DisplayState = DisplayState(),  # noqa: B008 - it is immutable
     ) -> Radiance:
-        """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine.
+        """Return the light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine.
 
         Those that the scenario makes invisible do neither.
         """
@@ -128,7 +128,7 @@ _USUAL = Appearance()
 
 
 def _beam(body: Body, brightness: float, high: bool) -> Beam:
-    """The headlamps of an actor."""
+    """Return the headlamps of an actor."""
     rotation, foot = _stance(body)
     length, _, height = body.spec.size
     lamp = np.array([length / 2, 0.0, min(0.7, 0.45 * height)])
@@ -170,7 +170,7 @@ def _stance(body: Body) -> tuple[Array, Array]:
 
 
 def _building_model(building: Building) -> Model:
-    """A building; behind some of its windows, by its name, somebody has a light on."""
+    """Return a building; behind some of its windows, by its name, somebody has a light on."""
     own = building.color or by_name(building.name, FACADES)
     mesh = dict(building_mesh(building.size))
     windows = mesh.pop("window", None)

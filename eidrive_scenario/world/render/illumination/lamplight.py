@@ -28,7 +28,7 @@ class Lamplight(NamedTuple):
 
 
 def lamplight(beams: Sequence[lamps.Beam], cover: Cover, surfaces: Surfaces, eye: CameraView) -> Lamplight | None:
-    """The light of all beams; None where the picture shows nothing."""
+    """Return the light of all beams; None if the picture shows nothing."""
     triangle = cover.triangle[::2, ::2]
     seen = triangle >= 0
     if not seen.any():
@@ -54,7 +54,7 @@ def lamplight(beams: Sequence[lamps.Beam], cover: Cover, surfaces: Surfaces, eye
 
 
 def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats:
-    """Values of those of every second pixel both ways that show something, for all pixels (H, W).
+    """Return values of those of every second pixel both ways that show something, for all pixels (H, W).
 
     A pixel whose sample had none takes the greatest beside it; one that lies nearer or farther than the sample's point
     takes the least, so that light does not spill over edges.
@@ -74,6 +74,6 @@ def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats
 
 
 def _doubled(grid: Floats, shape: tuple[int, ...]) -> Floats:
-    """A grid of every second pixel both ways, at all pixels."""
+    """Return a grid of every second pixel both ways, at all pixels."""
     found: Floats = np.repeat(np.repeat(grid, 2, axis=0)[: shape[0]], 2, axis=1)[:, : shape[1]]
     return found

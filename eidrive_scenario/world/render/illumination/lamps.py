@@ -54,7 +54,7 @@ class Canvas(NamedTuple):
 
 
 def numbered(shown: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """(H, W) the numbers of the pixels that show something, line by line from 0 on; -1 for the rest."""
+    """Return (H, W) the numbers of the pixels that show something, line by line from 0 on; -1 for the rest."""
     found = np.full(shown.shape, -1, dtype=np.int32)
     found[shown] = np.arange(int(shown.sum()), dtype=np.int32)
     return found
@@ -71,7 +71,7 @@ class Sample(NamedTuple):
 
     @classmethod
     def of(cls, canvas: Canvas) -> Sample:
-        """Every _STRIDE-th pixel both ways."""
+        """Return every _STRIDE-th pixel both ways."""
         some = canvas.where[::_STRIDE, ::_STRIDE]
         line, column = np.nonzero(some >= 0)
         rows = some[line, column]
@@ -106,7 +106,7 @@ def shine(beam: Beam, eye: Array, canvas: Canvas, sample: Sample) -> tuple[NDArr
 def _within(
     place: Floats, axes: Floats, x: Floats, y: Floats, z: Floats
 ) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats, Floats]:
-    """The rows of the points that the lamps may reach, where these lie from the lamps in the world's axes, how far
+    """Return the rows of the points that the lamps may reach, where these lie from the lamps in the world's axes, how far
     ahead they lie, and the tangents of the angles to the axis, sideways and upwards."""
     (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = axes
     dx, dy, dz = x - place[0], y - place[1], z - place[2]
@@ -122,7 +122,7 @@ def _within(
 
 @lru_cache(maxsize=2)
 def _table(high: bool) -> Floats:
-    """`intensity` on a grid of the tangents, line by line."""
+    """Return `intensity` on a grid of the tangents, line by line."""
     aside = (np.arange(_COLUMNS) + 0.5) / _FINE - _WIDTH
     above = (np.arange(round(4 * _HEIGHT * _FINE) + 1) + 0.5) / (2 * _FINE) - _HEIGHT
     return intensity(aside[None], above[:, None], high).astype(np.float32).ravel()

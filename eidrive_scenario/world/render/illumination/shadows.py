@@ -54,7 +54,7 @@ class ShadowGrid:
         return column, row
 
     def numbers(self, x: Floats, y: Floats, z: Floats) -> NDArray[np.int32]:
-        """The cells (n,) from whose middles on points lie, line by line; -1 beyond the grid."""
+        """Return the cells (n,) from whose middles on points lie, line by line; -1 beyond the grid."""
         column, row = (np.floor(part) for part in self.cells(x, y, z))
         within = (column >= 0) & (column < self.width - 1) & (row >= 0) & (row < self.height - 1)
         found: NDArray[np.int32] = np.where(within, row * np.float32(self.width) + column, -1.0).astype(np.int32)
@@ -100,7 +100,7 @@ class ShadowMap:
         return slice(self.top, self.top + height), slice(self.left, self.left + width)
 
     def lit(self, x: Floats, y: Floats, z: Floats) -> Floats | None:
-        """(n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid. None if all of
+        """Return (n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid. None if all of
         it reaches all of them."""
         height, width = self.heights.shape
         column, row = self.grid.cells(x, y, z)
@@ -152,7 +152,7 @@ class ShadowMap:
 
 
 def shadow_grid(towards: Array, eye: CameraView) -> ShadowGrid | None:
-    """The grid for the part of the world that a camera sees; None if the sun is too low."""
+    """Return the grid for the part of the world that a camera sees; None if the sun is too low."""
     if towards[2] < _LOWEST:
         return None
     first = np.cross(towards, (0.0, 0.0, 1.0) if abs(towards[2]) < 0.99 else (1.0, 0.0, 0.0))
@@ -169,7 +169,7 @@ def shadow_grid(towards: Array, eye: CameraView) -> ShadowGrid | None:
 
 
 def _seen_ground(eye: CameraView) -> Array:
-    """(M, 3) points, relative to the camera, around the part of the view within reach, near the ground and above."""
+    """Return (M, 3) points, relative to the camera, around the part of the view within reach, near the ground and above."""
     pinhole, pose = eye.pinhole, eye.pose
     columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
     rows = np.array([0.0, 0.5, 1.0]) * pinhole.height
@@ -191,7 +191,7 @@ def _seen_ground(eye: CameraView) -> Array:
 
 
 def _away(caster: MeshInstance, grid: ShadowGrid) -> Array | None:
-    """Corners (3 · K, 3), relative to the camera, of a body's triangles that turn away from the sun; None where none of
+    """Corners (3 · K, 3), relative to the camera, of a body's triangles that turn away from the sun; None if none of
     them can shade the grid."""
     model, axes, eye, low, high = caster.model, grid.axes, grid.eye, grid.low, grid.high
     center = caster.rotation @ model.center + caster.position - eye

@@ -24,7 +24,7 @@ _NIGHT_CLOUDS = 0.3
 
 
 def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
-    """The dome's light (…, 3) in directions given by the parts (H, W) of unit vectors; below the horizon that at it."""
+    """Return the dome's light (…, 3) in directions given by the parts (H, W) of unit vectors; below the horizon that at it."""
     level = np.maximum(z, np.float32(0.0))
     scale = np.float32((SIZE - 2) / 2) / (np.float32(1.0) + level)
     middle = np.float32((SIZE - 1) / 2)
@@ -34,7 +34,7 @@ def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
 
 @lru_cache(maxsize=16)
 def dome(weather: Weather) -> Floats:
-    """(SIZE, SIZE, 3) luminance [cd/m²]: column and row are x / (1 + z) and y / (1 + z) of the direction.
+    """Return (SIZE, SIZE, 3) luminance [cd/m²]: column and row are x / (1 + z) and y / (1 + z) of the direction.
 
     The clear and the covered part each give the ground the light that `daylight` says. Towards the horizon the dome
     fades into the air before it.
@@ -73,7 +73,7 @@ def dome(weather: Weather) -> Floats:
 
 
 def horizon(weather: Weather) -> Array:
-    """(3,) mean luminance just above the horizon [cd/m²]: the color into which distance fades."""
+    """Return (3,) mean luminance just above the horizon [cd/m²]: the color into which distance fades."""
     return _horizon(weather).copy()
 
 
