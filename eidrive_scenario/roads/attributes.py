@@ -1,4 +1,4 @@
-"""What a map says of its roads and their lanes, without their geometry."""
+"""Attributes of roads, lanes and signals of a map, without their geometry."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from eidrive_scenario.roads.routing.movement import driving_direction
 
 
 class RoadAttributes:
-    """The roads, junctions, signals and objects of a map, and what holds where on them."""
+    """Roads, junctions, signals and objects of a map, with their attributes at a position."""
 
     def __init__(self, road_map: RoadMap) -> None:
         self.source = road_map.source
@@ -34,18 +34,18 @@ class RoadAttributes:
         self.objects: tuple[RoadObject, ...] = road_map.objects
 
     def road(self, road_id: str) -> Road:
-        """Return the road with this id. Raise PositionError with the nearest right id."""
+        """Return the road with this id. Raise PositionError if it does not exist."""
         road = self.roads.get(road_id)
         if road is None:
             raise poses.unknown_road(road_id, list(self.roads))
         return road
 
     def driving_direction(self, road_id: str, lane_id: int) -> int:
-        """Return +1 if the lane's traffic drives in the direction of s, -1 if against it."""
+        """Return +1 if traffic of the lane drives in the direction of s, else -1."""
         return driving_direction(self.road(road_id), lane_id)
 
     def lane_ids(self, road_id: str, s: float, *, drivable: bool = False) -> tuple[int, ...]:
-        """Return the lanes at s from left to right, without lane 0; with `drivable` only those that cars drive on."""
+        """Return the lane ids at s from left to right, without lane 0. With `drivable`, return only lanes for cars."""
         lanes = self.road(road_id).section_at(s).lanes
         return tuple(number for number, lane in lanes.items() if number and (lane.drivable or not drivable))
 
@@ -55,15 +55,18 @@ class RoadAttributes:
         return lane.width.value(s - section.s)
 
     def lane_type(self, road_id: str, lane_id: int, s: float) -> str:
-        """Return the type of a lane at s, as the standard names it. Raise PositionError."""
+        """Return the type of a lane at s, a name of the standard. Raise PositionError."""
         return poses.lane_at(self.road(road_id), lane_id, s)[1].type
 
     def curvature(self, road_id: str, s: float) -> float:
-        """Return the curvature of the reference line at s, left positive [1/m]."""
+        """Return the curvature of the reference line at s [1/m]; left is positive."""
         return self.road(road_id).reference.at(s).curvature
 
     def speed_limit(self, road_id: str, s: float, lane_id: int | None = None) -> float | None:
-        """Return the limit at s [m/s]: the lane's own, else the road's; inf for no limit, None if the map is silent."""
+        """Return the speed limit at s [m/s]: that of the lane, else that of the road.
+
+        A road without a limit gives inf. The result is None if the map states none.
+        """
         road = self.road(road_id)
         if lane_id is not None:
             section, lane = poses.lane_at(road, lane_id, s)
@@ -74,13 +77,13 @@ class RoadAttributes:
         return kinds[-1].speed if kinds else None
 
     def on_road(self, location: LaneLocation) -> bool:
-        """Return True if the location lies within its lane's width."""
+        """Return True if the location is within the width of its lane."""
         width = self.lane_width(location.road, location.lane, location.s)
         return abs(location.offset) <= 0.5 * width
 
     def signal_pose(self, signal: Signal, place: SignalPlace | None = None) -> Pose:
-        """Where a signal stands, its face turned against the traffic that it is for."""
-        at = place or signal.place
-        pose = poses.road_pose_at(self.road(at.road), at.s, at.t)
-        turn = 0.0 if at.orientation == "-" else np.pi
+        """Return the pose of a signal. Its face is turned against the traffic for which it is valid."""
+        position = place or signal.place
+        pose = poses.road_pose_at(self.road(position.road), position.s, position.t)
+        turn = 0.0 if position.orientation == "-" else np.pi
         return pose._replace(z=pose.z + signal.z_offset).turned(turn + signal.h_offset)

@@ -1,4 +1,4 @@
-"""What is doubtful in a road file that can be read all the same: roads that jump, lanes without width, loose ends."""
+"""Checks of a readable road file: geometry gaps, lanes without width, missing links."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ from eidrive_scenario.roads.model.road_map import Connection, Junction, Lane, La
 from eidrive_scenario.roads.routing.links import LaneEnd, LaneLinks, end_section, side_at
 
 JUMP = 0.01
-"""Between a geometry's end and the next one's start [m]; also in s."""
+"""Maximum gap between the end of a geometry and the start of the next one [m]; also in s."""
 KINK = 1e-3
-"""Between their headings [rad]."""
+"""Maximum difference of the headings of consecutive geometries [rad]."""
 CORNER = math.radians(10.0)
-"""A larger angle than this is a corner that somebody drew [rad]."""
+"""Minimum angle of an intended corner, which is not reported as a discontinuity [rad]."""
 STEEP = 0.5 * math.pi
-"""A road that is tilted across by more than this lies on its back: degrees were meant [rad]."""
+"""Maximum plausible superelevation [rad]. A larger value was probably given in degrees."""
 NARROW = -0.01
-"""Widths below this are negative; rounding reaches less far [m]."""
+"""Minimum width that counts as a rounding error [m]. Lower widths are reported."""
 WIDE = 200.0
-"""No lane is wider than this; a term of its width is wrong [m]."""
+"""Maximum plausible width of a lane [m]."""
 OPEN = 0.5
-"""A lane of this width at its end does not just taper off [m]."""
+"""Minimum width of a lane at its end at which a missing successor is reported [m]. Narrower lanes taper off."""
 
 
 def check_road_map(
     roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks
 ) -> Iterator[MapWarning]:
-    """What is likely wrong with a file's roads."""
+    """Yield warnings of the roads of a file."""
     for road in roads.values():
         yield from _jumps(road)
         yield from _tilts(road)
@@ -66,22 +66,22 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
     spans = "geometries that overlap or leave a gap in s"
     if abs(curves[0].s) > JUMP:
         what = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
-        yield MapWarning(GEOMETRY_GAP, spans, what, "let it begin at s=0", curves[0].line)
+        yield MapWarning(GEOMETRY_GAP, spans, what, "start it at s=0", curves[0].line)
     for one, other in pairwise(curves):
         if one.line is not None and one.line == other.line:
             continue
         missing = other.s - one.s - one.length
         if abs(missing) > JUMP:
-            how = "ends before the next one begins" if missing > 0.0 else "runs on into the next one"
+            how = "ends before the next one starts" if missing > 0.0 else "overlaps the next one"
             what = f"{name}: the geometry at s = {one.s:g} m {how}, by {abs(missing):.3g} m"
-            yield MapWarning(GEOMETRY_GAP, spans, what, "let s be the sum of the lengths before", other.line)
+            yield MapWarning(GEOMETRY_GAP, spans, what, "set s to the sum of the preceding lengths", other.line)
             continue
         end, start = one.at(one.length), other.at(0.0)
         apart = math.hypot(start.x - end.x, start.y - end.y)
         turn = abs(wrap_angle(start.h - end.h))
         if apart > JUMP:
             what = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
-            hint = "let each geometry begin where the one before ends"
+            hint = "start each geometry at the end of its predecessor"
             yield MapWarning(GEOMETRY_GAP, "such jumps", what, hint, other.line)
         elif KINK < turn < CORNER:
             what = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
@@ -89,16 +89,14 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
                 HEADING_DISCONTINUITY,
                 "such kinks",
                 what,
-                "let each geometry go on with the heading before",
+                "start each geometry with the final heading of its predecessor",
                 other.line,
             )
     over = curves[-1].s + curves[-1].length - road.length
     if abs(over) > JUMP:
         there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
         what = f"{name} has length {road.length:g} m, but its geometry ends {there}"
-        yield MapWarning(
-            GEOMETRY_GAP, "lengths that are not those of the geometry", what, "correct the length", road.line
-        )
+        yield MapWarning(GEOMETRY_GAP, "lengths that differ from the geometry", what, "correct the length", road.line)
 
 
 def _tilts(road: Road) -> Iterator[MapWarning]:
@@ -121,14 +119,14 @@ def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning
     least, most = min(widths), max(widths)
     if least < NARROW:
         what = f"{name} becomes {least:.3g} m wide"
-        yield MapWarning(LANE_WIDTH, "negative widths", what, "let widths be 0 or more", lane.line)
+        yield MapWarning(LANE_WIDTH, "negative widths", what, "give widths of at least 0", lane.line)
     if most > WIDE:
         what = f"{name} becomes {most:.3g} m wide"
-        yield MapWarning(LANE_WIDTH, "widths beyond all roads", what, "correct its terms", lane.line)
+        yield MapWarning(LANE_WIDTH, "implausible widths", what, "correct its coefficients", lane.line)
 
 
 def _extremes(lane: Lane, length: float) -> Iterator[float]:
-    """Yield the width of a lane at the ends of each of its pieces, and where it turns in between [m]."""
+    """Yield the widths of a lane at the ends and the local extrema of each polynomial piece [m]."""
     pieces = lane.width.pieces
     ends = [*lane.width.starts[1:], length]
     for (start, a, b, c, d), end in zip(pieces, ends, strict=True):
@@ -147,7 +145,7 @@ def _extremes(lane: Lane, length: float) -> Iterator[float]:
 
 
 def _end(roads: Mapping[str, Road], road: Road, link: RoadLink | None, side: int) -> Iterator[MapWarning]:
-    """Links of lanes at an end of a road, to another road."""
+    """Yield warnings of links between lanes at an end of a road and another road."""
     if link is None or link.element_type != "road" or not road.sections:
         return
     other = roads[link.element_id]
@@ -168,9 +166,9 @@ def _broken(road: Road, section: LaneSection, side: int, there: Mapping[int, Lan
 
 
 def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
-    """Lanes on which one drives to where the road goes on, and they do not.
+    """Yield warnings of lanes without a successor although their road continues.
 
-    Bidirectional lanes (those in the middle, for turning) may end at junctions.
+    Bidirectional lanes, such as turning lanes in the middle, may end at junctions.
     """
     for section in road.sections:
         for lane in section.lanes.values():
@@ -188,17 +186,18 @@ def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
 
 
 def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | None) -> MapWarning:
-    what = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m) leads nowhere, and the road goes on"
+    name = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
+    what = f"{name} has no successor although the road continues"
     if link is not None:
         what += f" in {link.element_type} {link.element_id!r}"
     if link is not None and link.element_type == "junction":
         hint = "add a <laneLink> from it to a <connection>"
-        return MapWarning(LANE_LINK, "lanes that lead nowhere at junctions", what, hint, lane.line)
-    return MapWarning(LANE_LINK, "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
+        return MapWarning(LANE_LINK, "lanes without a successor at junctions", what, hint, lane.line)
+    return MapWarning(LANE_LINK, "lanes without a successor", what, "link it or reduce its width to 0", lane.line)
 
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
-    """Linked lanes of two roads that do not meet: cars jump there. The reference lines need not meet."""
+    """Yield warnings of linked lanes of two roads whose ends do not meet. The reference lines need not meet."""
     ends: dict[tuple[str, int], RoadEnd] = {}
     for one, other in links.between_roads():
         road, beyond = roads[one.lane.road], roads[other.lane.road]
@@ -210,12 +209,12 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
         apart = math.hypot(u - x, v - y)
         if apart > JUMP:
             names = f"lane {one.lane.lane} of road {road.id!r} and lane {other.lane.lane} of road {beyond.id!r}"
-            what = f"{names} are linked, and their ends are {apart:.3g} m apart"
-            yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", what, "let the roads meet there", lane.line)
+            what = f"{names} are linked but their ends are {apart:.3g} m apart"
+            yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", what, "make their ends meet", lane.line)
 
 
 class RoadEnd(NamedTuple):
-    """An end of a road: its point, the change of x and y per meter of t, and the lane offset [m]."""
+    """End of a road: its point [m], the change of x and y per meter of t, and the lane offset [m]."""
 
     x: float
     y: float
@@ -225,7 +224,7 @@ class RoadEnd(NamedTuple):
 
 
 def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], RoadEnd]) -> tuple[float, float]:
-    """Where the middle of a lane ends; `known` keeps what is the same for all lanes of an end of a road."""
+    """Return the end of the center line of a lane [m]. `known` caches values that all lanes of a road end share."""
     found = known.get((road.id, end.side))
     if found is None:
         s = road.length if end.side > 0 else 0.0
@@ -251,11 +250,11 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     if junction.type == "default" and not touches:
         what = f"{name} comes from road {incoming.id!r}, which does not end at the junction"
         hint = "link that road to the junction, or correct incomingRoad"
-        yield MapWarning(rule, "connections from elsewhere", what, hint, connection.line)
+        yield MapWarning(rule, "connections from roads that do not end at the junction", what, hint, connection.line)
     if junction.type == "default" and connecting.junction_id != junction.id:
-        what = f"{name} takes road {connecting.id!r}, which is not of this junction"
+        what = f"{name} uses road {connecting.id!r}, which does not belong to the junction"
         hint = f"give that road junction={junction.id!r}, or correct connectingRoad"
-        yield MapWarning(rule, "connections by roads outside", what, hint, connection.line)
+        yield MapWarning(rule, "connections over roads of no or another junction", what, hint, connection.line)
     side, other_side = (
         side_at(incoming, junction, connecting, connection.contact),
         1 if connection.contact == "end" else -1,
@@ -265,13 +264,13 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
         (n, m) for n, m in connection.lane_links if n in here and m in there and here[n].drivable and there[m].drivable
     ]
     if driven and all(incoming.directions[n] == -side and connecting.directions[m] == other_side for n, m in driven):
-        what = f"{name} leads against the traffic of the roads {incoming.id!r} and {connecting.id!r}"
-        hint = 'swap them; where traffic keeps to the left, give the roads rule="LHT"'
-        yield MapWarning(rule, "connections against the traffic", what, hint, connection.line)
+        what = f"{name} is opposite to the traffic of roads {incoming.id!r} and {connecting.id!r}"
+        hint = 'swap them; for left-hand traffic give the roads rule="LHT"'
+        yield MapWarning(rule, "connections opposite to the traffic", what, hint, connection.line)
     for number, target in connection.lane_links:
         for lane, known, road in ((number, here, incoming), (target, there, connecting)):
             if lane not in known:
-                what = f"{name} links lane {lane} of road {road.id!r}, which it does not have there"
+                what = f"{name} links lane {lane} of road {road.id!r}, which does not exist there"
                 hint = "known: " + ", ".join(map(str, sorted(known)))
                 yield MapWarning(rule, "links of lanes that do not exist", what, hint, connection.line)
     if not connection.lane_links and not set(here) & set(there) - {0}:

@@ -1,4 +1,4 @@
-"""Road marks as strips of paint along lane edges, and painted areas."""
+"""Road marks as painted strips along lane edges, and painted areas."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import outlines
 
 DASH, GAP = 3.0, 6.0
-"""Broken lines in built-up areas (German RMS: 3 m of paint, 6 m of gap)."""
+"""Length of dash and gap of broken lines in built-up areas [m], by the German RMS."""
 APART = 0.24
-"""Distance between the lines of a double line, center to center [m]."""
+"""Distance between the center lines of a double line [m]."""
 STRIPE = 0.5
-"""Width of a crosswalk's stripes and of the gaps between them [m]."""
+"""Width of the stripes of a crosswalk and of the gaps between them [m]."""
 MOST_STRIPES = 500
 MOST_DASHES = 20_000
-"""Dashes of one line; a line of more is drawn without gaps."""
-"""Of one crosswalk."""
+"""Maximum number of dashes of a line. A line with more dashes is drawn solid."""
+"""Maximum number of stripes of a crosswalk."""
 FINEST = 0.01
-"""Dashes and gaps that together are shorter than this look like a solid line [m]."""
+"""Minimum length of dash and gap together [m]. Shorter patterns are drawn solid."""
 PAINTED = ("solid", "broken", "solid solid", "solid broken", "broken solid", "broken broken", "botts dots")
 CURVED = 0.01
-"""Curvature above which a dash is bent [1/m]."""
+"""Minimum curvature at which a dash is drawn bent [1/m]."""
 
 
 class Strip(NamedTuple):
-    """Paint along a road: `s` and `t` (K, P) of K pieces with P points each, `width` [m]."""
+    """Paint along a road: `s` and `t` (K, P) of K pieces with P points each, and `width` [m]."""
 
     kind: str
     s: Array
@@ -39,7 +39,7 @@ class Strip(NamedTuple):
 
 
 def lane_strips(road: Road, section: LaneSection, cuts: Array) -> Iterator[Strip]:
-    """Yield the marks of a lane section; `cuts` are the s at which solid lines may bend."""
+    """Yield the marks of a lane section. Solid lines may bend at the values of s in `cuts`."""
     for lane in section.lanes.values():
         if road.junction_id is not None and lane.type == "none" and lane.id:
             continue
@@ -70,7 +70,10 @@ def _mark_strips(
 
 
 def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float, float]]:
-    """Return the lines of a mark: offset from the lane's edge in t, width, length of dash and gap (0 for solid), first s."""
+    """Return the lines of a mark: offset from the lane edge in t, width, lengths of dash and gap, first s.
+
+    A solid line has a gap of 0.
+    """
     lines = [
         (line.t_offset, line.width, line.length, line.space, line.s_offset)
         for line in mark.lines
@@ -81,7 +84,7 @@ def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float,
     words = mark.type.split()
     if mark.type == "botts dots":
         return [(0.0, 0.1, 0.1, 1.2, 0.0)]
-    # Two lines are named from the inside out, those of lane 0 from left to right.
+    # Double lines are named from the inside out, those of lane 0 from left to right.
     outwards = lane.side if lane.id else -1
     offsets = [0.0] if len(words) == 1 else [-0.5 * APART * outwards, 0.5 * APART * outwards]
     pattern = {"solid": (0.0, 0.0), "broken": (DASH, GAP)}
@@ -89,13 +92,13 @@ def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float,
 
 
 def _edge(road: Road, section: LaneSection, lane: Lane, s: Array) -> Array:
-    """t of a lane's outer edge."""
+    """Return t of the outer edge of a lane."""
     flat = [road.lane_offset.value(v) + lane.side * lane.outer.value(v - section.s) for v in s.ravel().tolist()]
     return np.array(flat).reshape(s.shape)
 
 
 def object_strips(network: RoadNetwork) -> Iterator[tuple[str, Array]]:
-    """Painted areas among the objects, as convex polygons (M, 3): crosswalks in stripes, stop lines whole."""
+    """Yield painted areas among the objects as convex polygons (M, 3). Crosswalks are split into stripes."""
     for item in network.objects:
         if item.type == "crosswalk":
             for outline in outlines(network, item):

@@ -1,4 +1,4 @@
-"""The road network: what the other rooms ask about roads."""
+"""Road network: interface to the roads of one OpenDRIVE file."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from eidrive_scenario.roads.routing.nearby import locate_near
 from eidrive_scenario.roads.routing.route import Route, concatenate_routes
 
 KEPT = 2
-"""So many networks of files are kept for the next run."""
+"""Maximum number of road networks that are kept for the next run."""
 
 
 class RoadNetwork(RoadAttributes):
     """Roads, lanes, junctions, signals and objects of one OpenDRIVE file, with their geometry.
 
-    Coordinates as in the standard: s along a road's reference line, t to its left, lane ids positive to the left.
+    Coordinates follow the standard: s along the reference line, t to its left, lane ids positive to the left.
     """
 
     def __init__(self, road_map: RoadMap) -> None:
@@ -50,10 +50,9 @@ class RoadNetwork(RoadAttributes):
 
     @classmethod
     def load(cls, path: str | Path) -> RoadNetwork:
-        """Return the network of an OpenDRIVE file. Raise RoadError with all findings.
+        """Return the network of an OpenDRIVE file. Raise RoadError with all diagnostics.
 
-        A network does not change: the runs of a campaign share it, and what was once worked out from it, as long as
-        the file says the same.
+        A network is immutable. Runs share it, including cached results, while the content of the file is unchanged.
         """
         return _loaded(read_road_text(Path(path)), str(path))
 
@@ -64,17 +63,17 @@ class RoadNetwork(RoadAttributes):
 
     @cached_property
     def map_warnings(self) -> tuple[Diagnostic, ...]:
-        """What is likely wrong with the file, though it can be read: one finding a kind, each with its rule."""
+        """Warnings of the file, which is readable nevertheless: one diagnostic per kind, with its rule."""
         return group_map_warnings([*self._flaws, *check_road_map(self.roads, self.junctions, self.links)], self.source)
 
     @cached_property
     def tables(self) -> RoadTables:
-        """The roads as flat arrays."""
+        """Roads as flat arrays."""
         return RoadTables(list(self.roads.values()))
 
     @cached_property
     def graph(self) -> LaneGraph:
-        """The lanes as a directed graph over LaneKey(road, section, lane)."""
+        """Lanes as a directed graph over LaneKey(road, section, lane)."""
         return build_graph(self.tables, self.links)
 
     @cached_property
@@ -98,7 +97,7 @@ class RoadNetwork(RoadAttributes):
         hint = "write <geoReference> as a PROJ string, such as +proj=utm +zone=32 +datum=WGS84"
         return PositionError(Diagnostic(str(error), hint, self.source, self.header.geo_reference_line))
 
-    # Road and lane coordinates to the world
+    # Road and lane coordinates to world coordinates
 
     def geographic(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Return x and y [m] of a point in WGS 84 [rad]. Raise PositionError if the map has no position for it."""
@@ -112,15 +111,18 @@ class RoadNetwork(RoadAttributes):
         return x * cos + y * sin, y * cos - x * sin
 
     def road_pose_at(self, road_id: str, s: float, t: float = 0.0) -> Pose:
-        """Return the pose at road coordinates; heading of the reference line. Raise PositionError."""
+        """Return the pose at road coordinates with the heading of the reference line. Raise PositionError."""
         return poses.road_pose_at(self.road(road_id), s, t)
 
     def lane_pose_at(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> Pose:
-        """Return the pose at a lane's center line plus offset; heading of the lane, along growing s. Raise PositionError."""
+        """Return the pose at the center line of a lane plus `offset`, with the heading of the lane along s.
+
+        Raise PositionError if the lane does not exist at s.
+        """
         return poses.lane_pose_at(self.road(road_id), lane_id, s, offset)
 
     def centers(self, places: Sequence[LaneLocation]) -> Array:
-        """Return (N, 3) points of the lanes' center lines at places [m], wherever across the lanes those are."""
+        """Return points (N, 3) of the center lines of lanes at the s of `places` [m]. Offsets are ignored."""
         tables = self.tables
         road = np.array([tables.index[place.road] for place in places], dtype=np.int64)
         s = np.array([place.s for place in places])
@@ -128,13 +130,13 @@ class RoadNetwork(RoadAttributes):
         return np.column_stack(tables.lane_poses(row, s, np.zeros(len(s)))[:3])
 
     def pose(self, location: LaneLocation) -> Pose:
-        """Return the pose at a lane location; heading of the lane in its driving direction."""
+        """Return the pose at a lane location with the heading of the driving direction of the lane."""
         road = self.road(location.road)
         found = poses.lane_pose_at(road, location.lane, location.s, location.offset)
         return found if driving_direction(road, location.lane) > 0 else found.turned(np.pi)
 
     def road_pose(self, road_id: str, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
-        """Return `road_pose_at` over arrays, broadcast against each other. Raise PositionError."""
+        """Return `road_pose_at` for broadcast arrays. Raise PositionError."""
         self.road(road_id)
         s, t = np.broadcast_arrays(np.asarray(s, dtype=np.float64), np.asarray(t, dtype=np.float64))
         road = np.full(s.size, self.tables.index[road_id])
@@ -143,7 +145,7 @@ class RoadNetwork(RoadAttributes):
         return Poses(*(part.reshape(s.shape) for part in found))
 
     def lane_pose(self, road_id: str, lane_id: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
-        """Return `lane_pose_at` over arrays, broadcast against each other. Raise PositionError."""
+        """Return `lane_pose_at` for broadcast arrays. Raise PositionError."""
         self.road(road_id)
         lane, s, offset = np.broadcast_arrays(
             np.asarray(lane_id, dtype=np.int64),
@@ -155,28 +157,30 @@ class RoadNetwork(RoadAttributes):
         found = self.tables.lane_poses(self.tables.lane_row(road, flat, lane.ravel()), flat, offset.ravel())
         return Poses(*(part.reshape(s.shape) for part in found))
 
-    # The world to road and lane coordinates
+    # World coordinates to road and lane coordinates
 
     def locate(self, x: ArrayLike, y: ArrayLike, z: ArrayLike | None = None, reach: float = REACH) -> LaneLocations:
-        """Return lane locations of points (N,); where roads lie above each other, z decides."""
+        """Return lane locations of points (N,). With roads above each other, z selects the road."""
         px, py = np.atleast_1d(np.asarray(x, dtype=np.float64)), np.atleast_1d(np.asarray(y, dtype=np.float64))
         pz = None if z is None else np.atleast_1d(np.asarray(z, dtype=np.float64))
         return self._locator.locate(px, py, pz, reach)
 
     def touched(self, x: Array, y: Array, z: Array | None = None) -> tuple[Integers, Array, Integers]:
-        """Return every lane that lies beneath points (N,): lane rows of `tables`, s on their roads, and whose point it is.
+        """Return all lanes that overlap points (N,): lane rows of `tables`, s on their roads, and indices of the
+        points.
 
-        Outside junctions that is one lane at most; in a junction, one for each connecting road beneath the point.
+        Outside junctions there is at most one lane per point. In a junction there is one for each connecting road.
         """
         return self._locator.overlapped_lanes(x, y, z)
 
     def locate_at(
         self, x: float, y: float, hint: LaneLocation | None = None, z: float | None = None, reach: float = REACH
     ) -> LaneLocation | None:
-        """Return the lane location of a point, None if no road is within reach.
+        """Return the lane location of a point, or None if no road is within `reach` [m].
 
-        With a hint (where it was before) the point stays on that road, or on what the road leads to, as long as it
-        lies on one of their lanes; so something that crosses a junction stays on its own connecting road.
+        With a previous location as `hint`, that road and its successors and predecessors have priority if the point is
+        on
+        one of their lanes. A road user that crosses a junction thus remains on its connecting road.
         """
         if hint is not None and hint.road in self.roads:
             near = locate_near(self.roads, self.links, x, y, hint)
@@ -186,13 +190,16 @@ class RoadNetwork(RoadAttributes):
         return found.location(0)
 
     def location(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> LaneLocation:
-        """Return the lane location with these coordinates, its t filled in. Raise PositionError."""
+        """Return the lane location with these coordinates, including its t. Raise PositionError."""
         road = self.road(road_id)
         section, lane = poses.lane_at(road, lane_id, s)
         return LaneLocation(road_id, lane_id, s, offset, poses.lane_t(road, section, lane, s)[0] + offset)
 
     def road_location(self, road_id: str, s: float, t: float) -> LaneLocation:
-        """Return the lane location of road coordinates, beyond the edge in the outermost lane. Raise PositionError."""
+        """Return the lane location of road coordinates. Outside the road it refers to the outermost lane.
+
+        Raise PositionError if s is outside the road.
+        """
         road = self.road(road_id)
         if not -poses.BEYOND <= s <= road.length + poses.BEYOND:
             raise poses.off_road(road, s)
@@ -211,11 +218,11 @@ class RoadNetwork(RoadAttributes):
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
-        """Return the place `distance` meters further along the lane in its driving direction (backwards if negative).
+        """Return the location `distance` [m] further along the lane in its driving direction (backwards if negative).
 
-        Through links and junctions; at a fork the route decides, else `choose(branches)`, else the straightest way is
-        taken. None if the lane ends, or the place where it does with `to_end`. `visit` says where on a route that
-        comes by several times (`Route.visit`).
+        The path passes links and junctions. At a fork the branch is selected by the route, else by `choose(branches)`,
+        else it is the straightest one. If the lane ends, the result is None, or the end of the lane with `to_end`.
+        `visit` is the visit of the route (`Route.visit`), which may pass a road several times.
         """
         return self.movement.advance(location, distance, route, choose, visit, to_end)
 
@@ -226,10 +233,11 @@ class RoadNetwork(RoadAttributes):
         via: Sequence[LaneLocation] = (),
         costs: Sequence[Cost | None] | None = None,
     ) -> Route:
-        """Return the cheapest way over the lanes from start to end. Raise RouteError if there is none.
+        """Return the cheapest route over lanes from start to end. Raise RouteError if there is none.
 
-        `costs` says for the way to each place of `via` and to the end what counts; None is the length, as everywhere
-        without `costs`.
+        `costs` holds one cost function for each leg: to each location of `via`, and to the end. None means the length,
+        which
+        is also the default.
         """
         stops = [start, *via, end]
         wanted = costs if costs is not None else [None] * (len(stops) - 1)
@@ -242,19 +250,21 @@ class RoadNetwork(RoadAttributes):
     def distance(
         self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", route: Route | None = None
     ) -> tuple[float, float] | None:
-        """How far b lies ahead of a and to its left [m], in road coordinates along connected roads, or None.
+        """Return the distances from a to b ahead and to the left [m] in road coordinates, or None.
 
-        Seen in the driving direction of a's lane; negative for behind and right. With a route along that one, None
-        where it does not pass both places.
+        They refer to the driving direction of the lane of a, and are negative for behind and right. They are measured
+        along
+        connected roads, or along `route`. The result is None if the roads are not connected or the route misses a
+        location.
         """
         if route is None:
             return self._distances.between(a, b, by)
         return route.distance(a, b)
 
     def orientation(self, a: LaneLocation, b: LaneLocation) -> int | None:
-        """Return +1 if the s of b's road runs as that of a's road does, seen along the road, -1 if against it.
+        """Return +1 if s of the road of b increases in the direction of s of the road of a along the chain, else -1.
 
-        None if no chain of roads joins them.
+        The result is None if no chain of roads connects them.
         """
         found = self._distances.placed(a, b)
         return None if found is None else found[2]
@@ -263,7 +273,7 @@ class RoadNetwork(RoadAttributes):
         return assumed_speed(self.speed_limit(road, 0.5 * self.road(road).length))
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Return the smallest rectangle around all lane centers: least x, least y, greatest x, greatest y [m]."""
+        """Return the bounding rectangle of all lane centers: minimum x and y, maximum x and y [m]."""
         points: Array = self._locator.sample_points
         low, high = points.min(axis=0), points.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])

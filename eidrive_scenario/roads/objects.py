@@ -1,4 +1,4 @@
-"""Objects of the road network in the world: where they stand, how large they are, what ground they cover."""
+"""Road objects in world coordinates: poses, dimensions and outlines."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from eidrive_scenario.roads.model.road_map import Corner, RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
 
 LONGEST_PART = 5.0
-"""An object that repeats without gaps (a barrier) is cut into parts of this length [m]."""
+"""Maximum length of a part of an object that repeats without gaps, such as a barrier [m]."""
 
 
 class PlacedObject(NamedTuple):
-    """One object in the world: pose of its foot, length, width and height [m], 0 where the map does not say."""
+    """One object in the world: pose of its base; length, width and height [m], 0 if the map omits them."""
 
     object: RoadObject
     pose: Pose
@@ -28,7 +28,7 @@ class PlacedObject(NamedTuple):
 
 
 def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
-    """Yield all objects, repeated ones once for each repetition."""
+    """Yield all objects, with one item for each repetition."""
     for item in network.objects:
         if item.repeats:
             yield from _repeated(network, item)
@@ -39,7 +39,7 @@ def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
 
 
 def outlines(network: RoadNetwork, item: RoadObject) -> list[Array]:
-    """Return the ground that an object covers, as polygons (M, 3) in the world; its length and width where it has none."""
+    """Return the outlines of an object on the ground as polygons (M, 3), by default from its length and width."""
     if item.outlines:
         return [_corners(network, item, outline) for outline in item.outlines if len(outline) >= 3]
     if item.length <= 0.0 or item.width <= 0.0:

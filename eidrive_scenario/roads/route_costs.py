@@ -1,4 +1,4 @@
-"""What a way over the lanes may cost, other than its length: time, junctions, or chance."""
+"""Costs of routes other than length: travel time, junctions, random factors."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.routing.costs import JUNCTION_COST, Cost, assumed_speed
 
-MOST_UNLIKELY = 10.0
-"""The largest factor by which chance makes a road seem longer than it is."""
+MAX_FACTOR = 10.0
+"""Maximum factor by which a random cost exceeds the length."""
 
 
 def fastest(network: RoadNetwork) -> Cost:
-    """Return seconds at the speed limits."""
+    """Return the travel time at the speed limits [s] as cost."""
     known: dict[LaneKey, float] = {}
 
     def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
@@ -31,7 +31,10 @@ def fastest(network: RoadNetwork) -> Cost:
 
 
 def fewest_junctions(network: RoadNetwork) -> Cost:
-    """Return each junction that is entered counts more than any length; among equals the shortest way."""
+    """Return a cost by which a junction counts more than any length.
+
+    Routes with equally many junctions are ordered by length.
+    """
 
     def cost(one: LaneKey, other: LaneKey, data: Mapping[str, Any]) -> float:
         before, after = network.road(one.road).junction_id, network.road(other.road).junction_id
@@ -41,8 +44,10 @@ def fewest_junctions(network: RoadNetwork) -> Cost:
 
 
 def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
-    """Return meters, each road's times a factor that the generator draws: now one way is the cheapest, now another."""
-    draws = generator.uniform(0.0, math.log(MOST_UNLIKELY), len(network.roads)).tolist()
+    """Return the length times a random factor of each road as cost [m], so that different draws select different
+    routes.
+    """
+    draws = generator.uniform(0.0, math.log(MAX_FACTOR), len(network.roads)).tolist()
     factors = {road: math.exp(draw) for road, draw in zip(network.roads, draws, strict=True)}
 
     def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:

@@ -1,4 +1,4 @@
-"""What a road looks like: surface triangles lane by lane, curbs, and markings, as arrays for drawing."""
+"""Road surfaces for drawing: triangles of lanes, curbs, and markings as arrays."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ KINDS = {
     "marking_white": (0.92, 0.92, 0.90),
     "marking_yellow": (0.92, 0.75, 0.16),
 }
-"""The kinds of surface, each with a color to draw it in: red, green, blue in [0, 1]."""
+"""Kinds of surface with their colors: red, green, blue in [0, 1]."""
 
 _BY_LANE_TYPE = {
     "sidewalk": "sidewalk",
@@ -44,16 +44,19 @@ _BY_LANE_TYPE = {
     "none": "verge",
 }
 FLATNESS = 0.01
-"""How far a cross section may lie from the straight surface that replaces it [m]."""
+"""Maximum deviation of a cross section from the straight surface that replaces it [m]."""
 LONGEST = 25.0
-"""Greatest distance between two cross sections [m]."""
+"""Maximum distance between two cross sections [m]."""
 FILL_RADIUS = 9.0
-"""Triangles of a smaller circumradius fill junctions: the holes between lanes, not the bays at the corners [m]."""
+"""Maximum circumradius of triangles that fill junctions [m]. It covers the holes between lanes, not the corner bays."""
 FILL_DEPTH = 0.02
 CYCLE_DEPTH = 0.01
 MARKING_HEIGHT = 0.02
-"""Markings lie above the surface, the filling of junctions below, and cycle lanes across a junction in between, so that
-nothing flickers in a picture [m]."""
+"""Vertical offset of markings above the surface [m].
+
+The filling of junctions is below the surface, and cycle lanes across a junction are between the two. The offsets
+prevent flickering in images.
+"""
 
 
 @dataclass(frozen=True)
@@ -80,10 +83,10 @@ class _Part(NamedTuple):
 
 
 def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMesh]:
-    """Return all road surfaces and markings, one mesh per kind.
+    """Return all road surfaces and markings as one mesh per kind.
 
-    `spacing` is the distance between the cross sections that are looked at [m]; those that lie within a centimeter of
-    a straight surface are left out.
+    `spacing` is the distance between the evaluated cross sections [m]. Cross sections within a centimeter of a straight
+    surface are omitted.
     """
     parts: list[_Part] = []
     edges: dict[str, list[Array]] = {}
@@ -103,7 +106,7 @@ def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMe
 
 
 def cross_sections(network: RoadNetwork, road: Road, section: LaneSection, spacing: float) -> Array:
-    """Return the s at which a section is cut for drawing: both ends and whatever its curves need in between."""
+    """Return the s of the cross sections of a lane section for drawing: both ends and as many as its curves need."""
     count = max(int(np.ceil(section.length / spacing)), 1) + 1
     s = section.s + np.linspace(0.0, max(section.length - 1e-9, 0.0), count)
     left, right = (
@@ -187,7 +190,7 @@ def _points(network: RoadNetwork, road: Road, s: Array, t: Array) -> Array:
 
 
 def _ribbon(count: int) -> Integers:
-    """Return triangles between two rows of `count` points, the second row numbered after the first."""
+    """Return triangles between two rows of `count` points. The second row is numbered after the first."""
     i = np.arange(count - 1)
     return np.concatenate([np.column_stack([i, i + 1, i + count]), np.column_stack([i + 1, i + count + 1, i + count])])
 
@@ -213,7 +216,7 @@ def _strip_part(network: RoadNetwork, road: Road, strip: Strip) -> _Part:
 
 
 def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
-    """Yield the ground of junctions between and under their connecting lanes."""
+    """Yield the surface of junctions between and below their connecting lanes."""
     for lines in edges.values():
         points = np.concatenate(lines)
         try:
@@ -230,7 +233,7 @@ def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
 
 
 def _upwards(vertices: Array, faces: Integers) -> Integers:
-    """Return the faces, each in the order that is counter-clockwise from above."""
+    """Return the faces in counter-clockwise order seen from above."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     up = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     return np.where((up < 0.0)[:, None], faces[:, ::-1], faces)

@@ -98,7 +98,7 @@ class TrafficLanes:
                         self.left[one], self.right[two] = (two if outward else -1), (one if inward else -1)
 
     def _may_cross(self, one: int, two: int) -> tuple[bool, bool]:
-        """Return whether the marking between neighbors, `one` left of `two` along s, lets cars from one to two, and back.
+        """Whether the marking between neighbors, `one` left of `two` along s, lets cars from one to two, and back.
 
         It is the marking on the outer edge of the lane nearer to lane 0. `increase` lets cars change to the higher id.
         """
@@ -145,7 +145,7 @@ class TrafficLanes:
         return int(row[0]), float(self.progress(row, s)[0])
 
     def chain(self, row: Integers, depth: int) -> Integers:
-        """Return (N, depth) lanes that follow each other from rows (N,) on, the first way at each fork; -1 beyond an end."""
+        """(N, depth) lanes that follow each other from rows (N,) on, the first way at each fork; -1 beyond an end."""
         chain = np.full((len(row), depth), -1)
         chain[:, 0] = row
         for d in range(1, depth):

@@ -82,14 +82,14 @@ class RightOfWay:
                 cars.granted[index] = False
 
     def _distances(self, cars: Cars, begins: Array) -> Array:
-        """Return (N,) meters to the first junction lane ahead that a car may not enter yet, inf if there is none in sight."""
+        """(N,) meters to the first junction lane ahead that a car may not enter yet, inf if there is none in sight."""
         barred = (cars.plan >= 0) & self._lanes.in_junction[cars.plan] & ~cars.granted & ~cars.walks[:, None]
         barred[:, 0] = False
         distance = np.where(barred, begins, np.inf).min(axis=1)
         return np.where(distance > LOOK_AHEAD, np.inf, distance)
 
     def _passage(self, cars: Cars, index: int) -> list[int]:
-        """Return the lanes through the next junction that a car may not enter yet, to the end of its last connecting road."""
+        """The lanes through the next junction that a car may not enter yet, to the end of its last connecting road."""
         lanes = self._lanes
         found: list[int] = []
         for row, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):

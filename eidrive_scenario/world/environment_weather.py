@@ -33,7 +33,7 @@ _CLOUDS = {"free": 0.0, "cloudy": 0.5, "overcast": 1.0, "rainy": 1.0, "skyOff": 
 
 
 def weather_from_environment(environment: Environment, time: float = 0.0) -> Weather:
-    """Return the weather at a time of the run [s]; what the environment does not say is as in a `Weather` without settings.
+    """The weather at a time of the run [s]; what the environment does not say is as in a `Weather` without settings.
 
     Angles of the sun and of the wind are taken as the standard has them: the sun's azimuth from north (y) over east
     (x), the wind's direction from x over y.

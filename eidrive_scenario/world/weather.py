@@ -118,7 +118,7 @@ class Weather(Settings):
 
 
 def load_weather(source: str | Path, *, origin: str = "") -> Weather:
-    """Return a preset of the library by name, or a YAML file; `origin` says where the name was given, such as an option.
+    """A preset of the library by name, or a YAML file; `origin` says where the name was given, such as an option.
 
     Raise SettingError with the file and line of each mistake, or with `origin` where there is no such file.
     """

@@ -222,7 +222,7 @@ class World:
         return cast_rays(self._client, begin, end, self._actors.row_of_handle, passed)
 
     def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
-        """Return the rows that rays meet first, as `raycast` has them: quicker for up to a thousand rays in plain numbers."""
+        """The rows that rays meet first, as `raycast` has them: quicker for up to a thousand rays in plain numbers."""
         self._refresh()
         if self._unseen:
             rows: list[int] = self.raycast(origins, targets).rows.tolist()
@@ -230,7 +230,7 @@ class World:
         return first_met(self._client, origins, targets, self._actors.row_in_list)
 
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
-        """Return (M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
+        """(M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
         clear: NDArray[np.bool_] = self.raycast(origin, targets, ignore).fraction >= 1.0
         return clear
 
@@ -256,7 +256,7 @@ class World:
         return CameraImage(rgb, seen.depth, seen.segmentation)
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
-        """Return the light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
+        """The light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
         if self._visuals is None:
             self._visuals = Visuals(self._scenery)
         rows = self.view().rows

@@ -53,7 +53,7 @@ def test_acquire_position_assigns_a_route_from_the_actor(scene: RunScene) -> Non
 def test_route_to_unreachable_position_is_rejected_with_its_line(scene: RunScene, action: str) -> None:
     """The position is behind the actor, in a lane of the same direction."""
     behind, further = (f'<Position><LanePosition roadId="1" laneId="-2" s="{s}"/></Position>' for s in (50, 20))
-    with pytest.raises(ScenarioError, match=r"scene\.xosc:\d+: .*no way over the lanes from road '1' lane -"):
+    with pytest.raises(ScenarioError, match=r"scene\.xosc:\d+: .*no route over the lanes leads from road '1' lane -"):
         scene(0.2, ("Ego", private(f"<RoutingAction>{action.format(behind, further)}</RoutingAction>")))
 
 

@@ -1,9 +1,10 @@
-"""Writes the roads of the scenario library: `python xosc/roads/make_roads.py` from the checkout.
+"""Generator of the roads of the scenario library: `python xosc/roads/make_roads.py` in the checkout.
 
-Each file is a crossing of two straight streets with the lanes of one of the paper's places. Frame: the ego vehicle
-starts at the origin and drives along x; y points left. Meters throughout. Connecting roads lead along lane centers:
-straight on for every lane, right from the outermost lane, left from the innermost; a turn is a line, then clothoid, arc
-and clothoid, so that the curvature has no jump.
+Each file is a crossing of two straight streets with the lanes of one site of the paper. The ego vehicle starts at the
+origin and drives along x; y points left. Lengths are in meters. Connecting roads follow lane centers: straight for
+every
+lane, right from the outermost lane, left from the innermost. A turn is a line, then clothoid, arc and clothoid, so that
+the curvature is continuous.
 """
 
 from __future__ import annotations
@@ -21,23 +22,23 @@ LANE = 3.5
 SIDEWALK = 2.0
 CURB = 0.12
 CLOTHOID = math.radians(25.0)
-"""Part of a quarter turn that each of the two clothoids takes."""
+"""Part of a quarter turn that each of the two clothoids covers [rad]."""
 CORNER_MARGIN = 2.6
-"""Width between a right turn's lane and the curb in the middle of the turn."""
+"""Width between the lane of a right turn and the curb in the middle of the turn [m]."""
 HOUSES = ((14.0, 10.0, 9.5), (11.0, 9.0, 6.5), (18.0, 12.0, 13.0))
-"""Length along the street, depth and height of the houses of a row."""
+"""Length along the street, depth and height of the houses of a row [m]."""
 HOUSE_GAP, SETBACK, CORNER_CLEARANCE = 5.0, 3.0, 14.0
-"""Between houses, from the sidewalk, and from where the street meets the junction."""
+"""Gap between houses, distance from the sidewalk, and distance from the junction [m]."""
 SPEED_LIMIT = "50"
 PROJECTION = "+proj=tmerc +lat_0=49 +lon_0=8 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"
-"""The places are not tied to the globe; a projection lets V2X messages carry latitude and longitude."""
+"""Projection of the maps, by which V2X messages carry latitude and longitude. The position on Earth is arbitrary."""
 
 Element = etree._Element
 
 
 @dataclass(frozen=True)
 class LaneSpec:
-    """One lane of a street: type, width and the marking on its outer edge (type, color)."""
+    """Lane of a street: type, width and the marking on its outer edge (type, color)."""
 
     type: str
     width: float
@@ -46,7 +47,7 @@ class LaneSpec:
 
 @dataclass(frozen=True)
 class Street:
-    """The lanes of a street, from lane 0 outwards."""
+    """Lanes of a street, from lane 0 outwards."""
 
     left: tuple[LaneSpec, ...]
     right: tuple[LaneSpec, ...]
@@ -56,22 +57,22 @@ class Street:
         return self.left if sign > 0 else self.right
 
     def center_of(self, lane: int) -> float:
-        """t of a lane's center."""
+        """Return t of the center of a lane."""
         specs = self.side(lane)
         sign = 1 if lane > 0 else -1
         return sign * (sum(spec.width for spec in specs[: abs(lane) - 1]) + specs[abs(lane) - 1].width / 2)
 
     def driving(self, sign: int) -> list[int]:
-        """Ids of the driving lanes on one side, from the innermost."""
+        """Return the ids of the driving lanes on one side, from the innermost."""
         return [sign * (i + 1) for i, spec in enumerate(self.side(sign)) if spec.type == "driving"]
 
     def edge(self, sign: int) -> float:
-        """|t| of the outer edge of the last driving lane."""
+        """Return |t| of the outer edge of the last driving lane."""
         last = self.driving(sign)[-1]
         return abs(self.center_of(last)) + LANE / 2
 
     def verge(self, sign: int) -> float:
-        """Width between the last driving lane and the sidewalk."""
+        """Return the width between the last driving lane and the sidewalk."""
         specs = self.side(sign)[abs(self.driving(sign)[-1]) :]
         return sum(spec.width for spec in specs if spec.type != "sidewalk")
 
@@ -86,17 +87,19 @@ AVENUE = Street(
     right=AVENUE_SIDE,
     center=("broken solid", "yellow"),
 )
-"""Two lanes each way around a shared left-turn lane."""
+"""Street with two lanes per direction around a shared left-turn lane."""
 SIDE_STREET_SIDE = (DRIVING_OUTER, LaneSpec("parking", 3.5), LaneSpec("shoulder", 0.5), GUTTER, WALK)
 SIDE_STREET = Street(left=SIDE_STREET_SIDE, right=SIDE_STREET_SIDE, center=("solid solid", "yellow"))
-"""One lane each way with parking on both sides."""
+"""Street with one lane per direction and parking on both sides."""
 
 
 @dataclass(frozen=True)
 class Arm:
-    """A street up to (contact 'end') or from (contact 'start') the junction; its reference line points along `heading`.
+    """Street up to (contact 'end') or from (contact 'start') the junction; its reference line has the direction
+    `heading`.
 
-    x, y  where the reference line starts; approach  side of the lanes that lead to the junction: -1 right, +1 left
+    x, y      start of the reference line
+    approach  side of the lanes that lead to the junction: -1 right, +1 left
     """
 
     id: str
@@ -116,22 +119,23 @@ class Arm:
         return -1 if self.contact == "end" else 1
 
     def mouth(self, lane: int) -> tuple[float, float]:
-        """Where a lane's center meets the junction."""
+        """Return the point at which the center of a lane meets the junction."""
         s, t = (self.length if self.contact == "end" else 0.0), self.street.center_of(lane)
         cos, sin = math.cos(self.heading), math.sin(self.heading)
         return self.x + cos * s - sin * t, self.y + sin * s + cos * t
 
     @property
     def inward(self) -> float:
-        """Heading of traffic that enters the junction here."""
+        """Heading of traffic that enters the junction."""
         return self.heading if self.contact == "end" else self.heading + math.pi
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """The ego's street along x with its lane 0 at y = `y`, another along y with its lane 0 at x = `x`.
+    """Street of the ego along x with lane 0 at y = `y`, and a street along y with lane 0 at x = `x`.
 
-    box  where the arms meet the junction: near x, far x, right y, left y; reach  where the arms end, in that order
+    box    ends of the arms at the junction: near x, far x, right y, left y
+    reach  outer ends of the arms, in that order
     """
 
     name: str
@@ -183,7 +187,7 @@ CROSSINGS = (
 
 @dataclass(frozen=True)
 class Way:
-    """A connecting road: lanes of one arm to lanes of another."""
+    """Connecting road from lanes of one arm to lanes of another."""
 
     start: Arm
     end: Arm
@@ -192,7 +196,7 @@ class Way:
 
 
 def ways(arms: dict[str, Arm]) -> Iterator[Way]:
-    """All movements of a crossing."""
+    """Yield all movements of a crossing."""
     for arm in arms.values():
         entering = arm.street.driving(arm.approach)
         for turn, other in (("ahead", arms[arm.ahead]), ("right", arms[arm.right]), ("left", arms[arm.left])):
@@ -206,7 +210,7 @@ def ways(arms: dict[str, Arm]) -> Iterator[Way]:
 
 
 def course(way: Way) -> list[curves.Curve]:
-    """The center line of the way's first lane."""
+    """Return the center line of the first lane of a connecting road."""
     (x, y), (x_end, y_end) = way.start.mouth(way.lanes[0][0]), way.end.mouth(way.lanes[0][1])
     heading = way.start.inward
     along = math.cos(heading) * (x_end - x) + math.sin(heading) * (y_end - y)
@@ -232,7 +236,7 @@ def course(way: Way) -> list[curves.Curve]:
 
 
 def _quarter_turn(tangent: float) -> list[tuple[str, float] | tuple[str, float, float]]:
-    """Clothoid, arc and clothoid that turn by 90° and use up `tangent` meters of both straight lines."""
+    """Return a clothoid, an arc and a clothoid that turn by 90° and use `tangent` [m] of both straight lines."""
     spiral_length, arc_length = 2.0 * CLOTHOID, math.pi / 2 - 2.0 * CLOTHOID
     x, y, h = 0.0, 0.0, 0.0
     for start, end, length in ((0.0, 1.0, spiral_length), (1.0, 1.0, arc_length), (1.0, 0.0, spiral_length)):
@@ -246,12 +250,12 @@ def _quarter_turn(tangent: float) -> list[tuple[str, float] | tuple[str, float, 
 
 
 def text(value: float) -> str:
-    """A number as the files write it."""
+    """Return a number in the notation of the files."""
     return f"{value + 0.0:.12g}"
 
 
 def add(parent: Element, tag: str, **attributes: str | float) -> Element:
-    """A new child element."""
+    """Append a child element and return it."""
     return etree.SubElement(
         parent, tag, {key.rstrip("_"): text(v) if isinstance(v, float) else str(v) for key, v in attributes.items()}
     )
@@ -262,8 +266,10 @@ def add_width(lane: Element, pieces: Sequence[tuple[float, float, float, float, 
         add(lane, "width", sOffset=s, a=a, b=b, c=c, d=d)
 
 
-def eased(start: float, middle: float, end: float, length: float) -> list[tuple[float, float, float, float, float]]:
-    """A width that goes from start over middle to end without a kink."""
+def smooth_width(
+    start: float, middle: float, end: float, length: float
+) -> list[tuple[float, float, float, float, float]]:
+    """Return a width that changes smoothly from start over middle to end."""
     pieces = []
     half = length / 2
     for s, a, b in ((0.0, start, middle), (half, middle, end)):
@@ -287,7 +293,7 @@ def add_lane(side: Element, number: int, spec: LaneSpec) -> Element:
 
 
 def add_road(root: Element, number: str, name: str, length: float, junction: str) -> tuple[Element, Element, Element]:
-    """A road with its fixed children; returns the road, its link and its planView."""
+    """Append a road with its fixed children. Return the road, its link and its planView."""
     road = add(root, "road", rule="RHT", name=name, length=length, id=number, junction=junction)
     link = add(road, "link")
     kind = add(road, "type", s=0.0, type="town")
@@ -313,11 +319,11 @@ def write_arm(root: Element, arm: Arm, crossing: Crossing) -> None:
     right = add(section, "right")
     for i, spec in enumerate(arm.street.right, start=1):
         add_lane(right, -i, spec)
-    write_furniture(road, arm, crossing)
+    write_objects_and_signals(road, arm, crossing)
 
 
-def write_furniture(road: Element, arm: Arm, crossing: Crossing) -> None:
-    """Crosswalk, stop line, and a stop sign or a traffic light, for the traffic that enters the junction."""
+def write_objects_and_signals(road: Element, arm: Arm, crossing: Crossing) -> None:
+    """Add crosswalk, stop line, and stop sign or traffic light for the traffic that enters the junction."""
     sign = arm.approach
     end, back = (arm.length, -1.0) if arm.contact == "end" else (0.0, 1.0)
     curbs = [side * (arm.street.edge(side) + arm.street.verge(side)) for side in (-1, 1)]
@@ -351,7 +357,7 @@ def write_furniture(road: Element, arm: Arm, crossing: Crossing) -> None:
 
 
 def write_buildings(objects: Element, arm: Arm) -> None:
-    """A row of houses on each side, set back from the sidewalk and well away from the junction's corners."""
+    """Add a row of houses on each side, set back from the sidewalk and away from the corners of the junction."""
     for side in (-1, 1):
         curb = sum(spec.width for spec in arm.street.side(side))
         from_junction = CORNER_CLEARANCE
@@ -378,7 +384,7 @@ def write_buildings(objects: Element, arm: Arm) -> None:
 
 
 def write_area(objects: Element, number: str, kind: str, s: float, s_end: float, t: float, t_end: float) -> None:
-    """A painted area of the road between two s and two t."""
+    """Add a painted area of the road between two s and two t."""
     middle, across = (s + s_end) / 2, (t + t_end) / 2
     item = add(
         objects,
@@ -423,7 +429,7 @@ def write_way(root: Element, number: str, way: Way) -> None:
     add(center, "link")
     add_mark(center, ("none", "white"))
     if way.turn == "ahead" and way.start.street.left[0].type == "bidirectional":
-        # The two ways straight on cover half of the middle lane each, which itself ends at the junction.
+        # Each of the two straight connecting roads covers half of the middle lane, which ends at the junction.
         left = etree.Element("left")
         section.insert(0, left)
         add_lane(left, 1, LaneSpec("bidirectional", LANE / 2))
@@ -439,13 +445,13 @@ def write_way(root: Element, number: str, way: Way) -> None:
 
 
 def write_corner(right: Element, way: Way, length: float) -> None:
-    """Between a right turn's lane and the corner: a margin up to the curb, then the sidewalk."""
+    """Add the margin between the lane of a right turn and the curb, then the sidewalk."""
     start = way.start.street.verge(way.start.approach)
     end = way.end.street.verge(-way.end.approach)
     margin = add_lane(right, -2, LaneSpec("shoulder", start, ("curb", "standard")))
     for old in margin.findall("width"):
         margin.remove(old)
-    for i, (s, a, b, c, d) in enumerate(eased(start, CORNER_MARGIN, end, length)):
+    for i, (s, a, b, c, d) in enumerate(smooth_width(start, CORNER_MARGIN, end, length)):
         width = etree.Element("width")
         for key, value in (("sOffset", s), ("a", a), ("b", b), ("c", c), ("d", d)):
             width.set(key, text(value))
@@ -454,7 +460,7 @@ def write_corner(right: Element, way: Way, length: float) -> None:
 
 
 def write(crossing: Crossing, path: Path) -> None:
-    """The OpenDRIVE file of a crossing."""
+    """Write the OpenDRIVE file of a crossing."""
     arms = crossing.arms()
     near_end, far_end, right_end, left_end = crossing.reach
     root = etree.Element("OpenDRIVE")

@@ -1,4 +1,4 @@
-"""World coordinates to roads and lanes: nearest sample of a lane center first, Newton's method on the road after."""
+"""Search for the road and lane at world coordinates: nearest sample of a lane center, then Newton's method."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from eidrive_scenario.roads.model.location import LaneLocations
 SPACING = 4.0
 """Distance between samples along a lane [m]."""
 NARROW = 1.0
-"""Lanes narrower than this are found by way of their neighbors [m]."""
+"""Minimum width of a lane that gets samples [m]. Narrower lanes are located by their neighbors."""
 CANDIDATES = 12
 MANY = 1000
-"""More points than this are put in order first."""
+"""Minimum number of points that are sorted before the search."""
 REACH = 30.0
-"""How far from a road a point may lie to be located on it [m]."""
+"""Default maximum distance of a point from the road on which it is located [m]."""
 
 
 class Locator:
-    """Finds road and lane coordinates of points.
+    """Locator of points in road and lane coordinates.
 
-    A point is taken to the road whose lane center is nearest; where it turns out to lie on none of that road's lanes,
-    the roads of the next samples are tried and the one wins that the point lies on, or is nearest to.
+    A point belongs to the road with the nearest lane center. If it is on none of the lanes of that road, the roads of
+    the
+    next samples are tried. The result is the road that contains the point, or else the nearest one.
     """
 
     def __init__(self, tables: RoadTables) -> None:
@@ -38,21 +39,21 @@ class Locator:
         self._road = tables.section_road[tables.lane_section[self._row]]
         self.sample_points: Array = np.column_stack([poses.x, poses.y])
         self._from_samples = tables.widest_lane + NARROW + SPACING
-        """No point on a road is further away from the nearest of its samples [m]."""
+        """Maximum distance of a point on a road from the nearest of its samples [m]."""
         self._flat = cKDTree(self.sample_points)
         self._solid = cKDTree(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
 
     def locate(self, x: Array, y: Array, z: Array | None, reach: float = REACH) -> LaneLocations:
-        """Return road and lane coordinates of points (N,); without z, the nearest in plan view counts."""
+        """Return road and lane coordinates of points (N,). Without z, the nearest road in plan view is selected."""
         solid = z is not None and self._solid is not None
         tree = self._solid if solid and self._solid is not None else self._flat
         points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
-        # What is far from all samples is out of reach of every road.
+        # A point that is far from all samples is outside the reach of every road.
         hopeless = np.inf if solid else reach + self._from_samples
         distance, nearest = (np.asarray(part) for part in tree.query(points, k=1, distance_upper_bound=hopeless))
         if len(points) <= MANY and distance.max(initial=0.0) < np.inf:
             return self._located(tree, points, nearest, reach)
-        # Neighbors one after the other: tables are searched faster in order.
+        # Sorted points make the lookup in the tables faster.
         order = np.flatnonzero(distance < np.inf)
         order = order[np.argsort(nearest[order])]
         some = self._located(tree, points[order], nearest[order], reach)
@@ -62,7 +63,7 @@ class Locator:
         return found
 
     def _located(self, tree: cKDTree, points: Array, nearest: Integers, reach: float) -> LaneLocations:
-        """Return points (N, 2), or (N, 3) where height counts, by the samples of `tree` that are nearest to them."""
+        """Return locations of points (N, 2), or (N, 3) with heights, by the nearest samples of `tree`."""
         x, y, z = points[:, 0], points[:, 1], points[:, 2] if points.shape[1] > 2 else None
         road, s = self._road[nearest], self._s[nearest]
         s, t, beyond = self._refine(road, s, x, y)
@@ -89,7 +90,7 @@ class Locator:
         )
 
     def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
-        """Return every lane beneath points (N,): its row, s on its road, and the point's number."""
+        """Return all lanes that overlap points (N,): lane rows, s on their roads, and indices of the points."""
         found = self.locate(x, y, z)
         on = np.flatnonzero((found.road >= 0) & (found.outside <= 0.0))
         pair, other, guess = self._overlaps.beneath(found.road[on], x[on], y[on])
@@ -107,9 +108,9 @@ class Locator:
     def _compare(
         self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None, limit: Array
     ) -> tuple[Integers, Array, Array, Integers, Array]:
-        """Return the best of the roads of the nearest samples: the one whose surface is nearest.
+        """Return the best road of the nearest samples: the one with the nearest surface.
 
-        limit  (N,) distance beyond which a sample's road cannot be nearer than what is known already [m]
+        limit  (N,) distance of a sample from which on its road cannot be nearer than the best road so far [m]
         """
         k = min(CANDIDATES, len(self._s))
         distance, nearest = (np.asarray(part) for part in tree.query(points, k=k))
@@ -132,7 +133,7 @@ class Locator:
         return road[best], s[best], t[best], row[best], outside[best]
 
     def _refine(self, road: Integers, s: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """s, t and the distance beyond an end of the road, by Newton's method from a guess of s."""
+        """Return s, t and the distance beyond an end of the road by Newton's method from an initial s."""
         curves, length = self._tables.curves, self._tables.length[road]
         s, t, beyond = s.copy(), np.empty_like(s), np.zeros_like(s)
         open_ = np.arange(len(s))
@@ -162,13 +163,13 @@ class Locator:
 
 
 def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:
-    """Return the columns of LaneLocations for places that no road is near."""
+    """Return the columns of LaneLocations for points without a road within reach."""
     s, t, offset, heading = np.zeros((4, count))
     return np.full(count, -1), np.zeros(count, dtype=np.int64), s, t, offset, heading, np.full(count, np.inf)
 
 
 def _samples(tables: RoadTables) -> tuple[Integers, Array]:
-    """Return lane rows and s of the samples: along every lane that is not narrow, and along the widest of each section."""
+    """Return lane rows and s of samples along all lanes of sufficient width and the widest lane of each section."""
     lanes = np.flatnonzero(tables.lane_id != 0)
     section = tables.lane_section[lanes]
     length = tables.section_length[section]
@@ -181,6 +182,6 @@ def _samples(tables: RoadTables) -> tuple[Integers, Array]:
     row = np.repeat(lanes, counts)
     number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
     part = number / np.repeat(counts - 1, counts)
-    # The end of a section belongs to the next one: stay a little inside.
+    # The end of a section belongs to the next one; the sample is slightly inside.
     s = np.repeat(tables.section_start[section], counts) + np.repeat(np.maximum(length - 1e-6, 0.0), counts) * part
     return row, s

@@ -1,4 +1,4 @@
-"""Where the roads of a junction lie over each other: which others may lie beneath a point of one of them."""
+"""Overlapping roads of junctions: candidates for roads below a point."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from eidrive_scenario.roads.geometry.tables import RoadTables
 
 
 class Overlaps:
-    """For points on connecting roads, the other roads of the junction that are near, and where on them.
+    """Nearby roads of the same junction for points on connecting roads.
 
-    points, road, s  (S,) samples along the lanes of all roads, the samples of a road next to each other
-    reach            no lane of a road lies further from its nearest sample than this [m]
+    points, road, s  (S,) samples along the lanes of all roads; samples of a road are contiguous
+    reach            maximum distance of a lane of a road from its nearest sample [m]
     """
 
     def __init__(self, tables: RoadTables, points: Array, road: Integers, s: Array, reach: float) -> None:
@@ -35,7 +35,7 @@ class Overlaps:
         np.maximum.at(self._high, road, points)
 
     def beneath(self, road: Integers, x: Array, y: Array) -> tuple[Integers, Integers, Array]:
-        """For points (N,) on roads, pairs of a point's number and another road near it, and s of its nearest sample."""
+        """Return pairs of point index and nearby other road for points (N,), and s of its nearest sample."""
         counts = self._counts[road]
         point = np.repeat(np.arange(len(road)), counts)
         if not point.size:
@@ -55,7 +55,7 @@ class Overlaps:
         sample = np.arange(len(owner)) - np.repeat(begins, sizes) + np.repeat(first, sizes)
         gap = (self._points[sample, 0] - px[owner]) ** 2 + (self._points[sample, 1] - py[owner]) ** 2
         least = np.minimum.reduceat(gap, begins)
-        # The first of equally near samples, as argmin has it.
+        # Ties select the first sample, as argmin does.
         at = np.flatnonzero(gap == least[owner])
         at = at[np.unique(owner[at], return_index=True)[1]]
         close = least <= reach * reach

@@ -1,7 +1,7 @@
-"""Road and lane coordinates to poses, one at a time: plain floats, as fast as Python goes.
+"""Scalar conversion of road and lane coordinates to poses, in plain floats for speed.
 
-The t-axis is turned by heading, slope and superelevation, in this order (OpenDRIVE 1.8, 8.3): z-y'-x''. It lies in the
-inclined surface. Where a road climbs and is banked, the cross section is not vertical: it leans back by t·sin·sin.
+The t-axis is rotated by heading, slope and superelevation, in this order (OpenDRIVE 1.8, 8.3): z-y'-x''. It is in the
+inclined surface. On a banked slope the cross section is not vertical: it leans back by t·sin·sin.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from eidrive_scenario.roads.model.location import Pose, PositionError
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 
 BEYOND = 0.1
-"""How far beyond an end of a road a place may lie and still count as its end [m]."""
+"""Maximum distance beyond an end of a road at which a position counts as that end [m]."""
 LEAST_STRETCH = 0.05
-"""A lane inside the center of a bend has no length to speak of, and no heading of its own: so many meters of path count
-per meter of s."""
+"""Minimum path length per meter of s. Inside the center of a bend, a lane has no length and no heading."""
 
 
 def road_pose_at(road: Road, s: float, t: float) -> Pose:
-    """Return the pose at road coordinates; its heading is that of the reference line. Raise PositionError."""
+    """Return the pose at road coordinates with the heading of the reference line. Raise PositionError."""
     if not -BEYOND <= s <= road.length + BEYOND:
         raise off_road(road, s)
     x, y, h, _, _ = road.reference.at(s)
@@ -44,9 +43,9 @@ def lateral_axis(slope: float, roll: float) -> tuple[float, float, float]:
 
 
 class Tangent(NamedTuple):
-    """A point of a lane on a banked road and the change of its place per meter of s.
+    """Point of a lane on a banked road and its derivative by s.
 
-    The axes are those of the reference line seen from above: ahead, to the left, and up [m].
+    The axes are those of the reference line in plan view: ahead, left, and up [m].
     """
 
     ahead: float
@@ -59,7 +58,7 @@ class Tangent(NamedTuple):
 
 
 def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: float, speed: float) -> Tangent:
-    """Return the place and tangent of a lane at t that changes by `sideways` per meter of s.
+    """Return the point and tangent of a lane at t, which changes by `sideways` per meter of s.
 
     `curvature` and `speed` are those of the reference line at s.
     """
@@ -75,7 +74,7 @@ def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: f
     aside = sideways * cos - t * sin * twist + curvature * speed * ahead
     climb = slope + rise * level - t * sin * slope * steeper
     along = max(along, LEAST_STRETCH)
-    # The surface's normal is the product of the tangent and the t-axis, which is (-sin·steep, cos, sin·level).
+    # The normal of the surface is the product of the tangent and the t-axis, which is (-sin·steep, cos, sin·level).
     nx, ny = aside * sin * level - climb * cos, -climb * sin * steep - along * sin * level
     nz = along * cos + aside * sin * steep
     left_z = nx * aside - ny * along
@@ -84,9 +83,9 @@ def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: f
 
 
 def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pose:
-    """Return the pose at a lane's center line plus `offset`; heading and pitch are the lane's, in the direction of growing s.
+    """Return the pose at the center line of a lane plus `offset`, with heading and pitch of the lane along s.
 
-    A lane that the map lifts (a sidewalk) is higher than the road beneath it. Raise PositionError.
+    A lane with <height>, such as a sidewalk, is above the road surface. Raise PositionError.
     """
     section, lane = lane_at(road, lane_id, s)
     t, sideways = lane_t(road, section, lane, s)
@@ -117,7 +116,9 @@ def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pos
 
 
 def lane_height(lane: Lane, ds: float, offset: float) -> float:
-    """How much a lane is lifted above the road, `offset` off its center line, ds behind its section's start [m]."""
+    """Return the height of a lane above the road [m], `offset` from its center line, `ds` after the start of its
+    section.
+    """
     record = None
     for height in lane.heights:
         if height.s_offset <= ds + 1e-9:
@@ -130,7 +131,7 @@ def lane_height(lane: Lane, ds: float, offset: float) -> float:
 
 
 def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[float, float]:
-    """t of a lane's center line at s, and its derivative."""
+    """Return t of the center line of a lane at s, and its derivative."""
     t, slope = road.lane_offset.value_and_slope(s)
     if lane.id == 0:
         return t, slope
@@ -139,7 +140,7 @@ def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[floa
 
 
 def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
-    """Return the lane with this id at s. Raise PositionError if the road is shorter, or has no such lane there."""
+    """Return the lane with this id at s. Raise PositionError if the road is shorter or has no such lane at s."""
     if not -BEYOND <= s <= road.length + BEYOND:
         raise off_road(road, s)
     section = road.section_at(s)
@@ -153,7 +154,10 @@ def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
 
 
 def lane_beside(road: Road, s: float, t: float) -> tuple[LaneSection, Lane, float]:
-    """Return the lane at road coordinates and the distance from the road's edge (0 on the road); beyond it, the last lane."""
+    """Return the lane at road coordinates and the distance from the road edge, 0 on the road.
+
+    Outside the road it is the outermost lane.
+    """
     section = road.section_at(s)
     offset = t - road.lane_offset.value(s)
     ds = s - section.s
@@ -173,9 +177,9 @@ def lane_beside(road: Road, s: float, t: float) -> tuple[LaneSection, Lane, floa
 
 
 def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, float]:
-    """Return road coordinates s, t of a point, searched from a first guess, and how far it lies beyond an end of the road.
+    """Return road coordinates s, t of a point and its distance beyond an end of the road [m].
 
-    Newton's method on the distance to the reference line.
+    Newton's method on the distance to the reference line starts from `s`.
     """
     length = road.length
     along = across = t = 0.0
@@ -201,12 +205,12 @@ def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, flo
 
 
 def off_road(road: Road, s: float) -> PositionError:
-    """Return the error for a place beyond the ends of a road."""
+    """Return the error for a position beyond the ends of a road."""
     return PositionError(
-        Diagnostic(f"s = {s:g} m is not on road {road.id!r}", f"the road runs from 0 to {road.length:g} m")
+        Diagnostic(f"s = {s:g} m is not on road {road.id!r}", f"the road extends from 0 to {road.length:g} m")
     )
 
 
 def unknown_road(number: str, known: list[str]) -> PositionError:
     """Return the error for a road that does not exist."""
-    return PositionError(Diagnostic(f"there is no road {number!r}", suggestion(number, known)))
+    return PositionError(Diagnostic(f"road {number!r} does not exist", suggestion(number, known)))

@@ -1,4 +1,4 @@
-"""All roads of a network as flat arrays: road and lane coordinates to poses for any mixture of roads at once."""
+"""All roads of a network as flat arrays, for poses at coordinates on any mixture of roads."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 class RoadTables:
     """Roads by their index in `ids`; lane sections and lanes by running numbers over all roads.
 
-    The lanes of a section stand in the order 0, 1, 2, … -1, -2, …
+    The lanes of a section are in the order 0, 1, 2, … -1, -2, …
     """
 
     def __init__(self, roads: Sequence[Road]) -> None:
@@ -33,7 +33,7 @@ class RoadTables:
         self.elevation = PolynomialTable([road.elevation for road in roads], spans)
         self.superelevation = PolynomialTable([road.superelevation for road in roads], spans)
         self.banked = not self.superelevation.is_zero
-        """Whether any road is superelevated."""
+        """Whether any road has a superelevation."""
         self.lane_offset = PolynomialTable([road.lane_offset for road in roads], spans)
         self._index_sections()
 
@@ -63,27 +63,27 @@ class RoadTables:
 
     @cached_property
     def widest_lane(self) -> float:
-        """The largest width of any lane, looked at its start, middle and end [m]."""
+        """Maximum width of any lane at its start, middle and end [m]."""
         lanes = np.arange(len(self.lane_id))
         length = self.section_length[self.lane_section]
         widths = [self.width.value(lanes, length * part).max(initial=0.0) for part in (0.0, 0.5, 1.0)]
         return float(max(widths))
 
     def section_of(self, road: Integers, s: Array) -> Integers:
-        """Running number of the lane section at s (N,) of roads (N,)."""
+        """Return the running number of the lane section at s (N,) of roads (N,)."""
         keys = self.curves.base[road] + s
         found: Integers = np.searchsorted(self._section_keys, keys, side="right") - 1
         first: Integers = self.first_section[road]
         return np.maximum(found, first)
 
     def lane_row(self, road: Integers, s: Array, lane: Integers) -> Integers:
-        """Running number of lanes by their id (N,) at s (N,). Raise PositionError for one that does not exist."""
+        """Return the running numbers of lanes by their id (N,) at s (N,). Raise PositionError if one does not exist."""
         section = self.section_of(road, s)
         left, right = self.left_count[section], self.right_count[section]
         row = self.first_lane[section] + np.where(lane >= 0, np.minimum(lane, left), left + np.minimum(-lane, right))
         wrong = self.lane_id[row] != lane
         for n in np.flatnonzero(wrong):
-            # Lane ids with gaps are against the standard, but occur: look the lane up by its id.
+            # Gaps in lane ids violate the standard but occur, so that lanes are found by id.
             end = self.first_lane[section[n]] + left[n] + right[n] + 1
             near = np.flatnonzero(self.lane_id[self.first_lane[section[n]] : end] == lane[n])
             if not near.size:
@@ -96,7 +96,7 @@ class RoadTables:
         return np.asarray(row, dtype=np.int64)
 
     def row_of(self, key: LaneKey) -> int:
-        """Running number of the lane of a lane section. Raise KeyError if there is none."""
+        """Return the running number of a lane of a lane section. Raise KeyError if it does not exist."""
         section = self.first_section[self.index[key.road]] + key.section
         first = int(self.first_lane[section])
         for row in range(first, first + int(self.left_count[section] + self.right_count[section]) + 1):
@@ -105,14 +105,14 @@ class RoadTables:
         raise KeyError(key)
 
     def check(self, road: Integers, s: Array) -> None:
-        """Raise PositionError for the first place beyond the ends of its road."""
+        """Raise PositionError for the first position beyond the ends of its road."""
         wrong = np.flatnonzero((s < -BEYOND) | (s > self.length[road] + BEYOND))
         if wrong.size:
             first = wrong[0]
             raise off_road(self.roads[road[first]], float(s[first]))
 
     def road_poses(self, road: Integers, s: Array, t: Array) -> Poses:
-        """Poses at road coordinates (N,); headings of the reference lines."""
+        """Return the poses at road coordinates (N,) with the headings of the reference lines."""
         x, y, h, _, _ = self.curves.at(road, s)
         z, slope = self.elevation.value_and_slope(road, s)
         pitch = -np.arctan(slope)
@@ -132,7 +132,7 @@ class RoadTables:
         return -sin * slope / steep, np.cos(roll), sin / steep, roll
 
     def lane_poses(self, row: Integers, s: Array, offset: Array) -> Poses:
-        """Poses at the center lines of lanes (running numbers) plus offset; `poses.lane_pose_at` over arrays."""
+        """Return the poses at the center lines of lanes (running numbers) plus offset, as `poses.lane_pose_at` does."""
         section = self.lane_section[row]
         road = self.section_road[section]
         t, sideways = self.lane_t(row, s)
@@ -160,7 +160,7 @@ class RoadTables:
     def _banked_tangent(
         self, road: Integers, s: Array, t: Array, sideways: Array, curvature: Array, speed: Array
     ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-        """Return `poses.banked_tangent` over arrays."""
+        """Return `poses.banked_tangent` for arrays."""
         z, slope, bend = self.elevation.to_second_order(road, s)
         roll, twist = self.superelevation.value_and_slope(road, s)
         sin, cos = np.sin(roll), np.cos(roll)
@@ -179,11 +179,11 @@ class RoadTables:
         return ahead, left, z + t * sin * level, along, aside, climb, lean
 
     def stretch_at(self, road: Integers, s: Array, t: Array, curvature: Array, speed: Array) -> Array:
-        """Return the meters ahead per meter of s at a constant t, (N,), on roads that may be banked."""
+        """Return the meters ahead per meter of s at constant t (N,) on roads with superelevation."""
         return self._banked_tangent(road, s, t, np.zeros_like(s), curvature, speed)[3]
 
     def stretch(self, row: Integers, s: Array) -> Array:
-        """Return meters of path per meter of s along lanes' center lines, in plan view."""
+        """Return the path length per meter of s along the center lines of lanes in plan view."""
         t, slope = self.lane_t(row, s)
         road = self.section_road[self.lane_section[row]]
         curvature, speed = self.curves.bend(road, s)
@@ -196,7 +196,7 @@ class RoadTables:
             yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
-        """t of lanes' center lines and its derivative."""
+        """Return t of the center lines of lanes and its derivative."""
         section = self.lane_section[row]
         t, slope = self.lane_offset.value_and_slope(self.section_road[section], s)
         center, center_slope = self.center.value_and_slope(row, s - self.section_start[section])
@@ -204,7 +204,7 @@ class RoadTables:
         return t + side * center, slope + side * center_slope
 
     def lane_beside(self, road: Integers, s: Array, t: Array) -> tuple[Integers, Array]:
-        """Running number of the lane at road coordinates, and the distance from the road's edge (0 on the road)."""
+        """Return running numbers of lanes at road coordinates and distances from the road edge, 0 on the road."""
         section = self.section_of(road, s)
         ds = s - self.section_start[section]
         offset = t - self.lane_offset.value(road, s)

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Data model of OpenDRIVE maps: roads, lanes, curves, polynomials and positions."""

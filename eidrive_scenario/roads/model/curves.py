@@ -1,7 +1,7 @@
-"""The plan view of a road: lines, arcs, spirals (clothoids) and cubic curves, one after the other.
+"""Plan view of a road: consecutive lines, arcs, spirals (clothoids) and cubic curves.
 
-A poly3 becomes a chain of short cubic curves over arc length when it is read, so that three kinds remain: curves of
-constant curvature (closed form), spirals (Fresnel integrals) and parametric cubics.
+A poly3 is converted into short cubic curves over arc length on reading. Three kinds remain: curves of constant
+curvature (closed form), spirals (Fresnel integrals) and parametric cubics.
 """
 
 from __future__ import annotations
@@ -20,15 +20,17 @@ from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.model.polynomials import spread
 
 FLAT_PHASE = 1e7
-"""Above this phase k²/(2c) a spiral is an arc to less than a millimeter, and Fresnel integrals lose their digits."""
+"""Maximum phase k²/(2c) of a spiral. Above it the spiral is an arc to less than a millimeter, and Fresnel integrals
+lose precision.
+"""
 
 
-MOST_CUBICS = 20_000
-"""Cubics that stand for one poly3; those of a longer one than so many meters are longer than a meter."""
+MAX_CUBICS = 20_000
+"""Maximum number of cubics that replace one poly3. Cubics of a longer poly3 are longer than a meter."""
 
 
 class CurvePoint(NamedTuple):
-    """A point of a reference line: x, y [m], heading [rad], curvature [1/m], meters of path per meter of s."""
+    """Point of a reference line: x, y [m], heading [rad], curvature [1/m], path length per meter of s."""
 
     x: float
     y: float
@@ -39,7 +41,7 @@ class CurvePoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Curve(ABC):
-    """One geometry of a plan view: starts at x, y with heading h, runs from `s` over `length` [m]."""
+    """Geometry of a plan view, which starts at x, y with heading h and extends from `s` over `length` [m]."""
 
     s: float
     x: float
@@ -56,17 +58,17 @@ class Curve(ABC):
 
     @abstractmethod
     def at(self, ds: float) -> CurvePoint:
-        """Return the point `ds` meters behind the start."""
+        """Return the point `ds` after the start [m]."""
 
     def bend(self, ds: float) -> tuple[float, float]:
-        """Return the curvature and meters of path per meter of s there: `at` without the place."""
+        """Return the curvature [1/m] and path length per meter of s at `ds`, as `at` does."""
         point = self.at(ds)
         return point.curvature, point.speed
 
 
 @dataclass(frozen=True)
 class Arc(Curve):
-    """Constant curvature [1/m], positive to the left; a line has 0."""
+    """Curve of constant curvature [1/m], positive to the left; 0 for a line."""
 
     curvature: float = 0.0
 
@@ -86,7 +88,7 @@ class Arc(Curve):
 
 @dataclass(frozen=True)
 class Spiral(Curve):
-    """A clothoid: the curvature grows by `rate` [1/m²] from `curvature` [1/m].
+    """Clothoid whose curvature increases by `rate` [1/m²] from `curvature` [1/m].
 
     With v = (ds + k/c)·√(|c|/π) the integrals of cos and sin of the heading are Fresnel integrals C(v), S(v)
     (Abramowitz and Stegun 7.3).
@@ -125,7 +127,7 @@ class Spiral(Curve):
 
 @dataclass(frozen=True)
 class Cubic(Curve):
-    """u(p) and v(p) cubic in the local frame of the start, p = ds·pace."""
+    """Curve u(p), v(p), cubic in the local frame of the start, with p = ds·pace."""
 
     u: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 0.0)
     v: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
@@ -160,7 +162,7 @@ class Cubic(Curve):
 def spiral(
     s: float, x: float, y: float, h: float, length: float, start: float, end: float, line: int | None = None
 ) -> Curve:
-    """Return the curve whose curvature runs linearly from `start` to `end` [1/m]; an arc where it hardly changes."""
+    """Return the curve with linear curvature from `start` to `end` [1/m], or an arc if the change is negligible."""
     rate = (end - start) / length
     if rate == 0.0 or max(start * start, end * end) / (2.0 * abs(rate)) > FLAT_PHASE:
         return Arc(s, x, y, h, length, 0.5 * (start + end), line=line)
@@ -172,8 +174,9 @@ def poly3(
 ) -> list[Cubic]:
     """Return the curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
 
-    The arc length is integrated by Gauss-Legendre quadrature; each cubic meets the curve's points and tangents at both
-    of its ends (Hermite), so the error falls with the fourth power of its length and stays far below a millimeter.
+    The arc length is integrated by Gauss-Legendre quadrature. Each cubic has the points and tangents of the curve at
+    both
+    ends (Hermite), so that the error decreases with the fourth power of its length and is far below a millimeter.
     """
     a, b, c, d = v
 
@@ -181,7 +184,7 @@ def poly3(
         return np.asarray(b + u * (2.0 * c + 3.0 * d * u))
 
     nodes, weights = np.polynomial.legendre.leggauss(5)
-    count = min(max(math.ceil(length), 4), MOST_CUBICS)
+    count = min(max(math.ceil(length), 4), MAX_CUBICS)
     edges = np.linspace(0.0, length, count * 4 + 1)
     half = 0.5 * np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -206,7 +209,7 @@ def poly3(
 
 
 def _hermite(value: Array, slope: Array, i: int, step: float) -> tuple[float, float, float, float]:
-    """Coefficients of the cubic with the given values and slopes at knots i and i + 1, `step` apart."""
+    """Return the coefficients of the cubic with the given values and slopes at knots i and i + 1, `step` apart."""
     rise = (value[i + 1] - value[i]) / step
     c = (3.0 * rise - 2.0 * slope[i] - slope[i + 1]) / step
     d = (slope[i] + slope[i + 1] - 2.0 * rise) / (step * step)
@@ -214,7 +217,7 @@ def _hermite(value: Array, slope: Array, i: int, step: float) -> tuple[float, fl
 
 
 class ReferenceLine:
-    """The curves of a road's plan view in the order of s."""
+    """Curves of the plan view of a road in the order of s."""
 
     __slots__ = ("curves", "length", "starts")
 
@@ -224,12 +227,12 @@ class ReferenceLine:
         self.length = length
 
     def at(self, s: float) -> CurvePoint:
-        """Return the point at s [m]; the first and last curve go on beyond the ends."""
+        """Return the point at s [m]. The first and last curve are extended beyond the ends."""
         curve = self.curves[bisect_right(self.starts, s, 1) - 1]
         return curve.at(s - curve.s)
 
     def ahead(self, s: float, direction: int) -> tuple[Curve, float]:
-        """Return the curve on which one goes on from s, with s growing (+1) or falling (-1), and to which s it holds [m]."""
+        """Return the curve ahead of s in `direction` (+1 along s, -1 against it), and the s of its end [m]."""
         starts = self.starts
         index = bisect_right(starts, s, 1) - 1
         if direction > 0:
@@ -239,17 +242,17 @@ class ReferenceLine:
         return self.curves[index], starts[index] if index > 0 else -math.inf
 
     def bend(self, s: float) -> tuple[float, float]:
-        """Return the curvature [1/m] and meters of path per meter of s at s [m]."""
+        """Return the curvature [1/m] and path length per meter of s at s [m]."""
         curve = self.curves[bisect_right(self.starts, s, 1) - 1]
         return curve.bend(s - curve.s)
 
 
 class CurveTable:
-    """The reference lines of many roads, evaluated together: line number i over [base[i], base[i] + length + 1)."""
+    """Reference lines of many roads for joint evaluation: line i covers [base[i], base[i] + length + 1)."""
 
     def __init__(self, lines: Sequence[ReferenceLine]) -> None:
         self.base: Array = spread([line.length for line in lines])
-        # A curve that starts beyond its own road would shadow the next one's: it is never reached.
+        # A curve that starts beyond the end of its road is unreachable, and would shadow a curve of the next road.
         reached = [[curve for curve in line.curves if curve.s <= line.length] or line.curves[:1] for line in lines]
         curves = [curve for group in reached for curve in group]
         owner = np.repeat(np.arange(len(lines)), [len(group) for group in reached])
@@ -265,7 +268,7 @@ class CurveTable:
         ).reshape(-1, 9)
 
     def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """x, y, heading, curvature and meters of path per meter of s at s (N,) of lines (N,)."""
+        """Return x, y, heading, curvature and path length per meter of s at s (N,) of lines (N,)."""
         curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
         ds = s - self._starts[curve]
         kind = self._kind[curve]
@@ -283,7 +286,7 @@ class CurveTable:
         return self._x[curve] + cos * u - sin * v, self._y[curve] + sin * u + cos * v, h + turn, curvature, speed
 
     def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
-        """Return the curvature and meters of path per meter of s at s (N,) of lines (N,): `at` without the places."""
+        """Return the curvature and path length per meter of s at s (N,) of lines (N,), as `at` does."""
         curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
         ds = s - self._starts[curve]
         curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)

@@ -1,4 +1,4 @@
-"""Where something is: poses, road coordinates and lane coordinates, one at a time or as arrays."""
+"""Positions: poses, road coordinates and lane coordinates, as single values or arrays."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from eidrive_scenario.errors import InputError
 
 
 class PositionError(InputError):
-    """A road, lane or place along a road that the road network does not have."""
+    """Position on a road or lane that does not exist in the road network."""
 
 
 class Pose(NamedTuple):
-    """World frame: x, y, z [m]; heading, pitch (nose down positive), roll [rad], z-y'-x'' rotation."""
+    """Pose in the world frame: x, y, z [m]; heading, pitch (nose down positive), roll [rad]; z-y'-x'' rotation."""
 
     x: float
     y: float
@@ -29,9 +29,9 @@ class Pose(NamedTuple):
     r: float
 
     def turned(self, angle: float) -> Pose:
-        """Return the pose of something that stands on the same spot of the same surface, turned left by `angle` [rad].
+        """Return the pose rotated to the left by `angle` [rad] on the same inclined surface.
 
-        Pitch and roll follow: what climbs in one direction descends in the other.
+        Pitch and roll are adapted: a slope upwards in one direction is downwards in the other.
         """
         if angle == 0.0:
             return self
@@ -50,7 +50,7 @@ class Pose(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """`Pose` as arrays of one shape."""
+    """Poses as arrays of one shape."""
 
     x: Array
     y: Array
@@ -61,9 +61,10 @@ class Poses(NamedTuple):
 
 
 class LaneLocation(NamedTuple):
-    """A place in lane coordinates.
+    """Position in lane coordinates.
 
-    s, t    road coordinates [m]; offset  distance from the lane's center line, positive in the direction of t [m]
+    s, t    road coordinates [m]
+    offset  distance from the center line of the lane, positive in the direction of t [m]
     """
 
     road: str
@@ -74,7 +75,7 @@ class LaneLocation(NamedTuple):
 
 
 class LaneKey(NamedTuple):
-    """A lane of a lane section: the node of the lane graph."""
+    """Lane of a lane section: node of the lane graph."""
 
     road: str
     section: int
@@ -83,13 +84,15 @@ class LaneKey(NamedTuple):
 
 @dataclass(frozen=True)
 class LaneLocations:
-    """Places in lane coordinates, as arrays of one shape (N,). Without a road within reach, only road and lane count.
+    """Positions in lane coordinates as arrays of one shape (N,). Without a road within reach only road and lane are
+    valid.
 
     road      index into `roads`, -1 if no road is within reach
-    lane      lane id; 0 where no road is within reach
-    s, t      road coordinates [m]; offset  from the lane's center line, positive in the direction of t [m]
-    heading   of the reference line at s [rad]
-    outside   distance from the edge of the road, 0 on the road [m]; at least `reach` where none is within it
+    lane      lane id; 0 if no road is within reach
+    s, t      road coordinates [m]
+    offset    distance from the center line of the lane, positive in the direction of t [m]
+    heading   heading of the reference line at s [rad]
+    outside   distance from the edge of the road, 0 on the road [m]; at least `reach` if none is within it
     """
 
     roads: Sequence[str]
@@ -107,7 +110,7 @@ class LaneLocations:
         return self.road >= 0
 
     def location(self, index: int) -> LaneLocation | None:
-        """Return one of them, None if no road is within reach."""
+        """Return one location, or None if no road is within reach."""
         road = int(self.road[index])
         if road < 0:
             return None

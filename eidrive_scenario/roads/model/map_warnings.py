@@ -1,6 +1,6 @@
-"""What is doubtful in a road file: single flaws, and how they are told.
+"""Warnings of a road file, grouped by kind.
 
-Real maps have many small flaws of one kind. So each kind is told once, with its first place and a count.
+Real maps have many small errors of one kind. Each kind is reported once, with its first line and a count.
 """
 
 from __future__ import annotations
@@ -57,19 +57,19 @@ class MapWarning(NamedTuple):
     line: int | None
 
 
-def group_map_warnings(flaws: Iterable[MapWarning], source: str) -> tuple[Diagnostic, ...]:
-    """Return one finding for each kind of flaw, with its rule of `eidrive check`."""
+def group_map_warnings(warnings: Iterable[MapWarning], source: str) -> tuple[Diagnostic, ...]:
+    """Return one diagnostic for each kind of warning, with its rule of `eidrive check`."""
     kinds: dict[tuple[MapRule, str], list[MapWarning]] = {}
-    for flaw in flaws:
-        kinds.setdefault((flaw.rule, flaw.kind), []).append(flaw)
-    return tuple(_told(group, source) for group in kinds.values())
+    for warning in warnings:
+        kinds.setdefault((warning.rule, warning.kind), []).append(warning)
+    return tuple(_group_diagnostic(group, source) for group in kinds.values())
 
 
-def _told(flaws: list[MapWarning], source: str) -> Diagnostic:
-    first = flaws[0]
+def _group_diagnostic(group: list[MapWarning], source: str) -> Diagnostic:
+    first = group[0]
     message = first.message
-    if len(flaws) > 1:
-        lines = [str(flaw.line) for flaw in flaws[1 : 1 + SHOWN]]
-        more = ", …" if len(flaws) > 1 + SHOWN else ""
-        message += f"; {len(flaws) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
+    if len(group) > 1:
+        lines = [str(warning.line) for warning in group[1 : 1 + SHOWN]]
+        more = ", …" if len(group) > 1 + SHOWN else ""
+        message += f"; {len(group) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
     return Diagnostic(message, first.hint, source, first.line, first.rule.name)

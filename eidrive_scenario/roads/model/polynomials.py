@@ -11,13 +11,13 @@ import numpy as np
 from eidrive_scenario.arrays import Array, Integers
 
 Piece = tuple[float, float, float, float, float]
-"""Start s of the piece and its coefficients a, b, c, d; ds counts from that start."""
+"""Start s of a piece and its coefficients a, b, c, d; ds counts from that start."""
 ROUNDING = 1e-6
-"""A first piece that starts no later than this holds from 0 on [m]."""
+"""Maximum start of a first piece that is extended to 0 [m]."""
 
 
 class Polynomials:
-    """A function of s on [0, ∞): each piece holds up to the start of the next; 0 before the first."""
+    """Function of s on [0, ∞). Each piece extends to the start of the next; before the first the value is 0."""
 
     __slots__ = ("_constant", "pieces", "starts")
 
@@ -34,21 +34,21 @@ class Polynomials:
 
     @classmethod
     def constant(cls, value: float) -> Polynomials:
-        """Return the function that is `value` everywhere."""
+        """Return the constant function `value`."""
         return cls([(0.0, value, 0.0, 0.0, 0.0)])
 
     @property
     def is_zero(self) -> bool:
-        """True for the function that is 0 everywhere."""
+        """True if the function is 0 everywhere."""
         return self._constant == 0.0
 
     @property
     def is_constant(self) -> bool:
-        """True for a function of a single, constant piece."""
+        """True if the function has a single, constant piece."""
         return self._constant is not None
 
     def value(self, s: float) -> float:
-        """Return the function at s."""
+        """Return the value at s."""
         if self._constant is not None:
             return self._constant
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
@@ -56,7 +56,7 @@ class Polynomials:
         return a + ds * (b + ds * (c + ds * d))
 
     def value_and_slope(self, s: float) -> tuple[float, float]:
-        """Return the function and its derivative at s."""
+        """Return the value and the derivative at s."""
         if self._constant is not None:
             return self._constant, 0.0
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
@@ -64,12 +64,12 @@ class Polynomials:
         return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
 
     def to_second_order(self, s: float) -> tuple[float, float, float]:
-        """Return the function and its first two derivatives at s."""
+        """Return the value and the first two derivatives at s."""
         value, slope, half_bend, _ = self.coefficients_at(s)
         return value, slope, 2.0 * half_bend
 
     def coefficients_at(self, s: float) -> tuple[float, float, float, float]:
-        """Return the coefficients of the function as seen from s: of the same polynomial with ds counted from s."""
+        """Return the coefficients of the polynomial at s with ds counted from s."""
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
         return (
@@ -80,13 +80,13 @@ class Polynomials:
         )
 
     def shifted(self, origin: float) -> Polynomials:
-        """Return the same function with s counted from `origin`; what lies before it is dropped."""
+        """Return the function with s counted from `origin`. The part before it is dropped."""
         first = (0.0, *self.coefficients_at(origin))
         return Polynomials([first, *((p[0] - origin, *p[1:]) for p in self.pieces if p[0] > origin)])
 
 
 def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:
-    """Return the sum of factor times function, exactly, over the union of their pieces."""
+    """Return the exact sum of factor times function over the union of their pieces."""
     starts = sorted({start for _, function in terms for start in function.starts})
     pieces: list[Piece] = []
     for start in starts:
@@ -101,10 +101,10 @@ def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:
 
 
 class PolynomialTable:
-    """Many `Polynomials`, each over its own span of s, evaluated together.
+    """Functions with individual ranges of s for joint evaluation.
 
-    Function number i owns the stretch [base[i], base[i] + span[i] + 1) of one common axis, so that a single binary
-    search finds the piece for any mixture of functions.
+    Function i occupies the interval [base[i], base[i] + span[i] + 1) of a common axis. One binary search thus finds the
+    pieces of any mixture of functions.
     """
 
     def __init__(self, functions: Sequence[Polynomials], spans: Sequence[float]) -> None:
@@ -112,7 +112,7 @@ class PolynomialTable:
         counts = [len(function.pieces) for function in functions]
         pieces = np.array([piece for function in functions for piece in function.pieces], dtype=np.float64)
         pieces = pieces.reshape(-1, 5)
-        # A piece that starts beyond its own function's span would shadow the next function: it is never reached.
+        # A piece that starts beyond the span of its function is unreachable, and would shadow the next function.
         limit = np.repeat(np.asarray(spans, dtype=np.float64), counts) if counts else np.empty(0)
         owner = np.repeat(np.arange(len(functions)), counts)
         reached = pieces[:, 0] <= limit
@@ -130,7 +130,7 @@ class PolynomialTable:
         return found
 
     def value(self, function: Integers, s: Array) -> Array:
-        """Return the functions number `function` (N,) at s (N,)."""
+        """Return the values of functions `function` (N,) at s (N,)."""
         piece = self._piece(function, s)
         if self._constant:
             return self._a[piece]
@@ -138,7 +138,7 @@ class PolynomialTable:
         return np.asarray(self._a[piece] + ds * (self._b[piece] + ds * (self._c[piece] + ds * self._d[piece])))
 
     def value_and_slope(self, function: Integers, s: Array) -> tuple[Array, Array]:
-        """Return the functions and their derivatives."""
+        """Return the values and derivatives of functions at s."""
         piece = self._piece(function, s)
         if self._constant:
             return self._a[piece], np.zeros(piece.shape)
@@ -147,7 +147,7 @@ class PolynomialTable:
         return self._a[piece] + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
 
     def to_second_order(self, function: Integers, s: Array) -> tuple[Array, Array, Array]:
-        """Return the functions and their first two derivatives."""
+        """Return the values and first two derivatives of functions at s."""
         piece = self._piece(function, s)
         ds = s - self._starts[piece]
         b, c, d = self._b[piece], self._c[piece], self._d[piece]
@@ -156,10 +156,10 @@ class PolynomialTable:
 
     @property
     def is_zero(self) -> bool:
-        """Whether all functions are 0 everywhere."""
+        """True if all functions are 0 everywhere."""
         return self._constant and not self._a.any()
 
 
 def spread(spans: Sequence[float]) -> Array:
-    """Where each of several stretches begins on a common axis, one meter apart."""
+    """Return the starts of intervals with the given lengths on a common axis, one meter apart."""
     return np.fromiter(accumulate((span + 1.0 for span in spans), initial=0.0), dtype=np.float64)[:-1]

@@ -1,4 +1,4 @@
-"""What an OpenDRIVE file says, as plain data: roads, lanes, junctions, signals, objects.
+"""Plain data of an OpenDRIVE file: roads, lanes, junctions, signals, objects.
 
 Names follow ASAM OpenDRIVE 1.6 to 1.8; lengths in meters, angles in radians, speeds in m/s.
 """
@@ -23,7 +23,7 @@ DRIVABLE = frozenset(
         *("mwyEntry", "mwyExit", "HOV", "bus", "taxi", "special1", "special2", "special3"),
     )
 )
-"""Lane types on which cars drive."""
+"""Lane types for cars."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Header:
 
 @dataclass(frozen=True)
 class RoadMarkLine:
-    """One line of a road mark with its own pattern."""
+    """Line of a road mark with an explicit pattern."""
 
     length: float
     space: float
@@ -57,7 +57,7 @@ class RoadMarkLine:
 
 @dataclass(frozen=True)
 class RoadMark:
-    """The marking on a lane's outer edge from s_offset on (counted from the lane section's start)."""
+    """Marking on the outer edge of a lane from s_offset on, counted from the start of the lane section."""
 
     s_offset: float
     type: str
@@ -70,7 +70,7 @@ class RoadMark:
 
 @dataclass(frozen=True)
 class LaneHeight:
-    """Lift of a lane's inner and outer edge above the road from s_offset on."""
+    """Height of the inner and outer edge of a lane above the road from s_offset on."""
 
     s_offset: float
     inner: float
@@ -79,10 +79,10 @@ class LaneHeight:
 
 @dataclass(frozen=True)
 class Lane:
-    """A lane of a lane section.
+    """Lane of a lane section.
 
-    width   as a function of ds from the start of the section
-    inner, outer  distance of the two edges from lane 0, at least 0, in the direction of the lane's side
+    width         function of ds from the start of the section
+    inner, outer  distances of the edges from lane 0, at least 0, towards the side of the lane
     """
 
     id: int
@@ -100,7 +100,7 @@ class Lane:
     speeds: tuple[tuple[float, float], ...] = ()
     """(s_offset, limit [m/s]) in the order of s_offset."""
     width_from: float = 0.0
-    """The s_offset from which on the file gives a width; inf where it gives none. Before it, the width is 0."""
+    """First s_offset with a specified width, inf if there is none. Before it the width is 0."""
     line: int | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -110,13 +110,13 @@ class Lane:
 
     @property
     def drivable(self) -> bool:
-        """True if cars drive."""
+        """True if the lane type is drivable for cars."""
         return self.type in DRIVABLE
 
 
 @dataclass(frozen=True)
 class LaneSection:
-    """A stretch of road with the same lanes: from s over `length`; lanes by id, from the leftmost to the rightmost."""
+    """Section of a road with constant lanes, from s over `length`; lanes by id from left to right."""
 
     index: int
     s: float
@@ -125,13 +125,13 @@ class LaneSection:
 
     @property
     def end(self) -> float:
-        """Where the section ends."""
+        """s of the end of the section."""
         return self.s + self.length
 
 
 @dataclass(frozen=True)
 class RoadLink:
-    """What a road continues in."""
+    """Successor or predecessor of a road."""
 
     element_type: Literal["road", "junction"]
     element_id: str
@@ -141,7 +141,7 @@ class RoadLink:
 
 @dataclass(frozen=True)
 class RoadType:
-    """The kind of road from s on, with its speed limit [m/s]; None if none is given, inf for no limit."""
+    """Type of a road from s on, with its speed limit [m/s]; None if none is given, inf for no limit."""
 
     s: float
     type: str
@@ -150,7 +150,7 @@ class RoadType:
 
 @dataclass(frozen=True)
 class Road:
-    """A road: its reference line, profiles and lane sections."""
+    """Road: its reference line, profiles and lane sections."""
 
     id: str
     name: str
@@ -170,7 +170,7 @@ class Road:
 
     @cached_property
     def directions(self) -> Mapping[int, int]:
-        """By lane id, +1 if traffic of the lane drives in the direction of s, -1 if against it; +1 for lane 0."""
+        """+1 if traffic drives in the direction of s, else -1, by lane id; +1 for lane 0."""
         found = {0: 1}
         for section in self.sections:
             for number, lane in section.lanes.items():
@@ -185,7 +185,7 @@ class Road:
 
 @dataclass(frozen=True)
 class Connection:
-    """A way through a junction; `connecting_road` is the linked road itself in a direct junction."""
+    """Connection through a junction. In a direct junction `connecting_road` is the linked road itself."""
 
     id: str
     incoming_road: str
@@ -197,7 +197,7 @@ class Connection:
 
 @dataclass(frozen=True)
 class Junction:
-    """Where roads meet. type  default, direct or virtual."""
+    """Junction of type default, direct or virtual."""
 
     id: str
     name: str
@@ -208,7 +208,7 @@ class Junction:
 
 @dataclass(frozen=True)
 class SignalPlace:
-    """A signal, or a reference to it, along a road.
+    """Position and validity of a signal or of a signal reference along a road.
 
     orientation  '+' valid for traffic in the direction of s, '-' against it, 'none' for both
     validity     ranges of lane ids, empty for all lanes
@@ -223,7 +223,7 @@ class SignalPlace:
 
 @dataclass(frozen=True)
 class Signal:
-    """A traffic sign (dynamic False) or light (dynamic True); `references` are further roads that obey it."""
+    """Traffic sign (dynamic False) or light (dynamic True). `references` are further roads for which it is valid."""
 
     id: str
     name: str
@@ -244,7 +244,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class SignalController:
-    """Signals that switch together."""
+    """Group of signals that switch together."""
 
     id: str
     name: str
@@ -253,7 +253,7 @@ class SignalController:
 
 @dataclass(frozen=True)
 class Corner:
-    """A corner of an object's outline: (s, t, dz) on the road, or (u, v, z) in the object's own frame."""
+    """Corner of the outline of an object: (s, t, dz) on the road, or (u, v, z) in the frame of the object."""
 
     on_road: bool
     x: float
@@ -264,7 +264,7 @@ class Corner:
 
 @dataclass(frozen=True)
 class Repeat:
-    """How an object repeats along the road; distance 0 means without gaps."""
+    """Repetition of an object along the road; distance 0 means without gaps."""
 
     s: float
     length: float
@@ -277,7 +277,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class RoadObject:
-    """Something that stands at a road: a barrier, pole, tree, building, crosswalk, parking space."""
+    """Object at a road, such as a barrier, pole, tree, building, crosswalk or parking space."""
 
     id: str
     name: str
@@ -301,7 +301,7 @@ class RoadObject:
 
 @dataclass(frozen=True)
 class RoadMap:
-    """A whole file."""
+    """Content of an OpenDRIVE file."""
 
     source: str
     header: Header
@@ -311,4 +311,4 @@ class RoadMap:
     controllers: Mapping[str, SignalController]
     objects: tuple[RoadObject, ...]
     map_warnings: tuple[MapWarning, ...] = ()
-    """What the file has against the standard, and is read all the same."""
+    """Deviations from the standard with which the file is readable."""

@@ -1,8 +1,8 @@
-"""What the state of a traffic light means for its lamps.
+"""Lamps of traffic lights by the text of a signal state.
 
-The standard leaves the text of a state to the tools. Understood are lists of lamps from top to bottom, as esmini has
-them ("on;off;off"), colors ("red", "redYellow", CARLA's "GREEN", tier4's "green solidOn circle"), and the semantic
-states of the standard's user guide ("go", "caution", "stop").
+The standard leaves this text to the tools. Supported are lists of lamps from top to bottom as in esmini ("on;off;off"),
+colors ("red", "redYellow", "GREEN" of CARLA, "green solidOn circle" of tier4), and the semantic states of the user
+guide of the standard ("go", "caution", "stop").
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ ON, OFF, FLASHING = "on", "off", "flashing"
 RED, YELLOW, GREEN = "red", "yellow", "green"
 
 FLASHES_PER_SECOND = 1.0
-"""Of a flashing lamp, lit for the first half of each period."""
+"""Frequency of a flashing lamp [Hz], which is lit in the first half of each period."""
 
-USUAL = (RED, YELLOW, GREEN)
-"""The lamps of a light of which nothing else is known, from top to bottom."""
-_COLORS: Mapping[int, tuple[str, ...]] = {1: (YELLOW,), 2: (RED, GREEN), 3: USUAL}
-"""The lamps of a light with so many of them."""
+DEFAULT_LAMPS = (RED, YELLOW, GREEN)
+"""Default lamps of a traffic light from top to bottom."""
+_COLORS: Mapping[int, tuple[str, ...]] = {1: (YELLOW,), 2: (RED, GREEN), 3: DEFAULT_LAMPS}
+"""Lamps of a traffic light by their number."""
 _TYPES: Mapping[str, tuple[str, ...]] = {"1000002": (RED, GREEN), "1000009": (RED, YELLOW), "1000013": (RED, GREEN)}
-"""Types of OpenDRIVE's own catalog with other lamps than red, yellow and green."""
+"""Types of the OpenDRIVE signal catalog whose lamps differ from red, yellow and green."""
 
 _MODES = {"on": ON, "off": OFF, "flashing": FLASHING, "blinking": FLASHING, "true": ON, "false": OFF}
 _WORDS = {
@@ -36,47 +36,48 @@ _FLASHES = frozenset({"flashing", "flash", "blinking", "blink"})
 
 
 def lamp_colors(signal: Signal) -> tuple[str, ...]:
-    """Return the lamps of a traffic light, from top to bottom; none for a sign."""
-    return _TYPES.get(signal.type, USUAL) if signal.dynamic else ()
+    """Return the lamps of a traffic light from top to bottom; empty for a sign."""
+    return _TYPES.get(signal.type, DEFAULT_LAMPS) if signal.dynamic else ()
 
 
 @lru_cache(maxsize=1024)
-def lamps(state: str, colors: tuple[str, ...] = USUAL) -> tuple[tuple[str, str], ...]:
-    """Return the color and mode (on, off, flashing) of each lamp in a state, from top to bottom.
+def lamps(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> tuple[tuple[str, str], ...]:
+    """Return the color and mode (on, off, flashing) of each lamp in a state from top to bottom.
 
-    A state that lists another number of lamps than the light is known to have is believed. A state that is not
-    understood leaves the lamps dark.
+    A state may list another number of lamps than the type of the light; the list then has priority. All lamps are off
+    in an
+    unsupported state.
     """
     modes = _listed(state)
     if modes is not None and (len(modes) > 1 or len(colors) == 1):
         if len(modes) != len(colors):
-            colors = _COLORS.get(len(modes), (*USUAL, *[GREEN] * len(modes))[: len(modes)])
+            colors = _COLORS.get(len(modes), (*DEFAULT_LAMPS, *[GREEN] * len(modes))[: len(modes)])
         return tuple(zip(colors, modes, strict=True))
     lit = _named(state)
     return tuple((color, lit.get(color, OFF)) for color in colors)
 
 
 def lit(state: str, colors: tuple[str, ...], time: float) -> tuple[bool, ...]:
-    """Which lamps shine at `time` [s], from top to bottom."""
-    bright = (time * FLASHES_PER_SECOND + 1e-9) % 1.0 < 0.5
-    return tuple(mode == ON or (mode == FLASHING and bright) for _, mode in lamps(state, colors))
+    """Return whether each lamp is lit at `time` [s], from top to bottom."""
+    in_lit_phase = (time * FLASHES_PER_SECOND + 1e-9) % 1.0 < 0.5
+    return tuple(mode == ON or (mode == FLASHING and in_lit_phase) for _, mode in lamps(state, colors))
 
 
-def must_stop(state: str, colors: tuple[str, ...] = USUAL) -> bool:
-    """Return whether a light in this state tells traffic to stop: red, or yellow alone, unless the yellow flashes."""
+def must_stop(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> bool:
+    """Return whether a light in this state requires traffic to stop: red, or steady yellow without green."""
     shown = dict(lamps(state, colors))
     red, yellow, green = (shown.get(color, OFF) for color in (RED, YELLOW, GREEN))
     return red != OFF or (yellow == ON and green == OFF)
 
 
 def _listed(state: str) -> list[str] | None:
-    """Return the modes of a list of lamps, None if the state is no such list."""
+    """Return the modes of a list of lamps, or None if the state is not such a list."""
     words = [word.strip().lower() for word in re.split("[;,]", state)]
     return [_MODES[word] for word in words] if all(word in _MODES for word in words) else None
 
 
 def _named(state: str) -> dict[str, str]:
-    """Return the lamps that a state in words lights, with their mode."""
+    """Return the lit lamps of a textual state with their modes."""
     found: dict[str, str] = {}
     for part in re.split("[;,]", state):
         words = [word.lower() for word in re.findall("[A-Z]+(?![a-z])|[A-Z]?[a-z]+", part)]

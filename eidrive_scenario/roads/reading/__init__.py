@@ -1,4 +1,4 @@
-"""Reads an OpenDRIVE file into the plain data of `roads.model`."""
+"""Reader of OpenDRIVE files into the plain data of `roads.model`."""
 
 from eidrive_scenario.roads.reading.document import parse_road_map, read_road_text
 

@@ -1,4 +1,4 @@
-"""Attributes of XML elements, checked; what is wrong is collected, so that one reading reports all of it."""
+"""Typed XML attributes with collected diagnostics."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
 from eidrive_scenario.roads.model.map_warnings import ROAD_MARK, MapRule, MapWarning
 
-MOST = 100
-"""Problems after which reading ends."""
-MOST_DOUBTS = 5000
-"""Doubts that are remembered."""
+MAX_ERRORS = 100
+"""Maximum number of errors of a file. Reading ends when it is reached."""
+MAX_WARNINGS = 5000
+"""Maximum number of warnings that are stored."""
 LARGEST = 1e9
-"""Size of a number that is read at all: no length, place or coefficient of a road comes near it."""
+"""Maximum magnitude of a number, far above any length, position or coefficient of a road."""
 
 
 def line_of(element: etree._Element | None) -> int | None:
-    """Where an element begins in its file."""
+    """Return the line of an element in its file."""
     line = None if element is None else element.sourceline
     return line if isinstance(line, int) else None
 
 
 class AttributeReader:
-    """Reads attributes of elements of one file and remembers each problem with its line."""
+    """Reader of typed attributes of one file, which collects diagnostics with their lines."""
 
     def __init__(self, source: str) -> None:
         self.source = source
@@ -34,26 +34,26 @@ class AttributeReader:
         self._spent: dict[str, float] = {}
 
     def report_error(self, element: etree._Element | None, message: str, hint: str) -> None:
-        """Remember a problem at an element."""
+        """Append an error of an element."""
         self.append_diagnostic(Diagnostic(message, hint, self.source, line_of(element)))
 
     def append_diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Remember a problem. Raise RoadError with all of them once there are too many."""
+        """Append an error. Raise RoadError with all errors if there are too many."""
         self.errors.append(diagnostic)
-        if len(self.errors) >= MOST:
-            last = Diagnostic(f"reading ends after {MOST} errors", "", self.source, diagnostic.line)
+        if len(self.errors) >= MAX_ERRORS:
+            last = Diagnostic(f"reading ends after {MAX_ERRORS} errors", "", self.source, diagnostic.line)
             raise RoadError([*sorted(self.errors, key=lambda one: one.line or 0), last])
 
     def spend(self, element: etree._Element, what: str, amount: float, limit: float) -> None:
-        """Count what takes memory or time; the element that exceeds the limit is a problem."""
+        """Count the use of a limited resource. Report an error at the element that exceeds the limit."""
         before = self._spent.get(what, 0.0)
         self._spent[what] = before + amount
         if before <= limit < before + amount:
             self.report_error(element, f"the file has more than {limit:g} {what}", "split it")
 
     def report_warning(self, element: etree._Element, rule: MapRule, kind: str, message: str, hint: str) -> None:
-        """Remember what is against the standard, and is read all the same."""
-        if len(self.map_warnings) < MOST_DOUBTS:
+        """Append a warning of a deviation from the standard with which the element is readable."""
+        if len(self.map_warnings) < MAX_WARNINGS:
             self.map_warnings.append(MapWarning(rule, kind, message, hint, line_of(element)))
 
     @overload
@@ -63,7 +63,10 @@ class AttributeReader:
     @overload
     def number(self, element: etree._Element, name: str, default: None) -> float | None: ...
     def number(self, element: etree._Element, name: str, default: float | None = math.nan) -> float | None:
-        """Return a number up to LARGEST. Missing without a default, or not such a number, is a problem and gives 0."""
+        """Return a number up to LARGEST.
+
+        A missing attribute without a default or an invalid number is reported and gives 0.
+        """
         text = element.get(name)
         if text is None:
             if default is not None and math.isnan(default):
@@ -78,23 +81,23 @@ class AttributeReader:
         return 0.0
 
     def mark_number(self, element: etree._Element, name: str, default: float | None) -> float | None:
-        """Return a number of a road mark. It is paint only: one that cannot be read is a warning, and the default."""
+        """Return a number of a road mark. An invalid one gives the default and only a warning, as marks are paint."""
         text = element.get(name)
         if text is None:
             return default
         value = _number(text)
         if abs(value) <= LARGEST:
             return value
-        self.doubt_mark(element, f"<{element.tag}> has {name}={quoted(text)}")
+        self.report_mark_warning(element, f"<{element.tag}> has {name}={quoted(text)}")
         return default
 
-    def doubt_mark(self, element: etree._Element, what: str) -> None:
-        """Remember what is missing or wrong in a road mark."""
-        message, hint = f"{what}, and is drawn without it", "correct it, or take the element out"
-        self.report_warning(element, ROAD_MARK, "road marks that are not complete", message, hint)
+    def report_mark_warning(self, element: etree._Element, what: str) -> None:
+        """Append a warning of an incomplete road mark."""
+        message, hint = f"{what}, and is drawn without it", "correct it or remove the element"
+        self.report_warning(element, ROAD_MARK, "incomplete road marks", message, hint)
 
     def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
-        """Return a piece of a cubic: its start and a, b, c, d."""
+        """Return a piece of a cubic polynomial: its start and a, b, c, d."""
         return (
             self.number(element, start),
             self.number(element, "a"),
@@ -104,7 +107,7 @@ class AttributeReader:
         )
 
     def text(self, element: etree._Element, name: str, default: str | None = None) -> str:
-        """Return a text. Missing without a default is a problem and gives ''."""
+        """Return a text. A missing attribute without a default is reported and gives ''."""
         text = element.get(name)
         if text is not None:
             return text
@@ -114,7 +117,7 @@ class AttributeReader:
         return default
 
     def integer(self, element: etree._Element, name: str) -> int:
-        """Return a whole number. Missing, or not one, is a problem and gives 0."""
+        """Return an integer. A missing or invalid attribute is reported and gives 0."""
         text = element.get(name)
         if text is None:
             self._missing(element, name)
@@ -129,7 +132,7 @@ class AttributeReader:
         return 0
 
     def contact(self, element: etree._Element, name: str) -> Literal["start", "end"] | None:
-        """Which end of a road; None if the attribute is missing."""
+        """Return the contact point, an end of a road, or None if the attribute is missing."""
         text = element.get(name)
         if text == "start":
             return "start"
@@ -140,7 +143,7 @@ class AttributeReader:
         return None
 
     def flag(self, element: etree._Element, name: str) -> bool:
-        """yes, true or 1 are true; anything else, or nothing, is false."""
+        """Return True for yes, true or 1, and False for anything else or a missing attribute."""
         return element.get(name, "").strip().lower() in ("yes", "true", "1")
 
     def _missing(self, element: etree._Element, name: str) -> None:
@@ -150,7 +153,7 @@ class AttributeReader:
 
 
 def _number(text: str) -> float:
-    """Return the number that a text states, NaN if it is none."""
+    """Return the number in a text, or NaN if it is invalid."""
     try:
         return float(text) if _plain(text) else math.nan
     except ValueError:
@@ -158,5 +161,5 @@ def _number(text: str) -> float:
 
 
 def _plain(text: str) -> bool:
-    """False for what only Python takes for a number: 1_000, or the digits of other scripts."""
+    """Return whether a text is an ASCII number without underscores, which Python would also accept."""
     return text.isascii() and "_" not in text

@@ -1,4 +1,4 @@
-"""The file as a whole: parsed safely, read element by element, its references checked."""
+"""Reader of a whole OpenDRIVE file: safe parsing, elements, references."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ LIMITS = XmlLimits(max_bytes=256 * MIB, max_nodes=4_000_000)
 
 
 def read_road_text(path: Path) -> bytes:
-    """Return the text of an OpenDRIVE file. Raise RoadError if it cannot be read."""
+    """Return the content of an OpenDRIVE file. Raise RoadError if it is unreadable."""
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
@@ -44,7 +44,7 @@ def read_road_text(path: Path) -> bytes:
 
 
 def parse_road_map(text: bytes, source: str) -> RoadMap:
-    """OpenDRIVE; `source` names it in errors. Raise RoadError with every finding, its line and what would be right."""
+    """Parse OpenDRIVE; `source` is the file name in errors. Raise RoadError with all diagnostics, lines and hints."""
     root = _parse(text, source)
     collector = AttributeReader(source)
     elements = [(collector.text(element, "id"), element) for element in root.iterfind("road")]
@@ -52,16 +52,16 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
     objects: list[RoadObject] = []
     for number, element in elements:
         if number in roads:
-            collector.report_error(element, f"road {number!r} occurs twice", "give each road its own id")
+            collector.report_error(element, f"road {number!r} occurs twice", "give each road a unique id")
         roads[number] = _read_road(number, element, collector)
         objects.extend(read_objects(number, element, collector))
     if not elements:
-        collector.report_error(root, "there is no <road>", "add at least one")
+        collector.report_error(root, "<OpenDRIVE> has no <road>", "add at least one")
     junctions = {}
     for element in root.iterfind("junction"):
         junction = _read_junction(element, roads, collector)
         junctions[junction.id] = junction
-    roads = {number: _with_sound_links(road, roads, junctions, collector) for number, road in roads.items()}
+    roads = {number: _with_valid_links(road, roads, junctions, collector) for number, road in roads.items()}
     signals = read_signals(elements, roads, collector)
     controllers = read_controllers(root, signals, collector)
     header = _read_header(root, collector)
@@ -75,7 +75,7 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
 
 
 def _parse(text: bytes, source: str) -> etree._Element:
-    """Return the root element, without namespaces."""
+    """Parse XML and return the root element without namespaces."""
     root = parse_untrusted(text, source, LIMITS, RoadError, remove_comments=True)
     if root.tag.startswith("{"):
         for element in root.iter():
@@ -136,9 +136,9 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
     for profile in element.iterfind("lateralProfile/*"):
         level = [collector.number(profile, name, 0.0) == 0.0 for name in "abcd"]
         if profile.tag == "crossSectionSurface" or (profile.tag in ("shape", "crossfall") and not all(level)):
-            message = f"road {number!r} has <{profile.tag}>, which is not read: its cross section is straight"
-            hint = "say the slope by <superelevation>"
-            collector.report_warning(profile, ROAD_SURFACE, "cross sections that are not read", message, hint)
+            message = f"road {number!r} has <{profile.tag}>, which is ignored: its cross section is straight"
+            hint = "specify the slope by <superelevation>"
+            collector.report_warning(profile, ROAD_SURFACE, "ignored cross sections", message, hint)
     return Road(
         id=number,
         name=element.get("name", ""),
@@ -182,10 +182,10 @@ def _read_link(element: etree._Element | None, collector: AttributeReader) -> Ro
         return None
     number = collector.text(element, "elementId")
     if kind == "road" and element.get("elementS") is not None:
-        # Of virtual junctions (1.6 to 1.8): a way into or out of a road between its ends.
-        message = f"a road leads to road {number!r} between its ends, and ends there instead"
-        hint = "split that road there, and join the parts by a junction"
-        collector.report_warning(element, ROAD_LINK, "roads that lead to others between their ends", message, hint)
+        # Virtual junctions (1.6 to 1.8) connect roads between their ends.
+        message = f"a road is linked to road {number!r} between its ends; the link is ignored"
+        hint = "split that road there and connect the parts by a junction"
+        collector.report_warning(element, ROAD_LINK, "roads linked to others between their ends", message, hint)
         return None
     contact = collector.contact(element, "contactPoint")
     return RoadLink(cast(Literal["road", "junction"], kind), number, contact, line_of(element))
@@ -210,7 +210,7 @@ def _read_junction(element: etree._Element, roads: dict[str, Road], collector: A
 
 
 def _ends_at(road: Road, junction: str) -> bool:
-    """Return whether an end of the road lies at the junction; what a virtual one joins in between is no way."""
+    """Return whether an end of the road is at the junction. Virtual junctions without an end are not connected."""
     ends = (road.predecessor, road.successor)
     return any(link is not None and (link.element_type, link.element_id) == ("junction", junction) for link in ends)
 
@@ -225,7 +225,7 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], collector:
     missing = [number for number in (incoming, connecting) if number not in roads]
     for number in missing:
         collector.report_error(
-            element, f"<connection> names road {number!r}, which does not exist", suggestion(number, roads)
+            element, f"<connection> refers to road {number!r}, which does not exist", suggestion(number, roads)
         )
     links = tuple(
         (collector.integer(link, "from"), collector.integer(link, "to")) for link in element.iterfind("laneLink")
@@ -236,12 +236,12 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], collector:
     return Connection(element.get("id", ""), incoming, connecting, contact, links, line_of(element))
 
 
-def _with_sound_links(
+def _with_valid_links(
     road: Road, roads: dict[str, Road], junctions: dict[str, Junction], collector: AttributeReader
 ) -> Road:
-    """Return the road, which ends where it links to a junction that does not exist: SUMO writes dead ends like that."""
+    """Return the road without links to junctions that do not exist. SUMO writes such links at dead ends."""
 
-    def sound(link: RoadLink | None) -> RoadLink | None:
+    def valid_link(link: RoadLink | None) -> RoadLink | None:
         known = {} if link is None else roads if link.element_type == "road" else junctions
         if link is None or link.element_id in known:
             return link
@@ -251,8 +251,8 @@ def _with_sound_links(
                 Diagnostic(message, suggestion(link.element_id, known), collector.source, link.line)
             )
             return link
-        hint = "take the link out, or add the junction with its connections"
-        collector.map_warnings.append(MapWarning(ROAD_LINK, "roads that lead to no junction", message, hint, link.line))
+        hint = "remove the link or add the junction with its connections"
+        collector.map_warnings.append(MapWarning(ROAD_LINK, "links to missing junctions", message, hint, link.line))
         return None
 
-    return replace(road, predecessor=sound(road.predecessor), successor=sound(road.successor))
+    return replace(road, predecessor=valid_link(road.predecessor), successor=valid_link(road.successor))

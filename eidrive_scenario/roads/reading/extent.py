@@ -1,4 +1,4 @@
-"""Bounds on the extent of a road map, as everything that is laid over it takes memory by its size."""
+"""Limits of the extent of a road map, which determines the memory of derived data."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 MAX_SHAPE = 1e6
-"""Largest distance of the points of one geometry from its start [m]."""
+"""Maximum distance of the points of a geometry from its start [m]."""
 MAX_WIDTH = 1e7
-"""Largest distance of a lane's edge from the reference line [m]."""
+"""Maximum distance of the edge of a lane from the reference line [m]."""
 MAX_HEIGHT = 1e5
-"""Largest height of a road [m]."""
+"""Maximum height of a road [m]."""
 MAX_LANE_LENGTH = 2e7
-"""Length of all lanes together [m]."""
+"""Maximum length of all lanes together [m]."""
 _SHARES = (0.0, 0.5, 1.0)
 
 
 def check_extent(roads: Mapping[str, Road], collector: AttributeReader) -> None:
-    """Report roads whose size nothing can be calculated with."""
+    """Report roads of excessive extent."""
     lanes = 0.0
     for road in roads.values():
         _check_geometries(road, collector)
@@ -34,7 +34,7 @@ def check_extent(roads: Mapping[str, Road], collector: AttributeReader) -> None:
 
 
 def _check_geometries(road: Road, collector: AttributeReader) -> None:
-    """A cubic may leave its start further than by its length, unlike all other geometries."""
+    """Report cubics that lead too far away from their start. Only cubics can exceed their length."""
     farthest: dict[int | None, float] = {}
     for curve in road.reference.curves:
         if not isinstance(curve, Cubic):
@@ -42,7 +42,7 @@ def _check_geometries(road: Road, collector: AttributeReader) -> None:
         points = [curve.at(share * curve.length) for share in _SHARES]
         away = max(math.hypot(point.x - curve.x, point.y - curve.y) for point in points)
         if not away <= MAX_SHAPE:
-            # One geometry of a file may be several curves here.
+            # One geometry of a file may consist of several curves here.
             line = curve.line or road.line
             farthest[line] = max(away, farthest.get(line, 0.0))
     for line, away in farthest.items():

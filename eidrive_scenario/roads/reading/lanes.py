@@ -1,4 +1,4 @@
-"""<lanes>: lane offset, lane sections, widths or borders, lane links, road marks, heights, speeds."""
+"""Reader of <lanes>: lane offset, lane sections, widths or borders, lane links, road marks, heights, speeds."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, lin
 UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 MARK_WIDTHS = {"standard": 0.12, "bold": 0.25}
 ORIGIN = "{eidrive-scenario}origin"
-"""Where the section in which a lane stands in the file begins, seen from the section that it was moved to [m]."""
+"""Attribute for the start of the original section of a lane, relative to the section that contains it now [m]."""
 ZERO = Polynomials()
 CENTER = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, center=ZERO)
 
 
 def read_speed(element: etree._Element, collector: AttributeReader) -> float | None:
-    """Return the limit of a <speed> in m/s; inf for 'no limit', None for 'undefined'."""
+    """Return the limit of a <speed> [m/s]; inf for 'no limit', None for 'undefined'."""
     text = collector.text(element, "max")
     if text in ("no limit", "undefined"):
         return math.inf if text == "no limit" else None
@@ -42,7 +42,7 @@ def read_lane_offset(lanes: etree._Element, collector: AttributeReader) -> Polyn
 def read_sections(
     lanes: etree._Element, length: float, lane_offset: Polynomials, collector: AttributeReader
 ) -> tuple[LaneSection, ...]:
-    """Return the lane sections of a road in the order of s; a section of no length is left out."""
+    """Return the lane sections of a road in the order of s, without sections of length 0."""
     found = sorted(
         ((min(max(collector.number(element, "s"), 0.0), length), element) for element in lanes.iterfind("laneSection")),
         key=lambda pair: pair[0],
@@ -60,24 +60,24 @@ def read_sections(
         read = _read_section(element, start, lane_offset, collector)
         if end - s <= 1e-6 and (sections or len(found) > 1):
             if sections:
-                sections[-1] = replace(sections[-1], lanes=_led_past(sections[-1].lanes, read, "successors"))
+                sections[-1] = replace(sections[-1], lanes=_redirect_links(sections[-1].lanes, read, "successors"))
             left_out.append(read)
             continue
         for between in reversed(left_out):
-            read = _led_past(read, between, "predecessors")
+            read = _redirect_links(read, between, "predecessors")
         left_out.clear()
         sections.append(LaneSection(len(sections), start, max(end - start, 0.0), read))
     if not sections:
-        collector.report_error(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
+        collector.report_error(lanes, "<lanes> has no <laneSection> on the road", "start the first at s=0")
     return tuple(sections)
 
 
-def _led_past(
+def _redirect_links(
     lanes: Mapping[int, Lane], between: Mapping[int, Lane], way: Literal["predecessors", "successors"]
 ) -> dict[int, Lane]:
-    """Lanes whose links one way lead past a section that is left out, to where that one's lanes lead.
+    """Return the lanes with links in one direction redirected past an omitted section.
 
-    Where that one has no links at all, its lanes go on in those of their own ids.
+    If the omitted section has no links, its lanes are linked to those of the same id.
     """
     if not any(lane.predecessors or lane.successors for lane in between.values()):
         return dict(lanes)
@@ -91,7 +91,7 @@ def _led_past(
 
 
 def _join_sides(found: list[tuple[float, etree._Element]]) -> list[tuple[float, etree._Element]]:
-    """Sections that name one side only (singleSide) as sections with both: the other side goes on from before."""
+    """Return sections with singleSide as sections with both sides. The other side is continued."""
     joined: list[tuple[float, etree._Element]] = []
     current: dict[str, tuple[float, etree._Element]] = {}
     for s in sorted({s for s, _ in found}):
@@ -119,7 +119,7 @@ def _join_sides(found: list[tuple[float, etree._Element]]) -> list[tuple[float, 
 
 
 def _continue_link(lane: etree._Element, name: str) -> None:
-    """Link a lane to the lane of its own id."""
+    """Link a lane to the lane of the same id."""
     link = lane.find("link")
     if link is None:
         link = etree.SubElement(lane, "link")
@@ -136,18 +136,18 @@ def _read_section(
         for element in section.iterfind(f"{side}/lane"):
             number = collector.integer(element, "id")
             wrong = (number > 0) - (number < 0) != sign
-            message = f"lane {number} stands under <{side}>"
-            hint = "left lanes have ids above 0, the center lane 0, right lanes below 0"
+            message = f"lane {number} is listed under <{side}>"
+            hint = "left lanes have ids above 0, the center lane 0, right lanes ids below 0"
             if wrong and number and sign:
-                # Its id is what links and positions name it by.
+                # Links and positions refer to the id.
                 kind = "lanes under the wrong side"
-                collector.report_warning(element, LANE_SIDE, kind, f"{message}, and is taken by its id", hint)
+                collector.report_warning(element, LANE_SIDE, kind, f"{message}; its id determines the side", hint)
             elif wrong:
                 collector.report_error(element, message, hint)
                 continue
             if number in found:
                 collector.report_error(
-                    element, f"lane {number} occurs twice in its section", "give each lane its own id"
+                    element, f"lane {number} occurs twice in its section", "give each lane a unique id"
                 )
             else:
                 found[number] = element
@@ -162,7 +162,7 @@ def _read_section(
             edge = lane.outer
     if not any(lanes):
         collector.report_error(
-            section, "<laneSection> has no lane beside the center", "add a lane under <left> or <right>"
+            section, "<laneSection> has no lane except the center lane", "add a lane under <left> or <right>"
         )
     return {number: lanes[number] for number in sorted(lanes, reverse=True)}
 
@@ -205,9 +205,9 @@ def _lane(
 def _read_width(
     element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, collector: AttributeReader
 ) -> tuple[Polynomials, float]:
-    """Return the width over ds, and the ds from which on the file gives it.
+    """Return the width over ds, and the first ds with a specified width.
 
-    A <border> counts from the reference line; <width> wins where both are given (clause 11.7).
+    A <border> counts from the reference line. <width> has priority if both are given (clause 11.7).
     """
     begin = float(element.get(ORIGIN, "0"))
     widths = [collector.polynomial(e, "sOffset") for e in element.iterfind("width")]
@@ -234,7 +234,7 @@ def _read_marks(element: etree._Element, begin: float, collector: AttributeReade
             _read_line(line, width or MARK_WIDTHS.get(weight, 0.12), collector) for line in mark.iterfind("type/line")
         )
         if mark.get("type") is None:
-            collector.doubt_mark(mark, "<roadMark> lacks the attribute 'type'")
+            collector.report_mark_warning(mark, "<roadMark> lacks the attribute 'type'")
         yield RoadMark(
             s_offset=(collector.mark_number(mark, "sOffset", 0.0) or 0.0) + begin,
             type=mark.get("type", "none"),
@@ -247,12 +247,14 @@ def _read_marks(element: etree._Element, begin: float, collector: AttributeReade
 
 
 def _read_line(line: etree._Element, usual: float, collector: AttributeReader) -> RoadMarkLine | None:
-    """Return a line of a road mark; None if its dashes are not given, as the type of the mark then says how it looks."""
+    """Return a line of a road mark, or None if its dashes are missing, as then the type of the mark defines the
+    pattern.
+    """
     length, space = (collector.mark_number(line, name, None) for name in ("length", "space"))
     missing = [name for name in ("length", "space") if line.get(name) is None]
     if missing:
         names = " and ".join(repr(name) for name in missing)
-        collector.doubt_mark(line, f"<line> lacks the attribute {names}")
+        collector.report_mark_warning(line, f"<line> lacks the attribute {names}")
     if length is None or space is None:
         return None
     return RoadMarkLine(

@@ -1,4 +1,4 @@
-"""<signals>, <objects> and <controller>."""
+"""Reader of <signals>, <objects> and <controller>."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from eidrive_scenario.roads.model.road_map import (
 )
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
-MOST_REPEATED = 100_000
-"""How often an object may stand along its road."""
-MOST_PLACED = 200_000
-"""How often all objects together may stand along their roads."""
-LARGEST_OBJECT = 1e5
-"""Largest length, width, height or radius of an object [m]."""
-FURTHEST = 1e6
-"""Largest distance of an object or of its outline from its place at the road [m]."""
+MAX_REPETITIONS = 100_000
+"""Maximum number of repetitions of an object."""
+MAX_OBJECTS = 200_000
+"""Maximum number of all objects including repetitions."""
+MAX_OBJECT_SIZE = 1e5
+"""Maximum length, width, height or radius of an object [m]."""
+MAX_OBJECT_DISTANCE = 1e6
+"""Maximum distance of an object or its outline from its position on the road [m]."""
 
 
 def read_signals(
     elements: list[tuple[str, etree._Element]], roads: Mapping[str, Road], collector: AttributeReader
 ) -> dict[str, Signal]:
-    """Return the signals of all roads by id, with the references that other roads make to them.
+    """Return the signals of all roads by id, with the references of other roads to them.
 
-    Some maps give one id to several signals: the second of them is found under 'id#2', and so on.
+    Some maps use one id for several signals; the second one is stored as 'id#2', and so on.
     """
     signals: dict[str, Signal] = {}
     same_id: dict[str, int] = {}
@@ -55,7 +55,9 @@ def read_signals(
         if number in signals:
             signals[number] = replace(signals[number], references=(*signals[number].references, place))
         else:
-            collector.report_error(reference, f"reference to signal {number!r}, which does not exist", "correct the id")
+            collector.report_error(
+                reference, f"<signalReference> refers to signal {number!r}, which does not exist", "correct the id"
+            )
     return signals
 
 
@@ -64,9 +66,9 @@ def _read_place(road: Road, element: etree._Element, collector: AttributeReader)
     s = collector.number(element, "s")
     held = min(max(s, 0.0), road.length)
     if abs(s - held) > BEYOND:
-        message = f"a signal stands at s = {s:g} m of road {road.id!r}, and is put at s = {held:g} m"
-        hint = f"the road runs from 0 to {road.length:g} m"
-        collector.report_warning(element, SIGNAL_OFF_ROAD, "signals beyond their roads", message, hint)
+        message = f"a signal is at s = {s:g} m of road {road.id!r}; s = {held:g} m is used"
+        hint = f"the road extends from 0 to {road.length:g} m"
+        collector.report_warning(element, SIGNAL_OFF_ROAD, "signals beyond the ends of their roads", message, hint)
     return SignalPlace(
         road=road.id,
         s=held,
@@ -100,14 +102,16 @@ def _read_signal(road: Road, element: etree._Element, collector: AttributeReader
 def read_controllers(
     root: etree._Element, signals: dict[str, Signal], collector: AttributeReader
 ) -> dict[str, SignalController]:
-    """Groups of signals by id."""
+    """Return groups of signals by id."""
     controllers = {}
     for element in root.iterfind("controller"):
         members = []
         for control in element.iterfind("control"):
             number = collector.text(control, "signalId")
             if number not in signals:
-                collector.report_error(control, f"control of signal {number!r}, which does not exist", "correct the id")
+                collector.report_error(
+                    control, f"<control> refers to signal {number!r}, which does not exist", "correct the id"
+                )
             members.append(number)
         number = collector.text(element, "id")
         controllers[number] = SignalController(number, element.get("name", ""), tuple(members))
@@ -124,14 +128,16 @@ def _read_object(road: str, element: etree._Element, collector: AttributeReader)
         return collector.number(element, name, 0.0)
 
     for name in ("length", "width", "height", "radius"):
-        if abs(number(name)) > LARGEST_OBJECT:
-            collector.report_error(element, f"<object> has {name}={number(name):g}", f"give at most {LARGEST_OBJECT:g}")
-    for name in ("t", "zOffset"):
-        if abs(number(name)) > FURTHEST:
+        if abs(number(name)) > MAX_OBJECT_SIZE:
             collector.report_error(
-                element, f"<object> has {name}={number(name):g}", f"give a number within {FURTHEST:g}"
+                element, f"<object> has {name}={number(name):g}", f"give at most {MAX_OBJECT_SIZE:g}"
             )
-    collector.spend(element, "objects", 1, MOST_PLACED)
+    for name in ("t", "zOffset"):
+        if abs(number(name)) > MAX_OBJECT_DISTANCE:
+            collector.report_error(
+                element, f"<object> has {name}={number(name):g}", f"give a number within {MAX_OBJECT_DISTANCE:g}"
+            )
+    collector.spend(element, "objects", 1, MAX_OBJECTS)
     outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
     corners = [tuple(_read_corners(outline, collector)) for outline in outlines]
     return RoadObject(
@@ -165,8 +171,10 @@ def _read_corners(outline: etree._Element, collector: AttributeReader) -> list[C
             x, y, z = collector.number(corner, "u"), collector.number(corner, "v"), collector.number(corner, "z", 0.0)
         else:
             continue
-        if max(abs(x), abs(y), abs(z)) > FURTHEST:
-            collector.report_error(corner, f"<{corner.tag}> lies beyond {FURTHEST:g} m", "correct its place")
+        if max(abs(x), abs(y), abs(z)) > MAX_OBJECT_DISTANCE:
+            collector.report_error(
+                corner, f"<{corner.tag}> is further away than {MAX_OBJECT_DISTANCE:g} m", "correct its position"
+            )
             continue
         corners.append(Corner(corner.tag == "cornerRoad", x, y, z, collector.number(corner, "height", 0.0)))
     return corners
@@ -179,15 +187,15 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, collector: Att
         return start, collector.number(repeat, f"{name}End", start)
 
     length, distance = collector.number(repeat, "length"), collector.number(repeat, "distance", 0.0)
-    if length > MOST_REPEATED * (distance if distance > 0.0 else 1.0):
-        message = f"<repeat> has length={length:g} and distance={distance:g}: the object stands there too often"
-        collector.report_error(repeat, message, f"at most {MOST_REPEATED} of it are read")
+    if length > MAX_REPETITIONS * (distance if distance > 0.0 else 1.0):
+        message = f"<repeat> has length={length:g} and distance={distance:g}: too many repetitions"
+        collector.report_error(repeat, message, f"at most {MAX_REPETITIONS} repetitions are read")
         length = 0.0
     step = distance if distance > 0.0 else 1.0
-    collector.spend(repeat, "places of objects", max(length, 0.0) / step, MOST_PLACED)
+    collector.spend(repeat, "positions of objects", max(length, 0.0) / step, MAX_OBJECTS)
     for name, own in (("width", "width"), ("height", "height"), ("t", "t"), ("zOffset", "zOffset")):
-        if max(map(abs, pair(name, own))) > LARGEST_OBJECT:
-            collector.report_error(repeat, f"<repeat> has a {name} beyond {LARGEST_OBJECT:g} m", "correct it")
+        if max(map(abs, pair(name, own))) > MAX_OBJECT_SIZE:
+            collector.report_error(repeat, f"<repeat> has a {name} beyond {MAX_OBJECT_SIZE:g} m", "correct it")
     return Repeat(
         s=collector.number(repeat, "s", collector.number(element, "s", 0.0)),
         length=length,

@@ -1,4 +1,4 @@
-"""<planView>: the curves of a reference line."""
+"""Reader of <planView>: curves of a reference line."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, lin
 
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6
-"""Length of a road or geometry that is read at all [m]."""
+"""Maximum length of a road or geometry [m]."""
 LONGEST_POLY3 = 2e5
-"""Length of all poly3 of a file, as one that is read takes memory by the meter [m]."""
+"""Maximum length of all poly3 of a file [m], as each meter takes memory."""
 SHORTEST = 1e-9
-"""Geometries of no length occur in real maps and are left out [m]."""
+"""Maximum length of a geometry that is omitted [m]. Geometries of length 0 occur in real maps."""
 
 
 def read_reference_line(road: etree._Element, length: float, collector: AttributeReader) -> ReferenceLine:
     """Return the reference line of a <road>.
 
-    Its length is that of the geometry where the road states one that differs by more than 1 %.
+    If the length of the road differs from that of the geometry by more than 1 %, the geometry has priority.
     """
     plan = road.find("planView")
     if plan is None:
@@ -40,9 +40,9 @@ def read_reference_line(road: etree._Element, length: float, collector: Attribut
     covered = found[-1].s + found[-1].length
     if abs(covered - length) > max(0.01 * length, 0.1):
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
-        what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there}: the geometry counts"
+        what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there} and has priority"
         hint = "correct the length or complete the geometry"
-        collector.report_warning(road, GEOMETRY_GAP, "lengths that are not those of the geometry", what, hint)
+        collector.report_warning(road, GEOMETRY_GAP, "lengths that differ from the geometry", what, hint)
         length = covered
     return ReferenceLine(found, length)
 
@@ -59,7 +59,7 @@ def _read_geometry(geometry: etree._Element, collector: AttributeReader) -> Sequ
     shape = next((child for child in geometry if isinstance(child.tag, str) and child.tag != "userData"), None)
     if shape is None:
         collector.report_error(
-            geometry, "<geometry> says no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS)
+            geometry, "<geometry> has no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS)
         )
         return []
     line = line_of(geometry)
@@ -91,6 +91,6 @@ def _read_param_poly3(
             shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized"))
         )
     if not any((u1, u2, u3, v1, v2, v3)):
-        collector.report_error(shape, "<paramPoly3> stays in one point", "give the polynomials of its u and v")
+        collector.report_error(shape, "<paramPoly3> is a single point", "give polynomials for u and v")
     pace = 1.0 if span == "arcLength" else 1.0 / length
     return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace, line=line_of(shape.getparent()))

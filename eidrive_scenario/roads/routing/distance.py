@@ -1,4 +1,4 @@
-"""Distances in road coordinates between places on connected roads."""
+"""Distances in road coordinates between locations on connected roads."""
 
 from __future__ import annotations
 
@@ -13,29 +13,31 @@ from eidrive_scenario.roads.routing.links import LaneLinks
 from eidrive_scenario.roads.routing.movement import driving_direction
 
 Chain = Literal["shortest", "fastest", "leastIntersections"]
-"""Which chain of roads a distance is measured along."""
+"""Criterion that selects the chain of roads of a distance."""
 
 
 class RoadDistances:
-    """Shortest ways from road to road along reference lines (Dijkstra), remembered per road and direction."""
+    """Shortest chains of roads along reference lines by Dijkstra's algorithm, cached per road and direction."""
 
     def __init__(self, roads: Mapping[str, Road], links: LaneLinks, speed: Callable[[str], float]) -> None:
-        """`speed` is the one with which a road counts where the fastest chain is asked for [m/s]."""
+        """Store the roads. `speed` returns the assumed speed of a road for the fastest chain [m/s]."""
         self._roads = roads
         self._links = links
         self._speed = speed
         self._found: dict[tuple[str, int, Chain], dict[str, tuple[float, float, int]]] = {}
 
     def between(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float] | None:
-        """How far b lies ahead of a (behind where negative) and to its left, seen in the traffic direction of a's lane.
+        """Return the distances from a to b ahead and to the left in the driving direction of the lane of a [m].
 
-        Along the reference lines of the chain of roads that `by` asks for [m]. None if no chain of roads joins them.
+        They are measured along the reference lines of the chain of roads that `by` selects. Behind and right are
+        negative.
+        The result is None if no chain of roads connects the locations.
         """
         found = self.placed(a, b, by)
         return None if found is None else found[:2]
 
     def placed(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float, int] | None:
-        """Return `between`, and +1 if the s of both roads runs the same way along the chain, else -1."""
+        """Return `between`, and +1 if s of both roads increases in the same direction along the chain, else -1."""
         direction = driving_direction(self._roads[a.road], a.lane)
         if a.road == b.road:
             return (b.s - a.s) * direction, (b.t - a.t) * direction, 1
@@ -63,7 +65,7 @@ class RoadDistances:
         return JUNCTION_COST if by == "leastIntersections" and enters else 0.0
 
     def _from(self, road: str, direction: int, by: Chain) -> dict[str, tuple[float, float, int]]:
-        """Return for each road reached by leaving `road` in `direction`: cost and meters between, and direction entered."""
+        """Return cost, length between [m] and direction of entry of each road reached from `road` in `direction`."""
         known = self._found.get((road, direction, by))
         if known is not None:
             return known

@@ -1,4 +1,4 @@
-"""The lanes of a road network as a graph, and the way from place to place over it."""
+"""Lanes of a road network as a graph, and the search for a route over it."""
 
 from __future__ import annotations
 
@@ -25,25 +25,24 @@ else:
     LaneGraph = nx.DiGraph
 
 LANE_CHANGE_COST = 10.0
-"""Meters of detour that a lane change is worth."""
-HASTE_COST = 500.0
-"""A lane change within a section of L meters costs this / L meters more: short sections are bad places for it."""
-NARROWEST = 1.0
-"""A lane must be this wide in the middle of its section to change to it [m]."""
-HERE = 0.01
-"""A destination that lies behind by less than this is reached without going round [m]."""
+"""Detour that is equivalent to a lane change [m]."""
+SHORT_SECTION_COST = 500.0
+"""Additional cost of a lane change times the length of the section [m²]: short sections are unsuitable."""
+MIN_CHANGE_WIDTH = 1.0
+"""Minimum width of a lane in the middle of its section for a lane change to it [m]."""
+REACHED_DISTANCE = 0.01
+"""Maximum distance of a destination behind the start that counts as reached [m]."""
 
 
 class RouteError(InputError):
-    """There is no way over the lanes from one place to another."""
+    """No route over the lanes from one location to another exists."""
 
 
 def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
-    """Nodes LaneKey with `length` [m], `end` (x, y) and `drivable`; edges with `weight` [m] and `kind`.
+    """Return the graph of lanes: nodes LaneKey with `length` [m], `end` (x, y) and `drivable`.
 
-    The kind of an edge is 'successor' or 'change'; lengths and ends are those of the lanes' center lines.
-
-    An edge leads from a lane to the lanes that traffic enters at its end, and to its neighbors of the same direction.
+    Edges have `weight` [m] and `kind`, 'successor' or 'change'. Lengths and ends are those of the center lines. An edge
+    leads from a lane to its successors in the driving direction and to its neighbors of the same direction.
     """
     graph: LaneGraph = LaneGraph()
     roads = {road.id: road for road in tables.roads}
@@ -66,7 +65,7 @@ def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
         for section in road.sections:
             for one, two in _neighbors(section):
                 if directions[road.id, one] == directions[road.id, two]:
-                    cost = LANE_CHANGE_COST + HASTE_COST / max(section.length, 1.0)
+                    cost = LANE_CHANGE_COST + SHORT_SECTION_COST / max(section.length, 1.0)
                     keys = LaneKey(road.id, section.index, one), LaneKey(road.id, section.index, two)
                     graph.add_edge(*keys, weight=cost, kind="change")
                     graph.add_edge(*reversed(keys), weight=cost, kind="change")
@@ -74,7 +73,7 @@ def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
 
 
 def _measure(graph: LaneGraph, tables: RoadTables, directions: Mapping[tuple[str, int], int]) -> None:
-    """Give each node the length of its center line, by Gauss-Legendre quadrature, and where traffic leaves it."""
+    """Set the length of the center line by Gauss-Legendre quadrature and the exit point of each node."""
     keys = list(graph)
     row = np.array([graph.nodes[key].pop("row") for key in keys], dtype=np.int64)
     section = tables.lane_section[row]
@@ -90,7 +89,7 @@ def _measure(graph: LaneGraph, tables: RoadTables, directions: Mapping[tuple[str
 
 
 def _neighbors(section: LaneSection) -> Iterator[tuple[int, int]]:
-    """Yield pairs of drivable lanes side by side, across lane 0 too."""
+    """Yield pairs of adjacent drivable lanes, also across lane 0."""
     lanes = [lane for number, lane in section.lanes.items() if number]
     for one, two in pairwise(lanes):
         if _usable(one, section) and _usable(two, section):
@@ -98,28 +97,28 @@ def _neighbors(section: LaneSection) -> Iterator[tuple[int, int]]:
 
 
 def _usable(lane: Lane, section: LaneSection) -> bool:
-    return lane.drivable and lane.width.value(0.5 * section.length) >= NARROWEST
+    return lane.drivable and lane.width.value(0.5 * section.length) >= MIN_CHANGE_WIDTH
 
 
 def find_lanes(
     graph: LaneGraph, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation, cost: Cost | None = None
 ) -> tuple[LaneKey, ...]:
-    """Return the lanes of the cheapest way: by A*, the straight line to the end as the bound; by Dijkstra with a `cost`.
+    """Return the lanes of the cheapest route: by A* with the straight distance to the end, by Dijkstra with a `cost`.
 
-    Raise RouteError.
+    Raise RouteError if there is none.
     """
     source, target = _key(roads, start), _key(roads, end)
     goal = graph.nodes[target]["end"] if target in graph else (0.0, 0.0)
     last = graph.nodes[target]["length"] if target in graph else 0.0
 
     def bound(key: LaneKey, _: LaneKey) -> float:
-        # The way counts up to where the target begins; lanes of real maps meet to within a few centimeters.
+        # The cost counts up to the start of the target; lanes of real maps meet within a few centimeters.
         x, y = graph.nodes[LaneKey(*key[:3])]["end"]
         return max(0.99 * (math.hypot(goal[0] - x, goal[1] - y) - last) - 1.0, 0.0)
 
-    behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < -HERE
+    behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < -REACHED_DISTANCE
     if source[:2] == target[:2] and behind and source in graph:
-        graph, source = _started(graph, source)
+        graph, source = _with_start_copy(graph, source)
     try:
         found: Sequence[LaneKey]
         if cost is None:
@@ -129,7 +128,7 @@ def find_lanes(
     except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
         raise RouteError(
             Diagnostic(
-                f"no way over the lanes from road {start.road!r} lane {start.lane} s {start.s:.1f} "
+                f"no route over the lanes leads from road {start.road!r} lane {start.lane} s {start.s:.1f} "
                 f"to road {end.road!r} lane {end.lane} s {end.s:.1f}",
                 "check the direction of the lanes and the links between them",
             )
@@ -137,13 +136,13 @@ def find_lanes(
     return tuple(LaneKey(*key[:3]) for key in found)
 
 
-def _started(graph: LaneGraph, source: LaneKey) -> tuple[LaneGraph, LaneKey]:
-    """Return a graph with a second copy of the source's section: one that can be left, but not yet reached as a target."""
+def _with_start_copy(graph: LaneGraph, source: LaneKey) -> tuple[LaneGraph, LaneKey]:
+    """Return a graph with a copy of the section of the source, which has exits but no entries."""
     copy: LaneGraph = LaneGraph(graph)
     group = [key for key in graph if key[:2] == source[:2]]
 
     def twin(key: LaneKey) -> LaneKey:
-        return _Started(*key)
+        return _StartLane(*key)
 
     for key in group:
         for _, other, data in graph.out_edges(key, data=True):
@@ -151,13 +150,13 @@ def _started(graph: LaneGraph, source: LaneKey) -> tuple[LaneGraph, LaneKey]:
     return copy, twin(source)
 
 
-class _Started(LaneKey):
-    """The part of a lane ahead of the start."""
+class _StartLane(LaneKey):
+    """Part of a lane ahead of the start."""
 
     __slots__ = ()
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Started) and tuple(self) == tuple(other)
+        return isinstance(other, _StartLane) and tuple(self) == tuple(other)
 
     def __hash__(self) -> int:
         return hash(("started", *self))

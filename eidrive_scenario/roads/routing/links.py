@@ -1,6 +1,6 @@
-"""Which lane goes on in which: within a road, from road to road, and through junctions.
+"""Links of lanes within a road, between roads, and through junctions.
 
-Links are kept both ways: a file may state them at either end.
+Links are stored in both directions, as a file may specify them at either end.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from eidrive_scenario.roads.model.road_map import Connection, Contact, Junction,
 
 
 class LaneEnd(NamedTuple):
-    """An end of a lane of a lane section; side +1 is where s ends, -1 if it starts."""
+    """End of a lane of a lane section; side +1 is its end in s, -1 its start."""
 
     lane: LaneKey
     side: int
 
 
 class RoadEnd(NamedTuple):
-    """An end of a road; side +1 is where s ends, -1 if it starts."""
+    """End of a road; side +1 is its end in s, -1 its start."""
 
     road: str
     side: int
 
 
 class LaneLinks:
-    """The links between lane ends, and between road ends."""
+    """Links between lane ends and between road ends."""
 
     def __init__(self, road_map: RoadMap) -> None:
         self._roads: Mapping[str, Road] = road_map.roads
@@ -44,17 +44,17 @@ class LaneLinks:
             self._link_road(road, road.successor, 1)
 
     def beyond(self, lane: LaneKey, direction: int) -> Iterator[tuple[LaneKey, int]]:
-        """Yield the lanes reached by leaving a lane in `direction` (+1 growing s), with the direction in which they begin."""
+        """Yield the lanes after leaving a lane in `direction` (+1 along s), with the direction of entry."""
         for other in self._lanes.get(LaneEnd(lane, direction), ()):
             yield other.lane, -other.side
 
     def beyond_road(self, road: str, direction: int) -> Iterator[tuple[str, int]]:
-        """Yield the roads reached by leaving a road in `direction`, with the direction in which they begin."""
+        """Yield the roads after leaving a road in `direction`, with the direction of entry."""
         for other in self._ends.get(RoadEnd(road, direction), ()):
             yield other.road, -other.side
 
     def between_roads(self) -> Iterator[tuple[LaneEnd, LaneEnd]]:
-        """Ends of lanes of different roads that are linked, each pair once."""
+        """Yield linked ends of lanes of different roads, each pair once."""
         for one, others in self._lanes.items():
             for other in others:
                 if one.lane.road < other.lane.road:
@@ -108,12 +108,12 @@ class LaneLinks:
 
 
 def end_section(road: Road, side: int) -> LaneSection:
-    """Return the lane section at an end of a road: side +1 is where s ends."""
+    """Return the lane section at an end of a road; side +1 is its end in s."""
     return road.sections[-1 if side > 0 else 0]
 
 
 def side_at(incoming: Road, junction: Junction, connecting: Road, contact: Contact) -> int:
-    """Return the end of the incoming road that lies at the junction."""
+    """Return the end of the incoming road that is at the junction."""
     sides = [
         side
         for side, link in ((-1, incoming.predecessor), (1, incoming.successor))
@@ -125,7 +125,7 @@ def side_at(incoming: Road, junction: Junction, connecting: Road, contact: Conta
 
 
 def _nearest_end(road: Road, side: int, other: Road) -> Contact:
-    """Return the end of `other` that lies nearest to an end of `road`."""
+    """Return the end of `other` that is nearest to an end of `road`."""
     x, y, *_ = road.reference.at(road.length if side > 0 else 0.0)
     start, end = other.reference.at(0.0), other.reference.at(other.length)
     return "start" if math.hypot(start.x - x, start.y - y) <= math.hypot(end.x - x, end.y - y) else "end"

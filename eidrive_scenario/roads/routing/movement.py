@@ -1,4 +1,4 @@
-"""Along a lane by a distance: through lane sections, links and junctions."""
+"""Motion along a lane by a distance through lane sections, links and junctions."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.routing.links import LaneLinks
 
 STRIDE = 2.0
-"""Longest step of the integration along a curved lane [m]."""
+"""Maximum step of the integration along a curved lane [m]."""
 LOOK_AHEAD = 30.0
-"""How far ahead the direction of a branch is judged where it is not a junction's connecting road [m]."""
+"""Distance ahead at which the direction of a branch is evaluated outside of connecting roads [m]."""
 
 
 class Branch(NamedTuple):
-    """A way on at a fork.
+    """Branch of a fork.
 
-    direction  +1 if it is entered in the direction of its s, -1 against it
-    turn       change of heading to its end, left positive, in (-π, π] [rad]
+    direction  +1 if it is entered in the direction of s, else -1
+    turn       change of heading up to its end, left positive, in (-π, π] [rad]
     """
 
     lane: LaneKey
@@ -46,7 +46,7 @@ class BranchGuide(Protocol):
 
 
 def driving_direction(road: Road, lane_id: int) -> int:
-    """Return +1 if traffic of the lane drives in the direction of s, -1 if against it; +1 for lane 0."""
+    """Return +1 if traffic of the lane drives in the direction of s, else -1; +1 for lane 0."""
     known = road.directions.get(lane_id)
     if known is not None:
         return known
@@ -54,7 +54,7 @@ def driving_direction(road: Road, lane_id: int) -> int:
 
 
 class Movement:
-    """Moves lane locations over one road network."""
+    """Motion of lane locations over one road network."""
 
     def __init__(self, roads: Mapping[str, Road], links: LaneLinks) -> None:
         self._roads = roads
@@ -69,11 +69,13 @@ class Movement:
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
-        """Return the place `distance` meters further in the lane's driving direction (backwards if negative), or None.
+        """Return the location `distance` [m] further in the driving direction (backwards if negative), or None.
 
-        The distance is measured on the path, at the location's offset. Where the lane forks, the route decides, else
-        `choose`, else the straightest way on is taken. None says that the lane ends; with `to_end` the result is the
-        place where it does.
+        The distance is measured on the path at the offset of the location. Where the lane forks, the branch is selected
+        by
+        the route, else by `choose`, else it is the straightest one. If the lane ends, the result is None, or the end of
+        the
+        lane with `to_end`.
         """
         road = self._roads[location.road]
         section, lane = lane_at(road, location.lane, location.s)
@@ -92,7 +94,8 @@ class Movement:
             following = self._next(road, section, lane, direction, with_traffic, offset, route, choose, visit)
             if following is None and (remaining <= 0.0 or to_end):
                 if not inside:
-                    s = math.nextafter(s, section.s)  # where the section ends, the next one begins, without this lane
+                    # At the end of the section, the next one starts without this lane.
+                    s = math.nextafter(s, section.s)
                 break
             if following is None:
                 return None
@@ -139,7 +142,7 @@ class Movement:
         return chosen.lane, chosen.direction, 0.0
 
     def branches(self, key: LaneKey, direction: int, with_traffic: bool = True) -> list[Branch]:
-        """Return the ways on from a lane's end, in the order of the file; those with the traffic if there are any."""
+        """Return the branches at the end of a lane in the order of the file, preferably those with the traffic."""
         found = list(self._links.beyond(key, direction))
         wanted = 1 if with_traffic else -1
         along = [(k, d) for k, d in found if driving_direction(self._roads[k.road], k.lane) * d == wanted]
@@ -158,7 +161,10 @@ class Movement:
     def _beside_end(
         self, road: Road, section: LaneSection, lane: Lane, direction: int, offset: float
     ) -> tuple[LaneKey, float] | None:
-        """Where a lane ends while its road goes on: the nearest lane of the same direction, and the shift of offset."""
+        """Return the nearest lane of the same direction beside the end of a lane, and the change of offset.
+
+        The result is None if the road ends as well.
+        """
         index = section.index + direction
         if not 0 <= index < len(road.sections):
             return None
@@ -177,7 +183,7 @@ class Movement:
 
 
 def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, direction: int) -> tuple[LaneSection, Lane]:
-    """Return the section that lies before s where one moves against s and stands on a section's very start."""
+    """Return the preceding section if the motion is against s and starts exactly at the start of a section."""
     if direction < 0 and s == section.s and section.index > 0:
         before = road.sections[section.index - 1]
         for number in lane.predecessors or (lane.id,):
@@ -189,9 +195,9 @@ def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, dire
 def _along(
     road: Road, section: LaneSection, lane: Lane, s: float, offset: float, direction: int, remaining: float
 ) -> tuple[float, float]:
-    """s after `remaining` meters of path or at the section's end, and the meters that are left (0 if none).
+    """Return s after `remaining` [m] of path or at the end of the section, and the length that is left (0 if none).
 
-    On a line or arc, where the lane keeps its distance from it, exact; elsewhere by the midpoint rule.
+    The result is exact on a line or arc at constant t, else by the midpoint rule.
     """
     end = section.end if direction > 0 else section.s
     if section.index == len(road.sections) - 1 and direction > 0:
@@ -229,7 +235,7 @@ def _along(
 
 
 def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: float) -> float:
-    """Return meters of path at an offset from a lane's center per meter of s; in banked bends as if they were level."""
+    """Return the path length at an offset from a lane center per meter of s, ignoring superelevation."""
     t, slope = lane_t(road, section, lane, s)
     curvature, speed = road.reference.bend(s)
     across = speed * (1.0 - curvature * (t + offset))

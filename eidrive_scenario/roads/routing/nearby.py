@@ -1,4 +1,4 @@
-"""Where a point is, near a place where something was before: on that road, or on what the road leads to."""
+"""Search for the lane at a point near a previous location: on its road or on adjacent roads."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from eidrive_scenario.roads.routing.movement import driving_direction
 def locate_near(
     roads: Mapping[str, Road], links: LaneLinks, x: float, y: float, hint: LaneLocation
 ) -> LaneLocation | None:
-    """Return the lane location of a point on the road of `hint`, or on one behind its ends; None if it lies on neither."""
+    """Return the lane location of a point on the road of `hint` or on an adjacent one, or None if it is on neither."""
     road = roads[hint.road]
     here = _on(road, x, y, hint.s)
     if here is not None:

@@ -1,4 +1,4 @@
-"""A route: the lanes from place to place, its length and its course."""
+"""Routes: lanes between locations, with length and path."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.routing.movement import Branch, driving_direction
 
-GRAIN = 0.25
-"""Distance between the points by which a route's course is kept [m]."""
+POINT_SPACING = 0.25
+"""Distance between the stored points of a path [m]."""
 LANE_CHANGE_LENGTH = 40.0
-"""Meters over which a lane change stretches where its section has room for it."""
+"""Length of a lane change if its section is long enough [m]."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A stretch of a route within one lane section: from s to s_end, from one lane into another (mostly the same)."""
+    """Part of a route within one lane section: from s to s_end, from one lane to another (usually the same)."""
 
     road: str
     section: int
@@ -38,16 +38,15 @@ class Leg:
 
     @property
     def direction(self) -> int:
-        """+1 along growing s, -1 against it."""
+        """+1 along s, -1 against it."""
         return 1 if self.s_end >= self.s else -1
 
 
 @dataclass(frozen=True)
 class Route:
-    """The way from `start` to `end` over `lanes`; distances along it count from the start [m].
+    """Route from `start` to `end` over `lanes`; distances along it count from the start [m].
 
-    A closed route ends where it starts, and is followed again and again; `lap` is the closed route to which this one
-    leads.
+    A closed route ends at its start and is repeated. `lap` is the closed route that follows this one.
     """
 
     tables: RoadTables = field(repr=False)
@@ -59,17 +58,17 @@ class Route:
 
     @property
     def roads(self) -> Mapping[str, Road]:
-        """The roads of the network by their ids."""
+        """Roads of the network by their ids."""
         return self.tables.by_id
 
     @property
     def onward(self) -> Route | None:
-        """What follows where it ends: the lap to which it leads, or a closed route itself."""
+        """Route that follows at the end: the lap, or a closed route itself."""
         return self if self.closed else self.lap
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
-        """The stretches of the route, one for each lane section that it crosses."""
+        """Parts of the route, one for each lane section."""
         groups: list[list[LaneKey]] = []
         for key in self.lanes:
             if groups and groups[-1][-1][:2] == key[:2] and groups[-1][-1] != key:
@@ -92,26 +91,26 @@ class Route:
 
     @property
     def length(self) -> float:
-        """Meters from start to end along the lanes' center lines."""
-        return float(self._course[1][-1])
+        """Length from start to end along the center lines of the lanes [m]."""
+        return float(self._path[1][-1])
 
     def polyline(self, spacing: float = 1.0) -> Array:
-        """Return (M, 3) points of the lanes' center lines from start to end, at most `spacing` apart [m].
+        """Return points (M, 3) of the center lines of the lanes from start to end, at most `spacing` apart [m].
 
-        Where a broken map has lanes jump, there are no more points than the lanes have in themselves.
+        Gaps between lanes of invalid maps get no additional points.
         """
-        most = math.ceil(2.0 * len(self._course[1]) * max(GRAIN / spacing, 1.0))
+        most = math.ceil(2.0 * len(self._path[1]) * max(POINT_SPACING / spacing, 1.0))
         count = min(max(math.ceil(self.length / spacing), 1), most) + 1
         return self.points_at(np.linspace(0.0, self.length, count))
 
     def points_at(self, distance: Array) -> Array:
-        """Return (M, 3) points at distances (M,) along the route."""
-        points, along, _, _ = self._course
+        """Return points (M, 3) at distances (M,) along the route."""
+        points, along, _, _ = self._path
         return np.column_stack([np.interp(distance, along, points[:, axis]) for axis in range(3)])
 
     def location_at(self, distance: float) -> LaneLocation:
-        """Return the place at a distance along the route, on its center line."""
-        _, along, owner, places = self._course
+        """Return the location at a distance along the route on its center line."""
+        _, along, owner, places = self._path
         index = min(max(bisect_right(along, distance) - 1, 0), len(along) - 2)
         leg = self.legs[int(owner[index + 1])]
         before = index if owner[index] == owner[index + 1] else index + 1
@@ -125,7 +124,7 @@ class Route:
         return LaneLocation(leg.road, lane, s, t - lane_t(road, section, section.lanes[lane], s)[0], t)
 
     def pose_at(self, distance: float) -> Pose:
-        """Return the pose at a distance along the route, heading in the direction of travel."""
+        """Return the pose at a distance along the route with the heading of travel."""
         place = self.location_at(distance)
         pose = lane_pose_at(self.roads[place.road], place.lane, place.s, place.offset)
         x, y, _ = self.points_at(np.array([distance - 0.25, distance + 0.25])).T
@@ -135,8 +134,8 @@ class Route:
         return pose.turned(_wrap(heading - pose.h))
 
     def s_along(self, location: LaneLocation) -> float | None:
-        """Return the distance along the route at which it passes a place's road and s, None if it does not."""
-        _, along, owner, places = self._course
+        """Return the distance along the route to the road and s of a location, or None if the route misses it."""
+        _, along, owner, places = self._path
         for number, leg in enumerate(self.legs):
             low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
             if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
@@ -146,9 +145,11 @@ class Route:
         return None
 
     def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:
-        """How far b lies ahead of a and to its left along the route's reference lines, None if it misses one of them.
+        """Return the distances from a to b ahead and to the left along the reference lines of the route [m].
 
-        Seen in the driving direction of a's lane. Round a closed route the nearer way counts.
+        They refer to the driving direction of the lane of a. A closed route gives the shorter way round. The result is
+        None
+        if the route misses a location.
         """
         here, there = self._passes(a), self._passes(b)
         if here is None or there is None:
@@ -161,7 +162,10 @@ class Route:
         return along * sense, (b.t * there[1] - a.t * here[1]) * sense
 
     def _passes(self, location: LaneLocation) -> tuple[float, int] | None:
-        """Where the route (or its lap, after it) passes a place: meters of reference line, and in which direction."""
+        """Return the length of reference lines up to a location and the direction of travel there, or None.
+
+        The lap of the route is included.
+        """
         done = 0.0
         for leg in self.legs:
             low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
@@ -172,11 +176,12 @@ class Route:
         return None if onward is None else (done + onward[0], onward[1])
 
     def project(self, x: float, y: float, near: float | None = None, window: float = 30.0) -> tuple[float, float]:
-        """Return the distance along the route that is nearest to a point, and how far left of the route the point lies [m].
+        """Return the distance along the route of the point nearest to x, y, and the offset to the left of the route
+        [m].
 
-        `near` narrows the search to `window` meters around a distance known before.
+        `near` restricts the search to `window` [m] around a previous distance.
         """
-        points, along, _, _ = self._course
+        points, along, _, _ = self._path
         low, high = 0, len(along) - 1
         if near is not None:
             low = max(bisect_right(along, near - window) - 1, 0)
@@ -199,9 +204,9 @@ class Route:
         return best[1], float(best[2])
 
     def pick(self, branches: Sequence[Branch], road: str, visit: int = 0) -> Branch | None:
-        """Return the branch that the route takes where it leaves a road; None if it takes none of them.
+        """Return the branch of the route at its exit from a road, or None if it takes none of the branches.
 
-        `visit` is the number of the road among those of the route, as `visit` gives it: a route may come by twice.
+        `visit` is the index of the road in the route (see `visit`), as a route may pass a road twice.
         """
         for number in self._later(visit):
             if self._visits[number][0] == road and (following := self.passes(number + 1)) is not None:
@@ -217,28 +222,28 @@ class Route:
         return None if self.lap is None else self.lap.pick(branches, road)
 
     def visit(self, road: str, visit: int = 0) -> int:
-        """Which road of the route that is, counted from 0, for who came by the one numbered `visit` before."""
+        """Return the index of this road in the route, searched from the previous index `visit`."""
         return next((number for number in self._later(visit) if self._visits[number][0] == road), visit)
 
     def passes(self, visit: int) -> str | None:
-        """Return the road of a visit, None beyond the route's end."""
+        """Return the road of a visit, or None after the end of the route."""
         if self.closed:
             visit %= len(self._visits)
         return self._visits[visit][0] if visit < len(self._visits) else None
 
     def _later(self, visit: int) -> Iterator[int]:
-        """Yield the roads from a visit on, and on a closed route those before it after all others."""
+        """Yield the indices of the roads from a visit on; a closed route continues at its start."""
         yield from range(visit, len(self._visits))
         if self.closed:
             yield from range(min(visit, len(self._visits)))
 
     @cached_property
     def _visits(self) -> list[tuple[str, frozenset[LaneKey]]]:
-        """The roads in the order in which the route comes by, each with its lanes there."""
+        """Roads in the order of the route, each with its lanes."""
         return [(road, frozenset(keys)) for road, keys in groupby(self.lanes, key=lambda key: key.road)]
 
     def _t(self, leg: Leg, s: float) -> float:
-        """t of the route's course on a leg; a lane change eases in and out with no jump of curvature."""
+        """Return t of the path on a leg. A lane change has a continuous curvature."""
         road = self.roads[leg.road]
         section = road.sections[leg.section]
         t = lane_t(road, section, section.lanes[leg.lane], s)[0]
@@ -249,11 +254,11 @@ class Route:
         return t + smoothstep(part) * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
 
     @cached_property
-    def _course(self) -> tuple[Array, Array, Array, Array]:
-        """Points (M, 3), distances along (M,), the leg of each (M,) and its s (M,)."""
+    def _path(self) -> tuple[Array, Array, Array, Array]:
+        """Points (M, 3), distances (M,), leg indices (M,) and s (M,) of the path."""
         legs, tables = self.legs, self.tables
         ways = np.array([abs(leg.s_end - leg.s) for leg in legs])
-        counts = np.maximum(np.ceil(ways / GRAIN), 1.0).astype(np.int64) + 1
+        counts = np.maximum(np.ceil(ways / POINT_SPACING), 1.0).astype(np.int64) + 1
         owner = np.repeat(np.arange(len(legs)), counts)
         s = np.concatenate([np.linspace(leg.s, leg.s_end, count) for leg, count in zip(legs, counts, strict=True)])
         row, row_end = (
@@ -281,12 +286,12 @@ Share = TypeVar("Share", float, Array)
 
 
 def smoothstep(part: Share) -> Share:
-    """How much of a lane change is done at a share of its length: no jump of curvature at either end."""
+    """Return the share of the lateral motion of a lane change at a share of its length, with continuous curvature."""
     return part**3 * (10.0 + part * (6.0 * part - 15.0))
 
 
 def concatenate_routes(routes: Sequence[Route]) -> Route:
-    """Return several routes, each beginning where the one before ends, as one."""
+    """Return several consecutive routes as one."""
     lanes = list(routes[0].lanes)
     for route in routes[1:]:
         lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)

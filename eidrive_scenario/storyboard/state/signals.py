@@ -9,7 +9,7 @@ from types import MappingProxyType
 from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.model.signal_states import USUAL, lamp_colors, must_stop
+from eidrive_scenario.roads.model.signal_states import DEFAULT_LAMPS, lamp_colors, must_stop
 from eidrive_scenario.storyboard.state.signal_cycles import SignalCycle, cycle_errors, cycle_warnings, signal_cycles
 
 SAME_PLACE = 2.0
@@ -44,7 +44,7 @@ class Signals:
     def must_stop(self, name: str) -> bool:
         """Whether a signal tells traffic to stop."""
         state = self.state(name)
-        return state is not None and must_stop(state, self._colors.get(name) or USUAL)
+        return state is not None and must_stop(state, self._colors.get(name) or DEFAULT_LAMPS)
 
     def set_state(self, name: str, state: str) -> None:
         """Let a signal show a state, until its controller's next phase begins or somebody sets it again."""

@@ -110,7 +110,7 @@ class SpawnAreas:
 def sites_within_radius(
     lanes: TrafficLanes, sites: SpawnSites, x: float, y: float, radius: float, location: LaneLocation | None
 ) -> SpawnSites:
-    """Return the places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
+    """The places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
 
     Where that is none at all, the nearest place that is no further away than a point may lie from its road.
     """

@@ -77,7 +77,7 @@ def _cabin(
 
 
 def _face(bottom: Array, top: Array) -> Array:
-    """Return the four corners of a face: bottom from left to right as seen from outside, then the top in the same way."""
+    """The four corners of a face: bottom from left to right as seen from outside, then the top in the same way."""
     return np.stack([bottom[0], bottom[1], top[0], top[1]])
 
 

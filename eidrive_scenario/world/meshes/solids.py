@@ -62,7 +62,7 @@ def box(center: Point, size: Point) -> Array:
 
 
 def tapered_box(center: Point, size: Point, top: Point, shift: float = 0.0) -> Array:
-    """Return a frustum of length, width and height `size` whose top is `top` long and wide and `shift` further ahead."""
+    """A frustum of length, width and height `size` whose top is `top` long and wide and `shift` further ahead."""
     x, y, z = center
     length, width, height = size
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))

@@ -69,7 +69,7 @@ class ContactTracker:
 
 
 def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
-    """Yield pairs of which one has moved and whose circles, with the hysteresis, overlap; in the order of the bodies."""
+    """Pairs of which one has moved and whose circles, with the hysteresis, overlap; in the order of the bodies."""
     if len(bodies) > _FEW:
         yield from _near_pairs_of_many(bodies)
         return

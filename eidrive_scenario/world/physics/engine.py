@@ -88,7 +88,7 @@ class Physics:
         controls: Mapping[str, Control],
         friction: float,
     ) -> Touches:
-        """Return all steps of one tick, the scripted bodies being at their new places; returns what pybullet resolved."""
+        """All steps of one tick, the scripted bodies being at their new places; returns what pybullet resolved."""
         self.changed()
         if not driven:
             return {}

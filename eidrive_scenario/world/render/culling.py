@@ -95,7 +95,7 @@ _NOTHING = _Chosen(
 
 
 def _sides(pinhole: Pinhole) -> Array:
-    """Return (5, 3) inward unit normals of the planes through the eye and the picture's edges, and of the near plane."""
+    """(5, 3) inward unit normals of the planes through the eye and the picture's edges, and of the near plane."""
     left, right = -pinhole.center_x / pinhole.focal, (pinhole.width - pinhole.center_x) / pinhole.focal
     top, bottom = -pinhole.center_y / pinhole.focal, (pinhole.height - pinhole.center_y) / pinhole.focal
     planes = np.array([(1, 0, -left), (-1, 0, right), (0, 1, -top), (0, -1, bottom), (0, 0, 1)], dtype=float)
@@ -152,7 +152,7 @@ def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array,
 
 
 def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
-    """Return triangles, (3, 3, N) by axis and corner, without what is nearer than the near plane, and the rows they had.
+    """Triangles, (3, 3, N) by axis and corner, without what is nearer than the near plane, and the rows they had.
 
     Of one with one corner behind the plane two are left, of one with two corners behind it one.
     """

@@ -70,7 +70,7 @@ def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> C
 
 
 def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
-    """Return the same for the part of the picture that holds all of them. What one triangle shows does not depend on others
+    """The same for the part of the picture that holds all of them. What one triangle shows does not depend on others
     but for what lies before it."""
     rows = _rows(x, y, nearness, width, height)
     if rows is None:
@@ -88,7 +88,7 @@ def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height:
 
 
 def greatest(x: Array, y: Array, nearness: Array, width: int, height: int) -> tuple[Floats, int, int]:
-    """Return the nearness alone, 0 where nothing is, of the part of the picture that holds all triangles, and its first line
+    """The nearness alone, 0 where nothing is, of the part of the picture that holds all triangles, and its first line
     and column."""
     rows = _rows(x, y, nearness, width, height)
     if rows is None:

@@ -114,7 +114,7 @@ class Renderer:
         pinhole: Pinhole,
         ground: float,
     ) -> Radiance:
-        """Return the light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m].
+        """The light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m].
 
         Scenery is kept from the second picture on that shows the same.
         """
@@ -253,7 +253,7 @@ def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
 
 
 def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
-    """Return the picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbors too."""
+    """The picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbors too."""
     eye = at.eye
     staged = cull_and_project(subjects.actors, eye.pose, eye.pinhole)
     seen = rasterize_reference(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)

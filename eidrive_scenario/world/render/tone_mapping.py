@@ -48,7 +48,7 @@ def tone_map(signal: Floats) -> NDArray[np.uint8]:
 
 
 def _tone_curve() -> NDArray[np.uint8]:
-    """Return a shoulder for highlights (Reinhard et al., Photographic tone reproduction, 2002, eq. 4), then sRGB's curve."""
+    """A shoulder for highlights (Reinhard et al., Photographic tone reproduction, 2002, eq. 4), then sRGB's curve."""
     scaled = np.linspace(0.0, HEADROOM, _STEPS)
     tone = scaled * (1.0 + scaled / HEADROOM**2) / (1.0 + scaled)
     encoded = np.where(tone <= 0.0031308, 12.92 * tone, 1.055 * tone ** (1 / 2.4) - 0.055)

@@ -71,7 +71,7 @@ class Visuals:
         weather: Weather,
         shown: DisplayState = DisplayState(),  # noqa: B008 - it is immutable
     ) -> Radiance:
-        """Return the light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine.
+        """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine.
 
         Those that the scenario makes invisible do neither.
         """

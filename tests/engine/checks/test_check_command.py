@@ -91,7 +91,7 @@ def test_road_files(eidrive: Eidrive, tmp_path: Path) -> None:
     assert broken.startswith(f"{tmp_path}/broken.xodr:2: not well-formed XML: ")
     assert doubtful == (
         f"{tmp_path}/doubtful.xodr:2: road '1' links to junction '4', which does not exist; "
-        "take the link out, or add the junction with its connections (warning: road-link)"
+        "remove the link or add the junction with its connections (warning: road-link)"
     )
     assert wrong == f"{tmp_path}/wrong.xodr:5: <width> has a='wide'; give a finite number"
     assert count == "4 files, 2 errors, 1 warning"

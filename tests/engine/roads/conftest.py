@@ -1,4 +1,4 @@
-"""Small OpenDRIVE texts, and the corpora of others where they are at hand."""
+"""Fixtures of roads: short OpenDRIVE texts and, if available, external corpora."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def road_text(
     hdg: float = 0.0,
     extra: str = "",
 ) -> str:
-    """One <road>; without a geometry it is a line from x, y along hdg."""
+    """Return one <road>, by default a line from x, y with heading hdg."""
     if geometry is None:
         geometry = f'<geometry s="0" x="{x!r}" y="{y!r}" hdg="{hdg!r}" length="{length!r}"><line/></geometry>'
     return (
@@ -41,7 +41,7 @@ def road_text(
 
 
 def map_text(*roads: str, rest: str = "") -> str:
-    """An OpenDRIVE file of roads and whatever else."""
+    """Return an OpenDRIVE file with these roads and further elements."""
     return f'<OpenDRIVE><header revMajor="1" revMinor="7"/>{"".join(roads)}{rest}</OpenDRIVE>'
 
 
@@ -57,13 +57,13 @@ def map_of() -> RoadText:
 
 @pytest.fixture
 def both_ways() -> str:
-    """The inside of a lane section with one lane each way, 3.5 m wide."""
+    """Content of a lane section with one lane per direction, 3.5 m wide."""
     return DRIVING_BOTH
 
 
 @pytest.fixture(scope="session")
 def corpora() -> Path:
-    """Maps and scenarios of others; they are no part of the project."""
+    """External maps and scenarios, which are not part of the project."""
     folder = os.environ.get("EIDRIVE_CORPORA")
     if not folder:
         pytest.skip("EIDRIVE_CORPORA is not set")
@@ -72,5 +72,5 @@ def corpora() -> Path:
 
 @pytest.fixture
 def library() -> Path:
-    """The roads of the scenario library."""
+    """Folder of the library roads."""
     return Path(__file__).parents[3] / "xosc" / "roads"

@@ -1,4 +1,4 @@
-"""Roads that climb and are superelevated: the t-axis is turned by heading, slope and bank, in this order."""
+"""Tests of slopes with superelevation: the t-axis is rotated by heading, slope and bank, in this order."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ CREST = 'a="0" b="0" c="0.15" d="-0.005"'
 
 @pytest.fixture
 def climbing(road: Text, map_of: Text) -> RoadNetwork:
-    """A slope of 10 %, banked by 0.4 rad, with one lane of 6 m: the road of esmini's slope_up_leaning_right."""
+    """Slope of 10 % with a bank of 0.4 rad and one lane of 6 m, as slope_up_leaning_right of esmini."""
     return RoadNetwork.parse(map_of(road(length=50.0, lanes=lane(6.0), extra=profiles(CLIMB, 0.4))))
 
 
 @pytest.fixture
 def crest(road: Text, map_of: Text) -> RoadNetwork:
-    """A crest to the north, banked by 45°, with one lane whose middle is at t = -2.5: esmini's tilted_crest."""
+    """Crest to the north with a bank of 45° and one lane centered at t = -2.5, as tilted_crest of esmini."""
     lanes, extra = lane(3.0, -1.0), profiles(CREST, math.pi / 4)
     return RoadNetwork.parse(map_of(road(length=20.0, hdg=math.pi / 2, lanes=lanes, extra=extra)))
 
 
 def test_lane_pose_on_banked_slope_leans_as_in_esmini(climbing: RoadNetwork, crest: RoadNetwork) -> None:
-    """Values of the tests of esmini 3.6.0: x = 10.116 at s = 10, and y = 1.4845 at s = 1."""
+    """Expected values are from the tests of esmini 3.6.0: x = 10.116 at s = 10, and y = 1.4845 at s = 1."""
     assert climbing.lane_pose_at("1", -1, 10.0).x == pytest.approx(10.116, abs=5e-4)
     assert crest.lane_pose_at("1", -1, 1.0).y == pytest.approx(1.4845, abs=5e-5)
 
@@ -63,7 +63,7 @@ def test_road_pose_equals_product_of_rotations(crest: RoadNetwork, s: float) -> 
 
 
 def surface_frame(network: RoadNetwork, s: float, offset: float) -> np.ndarray:
-    """Columns forward, left, up of the lane's surface, by finite differences."""
+    """Return the columns forward, left, up of the lane surface by finite differences."""
     h = 1e-5
     place = [network.lane_pose_at("1", -1, s + ds, offset + dt)[:3] for ds, dt in ((h, 0), (-h, 0), (0, h), (0, -h))]
     along, across = np.subtract(place[0], place[1]), np.subtract(place[2], place[3])
@@ -87,7 +87,7 @@ def test_lane_pose_lies_in_the_surface(road: Text, map_of: Text, twist: float, o
 
 
 @pytest.mark.parametrize("s", [0.5, 1.0, 6.0, 10.0, 17.0])
-def test_point_on_banked_slope_is_located_where_it_was(crest: RoadNetwork, s: float) -> None:
+def test_locate_on_banked_slope_inverts_pose(crest: RoadNetwork, s: float) -> None:
     pose = crest.lane_pose_at("1", -1, s, 0.4)
     hint = crest.location("1", -1, min(s + 1.0, 20.0))
     for found in (crest.locate_at(pose.x, pose.y), crest.locate_at(pose.x, pose.y, hint)):

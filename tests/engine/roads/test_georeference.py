@@ -1,4 +1,4 @@
-"""Geodetic references: worked examples of EPSG and swisstopo, values of PROJ, and hostile texts."""
+"""Tests of geodetic references by worked examples of EPSG and swisstopo, values of PROJ, and hostile texts."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_utm_south_adds_ten_thousand_kilometers() -> None:
 
 
 def test_carla_map_is_true_to_scale_at_its_latitude() -> None:
-    """A minute of arc to the east is R cos(latitude) times its angle, and so is one to the north near by."""
+    """A minute of arc to the east is R cos(latitude) times its angle, and so is a minute to the north nearby."""
     east, none = plane("+lat_0=49 +lon_0=8", 49, 8 + 1 / 60)
     minute = math.radians(1 / 60)
     assert (east, none) == pytest.approx((6_378_137.0 * math.cos(math.radians(49)) * minute, 0.0), abs=1e-6)
@@ -150,7 +150,7 @@ def test_unused_parameters_never_reach_proj(extra: str, tmp_path: Path) -> None:
 
 
 def test_epsg_number_uses_neither_network_nor_grids(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An allowed network of PROJ would select the grid BETA2007 of its server for Gauss-Krüger zones."""
+    """With network access, PROJ would select the grid BETA2007 of its server for Gauss-Krüger zones."""
     from pyproj import network
 
     network.set_network_enabled(True)
@@ -170,7 +170,7 @@ def test_import_of_roads_does_not_import_pyproj() -> None:
 
 
 def test_offset_shifts_and_rotates_the_plane(road: RoadText) -> None:
-    """20 km east of the zone's middle at 48°N; the file is shifted there and turned by a right angle."""
+    """The origin is 20 km east of the central meridian at 48°N, and the file is rotated by a right angle."""
     text = "<geoReference><![CDATA[ +proj=utm +zone=32 +datum=WGS84 ]]></geoReference>"
     place = plane("+proj=utm +zone=32 +datum=WGS84", 48.0, 9.25)
     shifted = text + f'<offset x="{place[0]!r}" y="{place[1]!r}" z="100" hdg="{math.pi / 2!r}"/>'
@@ -195,7 +195,7 @@ def test_map_without_valid_geo_reference_has_no_geographic_positions(road: RoadT
 
 
 def test_point_outside_the_projection_is_an_error(road: RoadText) -> None:
-    """UTM is undefined 92° from its middle meridian at the equator."""
+    """UTM is undefined 92° from its central meridian at the equator."""
     text = "<geoReference>+proj=utm +zone=32</geoReference>"
     network = RoadNetwork.parse(MAP.format(inside=text, road=road()))
     with pytest.raises(PositionError, match="the projection is undefined at latitude and longitude 0°, 101°"):

@@ -1,4 +1,4 @@
-"""Road and lane coordinates to the world and back."""
+"""Tests of road and lane coordinates to world coordinates and back."""
 
 import math
 from collections.abc import Callable
@@ -20,7 +20,7 @@ BANKED = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
 
 @st.composite
 def plan_views(draw: st.DrawFn) -> ReferenceLine:
-    """Up to five joined curves."""
+    """Draw up to five connected curves."""
     found: list[Curve] = []
     x, y, h, s, curvature = draw(st.floats(-50, 50)), draw(st.floats(-50, 50)), draw(st.floats(-3, 3)), 0.0, 0.0
     for _ in range(draw(st.integers(1, 5))):
@@ -42,7 +42,7 @@ def plan_views(draw: st.DrawFn) -> ReferenceLine:
 
 @st.composite
 def lane_sections(draw: st.DrawFn, index: int, start: float, length: float) -> LaneSection:
-    """One to three lanes on each side, each of its own width, which changes."""
+    """Draw one to three lanes of changing width on each side."""
     lanes = {0: Lane(0, "none", Polynomials(), Polynomials(), Polynomials(), Polynomials())}
     for side in (1, -1):
         inner = Polynomials()
@@ -56,7 +56,7 @@ def lane_sections(draw: st.DrawFn, index: int, start: float, length: float) -> L
 
 @st.composite
 def roads(draw: st.DrawFn, name: str) -> Road:
-    """One to three lane sections between which lanes begin and end, elevation and a bank that changes."""
+    """Draw a road with up to three lane sections, elevation and superelevation."""
     line = draw(plan_views())
     count = draw(st.integers(1, 3 if line.length > 12.0 else 1))
     starts = [line.length * part / count for part in range(count)]
@@ -79,15 +79,15 @@ def roads(draw: st.DrawFn, name: str) -> Road:
 
 @st.composite
 def networks(draw: st.DrawFn, most: int = 3) -> RoadNetwork:
-    """Up to `most` roads that may cross; the first is called r."""
+    """Draw up to `most` roads that may intersect; the first has the id r."""
     drawn = [draw(roads(name)) for name in "rst"[: draw(st.integers(1, most))]]
     return RoadNetwork(RoadMap("drawn", Header(), {road.id: road for road in drawn}, {}, {}, {}, ()))
 
 
 @settings(max_examples=150, deadline=None)
 @given(networks(), st.data())
-def test_there_and_back(network: RoadNetwork, data: st.DataObject) -> None:
-    """In road and lane coordinates: exactly from near by; from nowhere to a place that is the same seen from above."""
+def test_locate_inverts_pose_on_random_roads(network: RoadNetwork, data: st.DataObject) -> None:
+    """Scalar results with a hint are exact. Array results have the same position in plan view."""
     road = network.roads[data.draw(st.sampled_from(sorted(network.roads)))]
     section = data.draw(st.sampled_from(road.sections))
     lane = data.draw(st.sampled_from([number for number in section.lanes if number]))
@@ -104,13 +104,13 @@ def test_there_and_back(network: RoadNetwork, data: st.DataObject) -> None:
     assert found is not None
     assert math.dist(network.lane_pose_at(found.road, found.lane, found.s, found.offset)[:2], pose[:2]) < 0.01
     if len(network.roads) == 1 and road.length < 60.0:
-        # A longer road may cross itself; then its other branch is an answer too.
+        # A longer road may intersect itself; its other branch is then a valid result.
         assert (found.road, found.lane) == (road.id, lane)
 
 
 @settings(max_examples=40, deadline=None)
 @given(networks())
-def test_arrays_and_single_places_agree(network: RoadNetwork) -> None:
+def test_array_poses_equal_scalar_poses(network: RoadNetwork) -> None:
     s = np.linspace(0.0, network.roads["r"].length, 23)
     for lane in (-1, 1):
         many = np.column_stack(network.lane_pose("r", lane, s, 0.3))
@@ -121,7 +121,7 @@ def test_arrays_and_single_places_agree(network: RoadNetwork) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(networks(), st.data())
-def test_a_lane_heads_where_it_goes(network: RoadNetwork, data: st.DataObject) -> None:
+def test_lane_heading_equals_direction_of_its_points(network: RoadNetwork, data: st.DataObject) -> None:
     road = network.roads["r"]
     s = data.draw(st.floats(1.0, road.length - 1.0))
     if min(abs(s - start) for start in (*road.reference.starts, *road.section_starts, road.length)) < 0.01:
@@ -133,7 +133,7 @@ def test_a_lane_heads_where_it_goes(network: RoadNetwork, data: st.DataObject) -
     assert gone / np.linalg.norm(gone) == pytest.approx(np.array(step), abs=1e-5)
 
 
-def test_bank_and_slope(road: Text, map_of: Text) -> None:
+def test_road_pose_with_superelevation_and_slope(road: Text, map_of: Text) -> None:
     rising = '<elevationProfile><elevation s="0" a="2" b="0.05" c="0" d="0"/></elevationProfile>'
     extra = f"{rising}<lateralProfile>{BANKED}</lateralProfile>"
     network = RoadNetwork.parse(map_of(road(extra=extra)))
@@ -146,7 +146,7 @@ def test_bank_and_slope(road: Text, map_of: Text) -> None:
     assert math.sin(aside.p) == pytest.approx(-math.cos(math.atan(0.05)) * math.sin(0.1))
 
 
-def test_a_pavement_lies_higher_than_the_road(road: Text, map_of: Text) -> None:
+def test_lane_height_raises_sidewalk(road: Text, map_of: Text) -> None:
     lanes = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'
         '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
@@ -159,13 +159,13 @@ def test_a_pavement_lies_higher_than_the_road(road: Text, map_of: Text) -> None:
     assert network.lane_pose("1", -2, [10.0], [0.0]).z == pytest.approx(0.12)
 
 
-def test_places_that_do_not_exist(road: Text, map_of: Text) -> None:
+def test_pose_at_unknown_road_lane_or_s_is_an_error(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(map_of(road("10"), road("11", y=30.0)))
-    with pytest.raises(PositionError, match=r"there is no road '12'; known: 10, 11"):
+    with pytest.raises(PositionError, match=r"road '12' does not exist; known: 10, 11"):
         network.lane_pose_at("12", -1, 0.0)
     with pytest.raises(PositionError, match=r"road '10' has no lane -3 at s = 5 m; its lanes are 1, 0, -1"):
         network.lane_pose_at("10", -3, 5.0)
-    with pytest.raises(PositionError, match=r"s = 120 m is not on road '10'; the road runs from 0 to 100 m"):
+    with pytest.raises(PositionError, match=r"s = 120 m is not on road '10'; the road extends from 0 to 100 m"):
         network.road_pose_at("10", 120.0, 0.0)
     with pytest.raises(PositionError, match=r"s = 101 m is not on road '11'"):
         network.road_pose("11", [0.0, 101.0])
@@ -173,7 +173,7 @@ def test_places_that_do_not_exist(road: Text, map_of: Text) -> None:
         network.lane_pose("11", [1, 2], 3.0)
 
 
-def test_points_beside_and_beyond_the_road(road: Text, map_of: Text) -> None:
+def test_locate_points_outside_the_road(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(map_of(road()))
     found = network.locate([50.0, 50.0, 103.0, 50.0], [-1.0, 6.0, 1.0, 90.0])
     assert found.found.tolist() == [True, True, True, False]
@@ -188,8 +188,8 @@ def test_points_beside_and_beyond_the_road(road: Text, map_of: Text) -> None:
     assert not network.on_road(beside)
 
 
-def test_many_points_are_located_as_each_of_them(road: Text, map_of: Text) -> None:
-    """Beyond a thousand they are put in order; what is far from the road has no place on it either way."""
+def test_locate_many_points_equals_single_points(road: Text, map_of: Text) -> None:
+    """More than a thousand points are sorted. Points far from the road have no location in both cases."""
     network = RoadNetwork.parse(map_of(road(), road("2", y=20.0, hdg=0.4)))
     rng = np.random.default_rng(7)
     x, y = rng.uniform(-80.0, 180.0, (2, 1500))
@@ -200,7 +200,7 @@ def test_many_points_are_located_as_each_of_them(road: Text, map_of: Text) -> No
     assert 0 < np.count_nonzero(many.found) < 1500
 
 
-def test_a_bridge_is_told_from_the_road_below_by_its_height(road: Text, map_of: Text) -> None:
+def test_locate_with_height_separates_bridge_from_road_below(road: Text, map_of: Text) -> None:
     bridge = '<elevationProfile><elevation s="0" a="6" b="0" c="0" d="0"/></elevationProfile>'
     network = RoadNetwork.parse(map_of(road("low"), road("high", x=50.0, y=-50.0, hdg=math.pi / 2, extra=bridge)))
     found = network.locate([51.0, 51.0], [-1.0, -1.0], [0.2, 6.3])
@@ -210,7 +210,7 @@ def test_a_bridge_is_told_from_the_road_below_by_its_height(road: Text, map_of: 
     assert high.road == "high"
 
 
-def test_a_hint_keeps_to_the_road_that_one_is_on(road: Text, map_of: Text) -> None:
+def test_locate_with_hint_stays_on_the_same_road(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(map_of(road("a"), road("b", x=50.0, y=-50.0, hdg=math.pi / 2)))
     for name, s in (("a", 49.0), ("b", 48.0)):
         found = network.locate_at(51.0, -1.0, network.location(name, -1, s))

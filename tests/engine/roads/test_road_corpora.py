@@ -1,4 +1,4 @@
-"""Maps of others: they load, and our geometry is CARLA's and esmini's."""
+"""Tests of external maps: loading, and geometry compared with CARLA and esmini."""
 
 import csv
 import gzip
@@ -27,7 +27,7 @@ def carla() -> ModuleType:
     return module
 
 
-def test_every_map_loads_and_can_be_drawn(corpora: Path) -> None:
+def test_every_corpus_map_loads_and_has_surfaces(corpora: Path) -> None:
     files = sorted(corpora.rglob("*.xodr"))
     assert len(files) >= 40
     for file in files:
@@ -39,7 +39,7 @@ def test_every_map_loads_and_can_be_drawn(corpora: Path) -> None:
 
 
 @pytest.mark.parametrize("town", TOWNS)
-def test_lane_centers_are_where_carla_has_them(corpora: Path, carla: Any, town: str) -> None:
+def test_lane_centers_equal_carla(corpora: Path, carla: Any, town: str) -> None:
     file = corpora / "carla_towns" / f"{town}.xodr"
     network = RoadNetwork.load(file)
     waypoints = carla.Map(town, file.read_text()).generate_waypoints(4.0)
@@ -55,7 +55,7 @@ def test_lane_centers_are_where_carla_has_them(corpora: Path, carla: Any, town: 
 
 
 @pytest.mark.parametrize("town", ["Town03", "Town05"])
-def test_lanes_lead_where_carla_says(corpora: Path, carla: Any, town: str) -> None:
+def test_lane_successors_equal_carla(corpora: Path, carla: Any, town: str) -> None:
     file = corpora / "carla_towns" / f"{town}.xodr"
     network = RoadNetwork.load(file)
     reached: dict[tuple[str, int], set[tuple[str, int]]] = {}
@@ -69,7 +69,7 @@ def test_lanes_lead_where_carla_says(corpora: Path, carla: Any, town: str) -> No
     assert missing == 0
 
 
-def test_a_hundred_thousand_points_of_a_town(corpora: Path) -> None:
+def test_locate_hundred_thousand_points_of_a_town(corpora: Path) -> None:
     network = RoadNetwork.load(corpora / "carla_towns" / "Town04.xodr")
     rng = np.random.default_rng(4)
     keys = [key for key, drivable in network.graph.nodes(data="drivable") if drivable]
@@ -95,7 +95,7 @@ def test_a_hundred_thousand_points_of_a_town(corpora: Path) -> None:
     assert np.abs(back.z - poses.z).max() < 0.5, "another storey"
 
 
-def test_routes_over_a_town_are_the_cheapest(corpora: Path) -> None:
+def test_routes_over_a_town_have_minimal_cost(corpora: Path) -> None:
     network = RoadNetwork.load(corpora / "carla_towns" / "Town03.xodr")
     keys = [key for key, data in network.graph.nodes(data=True) if data["drivable"] and data["length"] > 20.0]
     rng = np.random.default_rng(7)
@@ -130,7 +130,7 @@ def test_routes_over_a_town_are_the_cheapest(corpora: Path) -> None:
         ("highway_merge", "soderleden.xodr"),
     ],
 )
-def test_lane_positions_are_where_esmini_puts_them(corpora: Path, scenario: str, road_file: str) -> None:
+def test_lane_positions_equal_esmini(corpora: Path, scenario: str, road_file: str) -> None:
     network = RoadNetwork.load(corpora / "esmini" / "xodr" / road_file)
     root = etree.parse(str(corpora / "esmini" / "xosc" / f"{scenario}.xosc")).getroot()
     known = {p.get("name"): p.get("value") for p in root.iterfind("ParameterDeclarations/ParameterDeclaration")}
@@ -160,7 +160,7 @@ def test_lane_positions_are_where_esmini_puts_them(corpora: Path, scenario: str,
     assert checked >= 1
 
 
-def test_a_banked_track_is_as_steep_as_esminis(corpora: Path) -> None:
+def test_superelevation_of_banked_track_equals_esmini(corpora: Path) -> None:
     network = RoadNetwork.load(corpora / "esmini" / "xodr" / "velodrome.xodr")
     with gzip.open(corpora / "reference" / "esmini__velodrome.csv.gz", "rt") as file:
         trace = np.array([[float(row[column]) for column in ("x", "y", "z", "r")] for row in csv.DictReader(file)])

@@ -1,4 +1,4 @@
-"""Reference lines against closed forms and against quadrature of their own curvature."""
+"""Tests of reference lines against closed forms and against quadrature of their curvature."""
 
 import math
 
@@ -11,18 +11,18 @@ from eidrive_scenario.roads.model import curves
 from eidrive_scenario.roads.model.curves import Arc, Cubic, CurveTable, ReferenceLine, Spiral
 
 
-def test_a_quarter_of_an_arc_ends_a_radius_ahead_and_a_radius_aside() -> None:
+def test_quarter_arc_ends_one_radius_ahead_and_aside() -> None:
     point = Arc(0.0, 2.0, 3.0, 0.0, 50.0, curvature=0.1).at(math.pi / 2 * 10.0)
     assert point == pytest.approx((12.0, 13.0, math.pi / 2, 0.1, 1.0))
     right = Arc(0.0, 0.0, 0.0, math.pi / 2, 50.0, curvature=-0.1).at(math.pi / 2 * 10.0)
     assert right == pytest.approx((10.0, 10.0, 0.0, -0.1, 1.0), abs=1e-12)
 
 
-def test_a_line_is_an_arc_without_curvature() -> None:
+def test_line_equals_arc_without_curvature() -> None:
     assert Arc(0.0, 1.0, 1.0, math.pi / 4, 10.0).at(math.sqrt(2.0)) == pytest.approx((2, 2, math.pi / 4, 0, 1))
 
 
-def test_a_spiral_from_the_straight_is_a_pair_of_fresnel_integrals() -> None:
+def test_spiral_from_line_equals_fresnel_integrals() -> None:
     length, end = 80.0, 0.02
     spiral = curves.spiral(0.0, 0.0, 0.0, 0.0, length, 0.0, end)
     a = math.sqrt(math.pi * length / end)
@@ -33,7 +33,7 @@ def test_a_spiral_from_the_straight_is_a_pair_of_fresnel_integrals() -> None:
 @pytest.mark.parametrize(
     ("start", "end"), [(0.05, -0.03), (-0.02, -0.04), (0.1, 0.0), (1e-6, 2e-6), (0.05, 0.05 + 1e-11)]
 )
-def test_spirals_follow_the_integral_of_their_heading(start: float, end: float) -> None:
+def test_spiral_equals_integral_of_its_heading(start: float, end: float) -> None:
     length = 60.0
     spiral = curves.spiral(10.0, 5.0, -7.0, 0.7, length, start, end)
 
@@ -46,12 +46,12 @@ def test_spirals_follow_the_integral_of_their_heading(start: float, end: float) 
         assert spiral.at(ds)[:3] == pytest.approx((x, y, heading(ds)), abs=1e-7)
 
 
-def test_a_spiral_that_hardly_bends_becomes_an_arc() -> None:
+def test_spiral_with_negligible_rate_becomes_an_arc() -> None:
     assert isinstance(curves.spiral(0.0, 0.0, 0.0, 0.0, 60.0, 0.05, 0.05 + 1e-11), Arc)
     assert isinstance(curves.spiral(0.0, 0.0, 0.0, 0.0, 60.0, 0.05, 0.05 + 1e-8), Spiral)
 
 
-def test_param_poly3_over_arc_length_and_normalized_say_the_same() -> None:
+def test_param_poly3_over_arc_length_equals_normalized() -> None:
     over_length = Cubic(0.0, 1.0, 2.0, 0.3, 20.0, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.01, -0.0002))
     normalized = Cubic(
         0.0, 1.0, 2.0, 0.3, 20.0, (0.0, 20.0, 0.0, 0.0), (0.0, 0.0, 0.01 * 400, -0.0002 * 8000), pace=1 / 20
@@ -66,7 +66,7 @@ def test_param_poly3_over_arc_length_and_normalized_say_the_same() -> None:
     assert over_length.at(10.0).curvature == pytest.approx((0.02 - 0.0012 * 10) / (1 + slope**2) ** 1.5)
 
 
-def test_poly3_runs_over_arc_length() -> None:
+def test_poly3_is_parametrized_by_arc_length() -> None:
     a, b, c, d = 0.0, 0.1, 0.02, -0.0004
     length = 40.0
     line = ReferenceLine(curves.poly3(0.0, 0.0, 0.0, 0.0, length, (a, b, c, d)), length)
@@ -82,7 +82,7 @@ def test_poly3_runs_over_arc_length() -> None:
         assert pace == pytest.approx(1.0, abs=1e-3)
 
 
-def test_the_table_of_many_lines_gives_what_each_line_gives() -> None:
+def test_curve_table_equals_single_lines() -> None:
     lines = [
         ReferenceLine(
             [

@@ -1,4 +1,4 @@
-"""The roads of the scenario library: the lanes at the paper's places, and files that fit together."""
+"""Tests of the library roads: lanes at the sites of the paper, and consistency of the files."""
 
 import math
 import runpy
@@ -12,7 +12,7 @@ NAMES = ("coop_1", "coop_2")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_lane_goes_on_where_and_as_it_ends(library: Path, name: str) -> None:
+def test_lane_successors_continue_position_and_width(library: Path, name: str) -> None:
     network = RoadNetwork.load(library / f"{name}.xodr")
     checked = 0
     for key in network.graph:
@@ -29,7 +29,7 @@ def test_every_lane_goes_on_where_and_as_it_ends(library: Path, name: str) -> No
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_committed_file_is_what_the_script_writes(library: Path, tmp_path: Path, name: str) -> None:
+def test_road_file_equals_output_of_its_script(library: Path, tmp_path: Path, name: str) -> None:
     script = runpy.run_path(str(library / "make_roads.py"))
     crossing = next(crossing for crossing in script["CROSSINGS"] if crossing.name == name)
     script["write"](crossing, tmp_path / "again.xodr")
@@ -45,7 +45,7 @@ def test_the_committed_file_is_what_the_script_writes(library: Path, tmp_path: P
         ("coop_2", 25.0, 34.5, -90.0, "3", 1),
     ],
 )
-def test_cars_of_the_paper_start_on_a_lane_center(
+def test_start_positions_of_the_paper_are_on_lane_centers(
     library: Path, name: str, x: float, y: float, heading: float, road: str, lane: int
 ) -> None:
     network = RoadNetwork.load(library / f"{name}.xodr")
@@ -57,7 +57,7 @@ def test_cars_of_the_paper_start_on_a_lane_center(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_arm_leads_everywhere_else_from_a_stop_line(library: Path, name: str) -> None:
+def test_each_arm_leads_from_stop_line_to_all_others(library: Path, name: str) -> None:
     network = RoadNetwork.load(library / f"{name}.xodr")
     reached: dict[str, set[str]] = {}
     for connection in network.junctions["100"].connections:
@@ -70,7 +70,7 @@ def test_each_arm_leads_everywhere_else_from_a_stop_line(library: Path, name: st
     assert sorted(item.type for item in network.objects) == ["building"] * 24 + ["crosswalk"] * 4 + ["roadMark"] * 4
 
 
-def test_straight_roads_of_sixty_meters_each_way(library: Path) -> None:
+def test_arms_are_straight_for_sixty_meters(library: Path) -> None:
     for name, x in (("coop_1", 29.5), ("coop_2", 25.0)):
         network = RoadNetwork.load(library / f"{name}.xodr")
         for y in (-75.0, -30.0, 0.0, 30.0, 75.0):

@@ -1,4 +1,4 @@
-"""Along lanes, through links and junctions."""
+"""Tests of motion along lanes, through links and junctions."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ def section(s: float, right: str, left: str = "") -> str:
 
 
 def chained(road: Text, map_of: Text) -> RoadNetwork:
-    """Road a along x, then road b whose reference line points back: its lane +1 continues a's lane -1."""
+    """Return road a along x, and road b with opposite reference line: its lane +1 continues lane -1 of a."""
     a = road(
         "a",
         lanes=section(0, lane(-1, '<successor id="1"/>'), lane(1, '<successor id="-1"/>')),
@@ -38,9 +38,7 @@ def chained(road: Text, map_of: Text) -> RoadNetwork:
     return RoadNetwork.parse(map_of(a, b))
 
 
-def test_the_offset_keeps_its_place_in_the_world_where_the_next_road_runs_the_other_way(
-    road: Text, map_of: Text
-) -> None:
+def test_advance_onto_reversed_road_keeps_lateral_position(road: Text, map_of: Text) -> None:
     network = chained(road, map_of)
     start = network.location("a", -1, 90.0, 0.4)
     end = network.advance(start, 30.0)
@@ -53,7 +51,7 @@ def test_the_offset_keeps_its_place_in_the_world_where_the_next_road_runs_the_ot
     assert back == pytest.approx(start)
 
 
-def test_the_lane_ends_with_the_road(road: Text, map_of: Text) -> None:
+def test_advance_beyond_end_of_road_is_none(road: Text, map_of: Text) -> None:
     network = chained(road, map_of)
     assert network.advance(network.location("a", -1, 90.0), 110.5) is None
     assert network.advance(network.location("a", 1, 10.0), 10.5) is None
@@ -62,7 +60,7 @@ def test_the_lane_ends_with_the_road(road: Text, map_of: Text) -> None:
     assert left.s == pytest.approx(0.0)
 
 
-def test_left_hand_traffic_drives_the_other_way(road: Text, map_of: Text) -> None:
+def test_left_hand_traffic_advances_in_opposite_direction(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(map_of(road("r", rule="LHT")))
     assert [network.driving_direction("r", n) for n in (1, -1)] == [1, -1]
     moved = network.advance(network.location("r", 1, 20.0), 5.0)
@@ -70,7 +68,7 @@ def test_left_hand_traffic_drives_the_other_way(road: Text, map_of: Text) -> Non
     assert moved.s == pytest.approx(25.0)
 
 
-def test_distance_counts_on_the_lane_not_on_the_reference_line(road: Text, map_of: Text) -> None:
+def test_advance_measures_distance_on_the_lane(road: Text, map_of: Text) -> None:
     length = 20 * math.pi
     bend = f'<geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="0.05"/></geometry>'
     network = RoadNetwork.parse(map_of(road("r", length=length, geometry=bend)))
@@ -82,8 +80,8 @@ def test_distance_counts_on_the_lane_not_on_the_reference_line(road: Text, map_o
     assert 30.0 - inner.s == pytest.approx(10.0 * 20.0 / 18.25)
 
 
-def test_far_at_once_is_as_far_as_in_small_steps(road: Text, map_of: Text) -> None:
-    """Line, arc, line, spiral, arc; on the lanes, beside them, and where a lane widens; with the traffic and back."""
+def test_advance_once_equals_advance_in_small_steps(road: Text, map_of: Text) -> None:
+    """Line, arc, line, spiral, arc: on lanes, beside them, on a widening lane, forwards and backwards."""
     parts = [("line", 30.0, ""), ("arc", 25.0, 'curvature="0.04"'), ("line", 10.0, ""),
              ("spiral", 20.0, 'curvStart="0" curvEnd="-0.05"'), ("arc", 35.0, 'curvature="-0.05"')]  # fmt: skip
     x = y = heading = s = 0.0
@@ -113,7 +111,7 @@ def test_far_at_once_is_as_far_as_in_small_steps(road: Text, map_of: Text) -> No
         assert back.s == pytest.approx(start, abs=0.01)
 
 
-def test_lanes_are_renumbered_from_section_to_section(road: Text, map_of: Text) -> None:
+def test_advance_follows_links_between_sections(road: Text, map_of: Text) -> None:
     lanes = section(0, lane(-1, '<successor id="-2"/>')) + section(40, lane(-1) + lane(-2, '<predecessor id="-1"/>'))
     network = RoadNetwork.parse(map_of(road("r", lanes=lanes)))
     moved = network.advance(network.location("r", -1, 35.0), 10.0)
@@ -127,7 +125,7 @@ def test_lanes_are_renumbered_from_section_to_section(road: Text, map_of: Text) 
     assert (back.lane, back.s) == pytest.approx((-1, 35.0))
 
 
-def test_where_a_lane_ends_the_car_stays_where_it_is_on_the_lane_beside(road: Text, map_of: Text) -> None:
+def test_advance_at_lane_end_continues_on_adjacent_lane(road: Text, map_of: Text) -> None:
     lanes = section(0, lane(-1, '<successor id="-1"/>') + lane(-2)) + section(40, lane(-1, '<predecessor id="-1"/>'))
     network = RoadNetwork.parse(map_of(road("r", lanes=lanes)))
     moved = network.advance(network.location("r", -2, 35.0), 10.0)
@@ -136,7 +134,7 @@ def test_where_a_lane_ends_the_car_stays_where_it_is_on_the_lane_beside(road: Te
 
 
 def test_advance_to_end_of_a_lane_inside_its_road_stays_on_it(road: Text, map_of: Text) -> None:
-    """Lane -1 ends at s = 40 and nothing is beside it; lane 1 begins there, and its traffic leaves it there."""
+    """Lane -1 ends at s = 40 without a lane beside it. Lane 1 starts there, where its traffic leaves it."""
     both = section(0, lane(-1)) + section(40, "", lane(1))
     network = RoadNetwork.parse(map_of(road("r", lanes=both)))
     here, there = network.location("r", -1, 35.0), network.location("r", 1, 45.0)
@@ -153,7 +151,7 @@ def test_advance_to_end_of_a_lane_inside_its_road_stays_on_it(road: Text, map_of
 
 
 def fork(road: Text, map_of: Text) -> RoadNetwork:
-    """Road a leads to a junction with a way to the left and one that bends a little to the right."""
+    """Return a road to a junction with a left turn and a branch that bends slightly to the right."""
     ways = []
     rest = ['<junction id="9" name="">']
     for i, (number, bend) in enumerate((("left", 0.05), ("ahead", -0.01))):
@@ -169,7 +167,7 @@ def fork(road: Text, map_of: Text) -> RoadNetwork:
     return RoadNetwork.parse(map_of(a, *ways, rest="".join(rest) + "</junction>"))
 
 
-def test_at_a_junction_the_straightest_way_is_taken_unless_told_otherwise(road: Text, map_of: Text) -> None:
+def test_advance_at_junction_selects_straightest_or_chosen_branch(road: Text, map_of: Text) -> None:
     network = fork(road, map_of)
     start = network.location("a", -1, 95.0)
     default = network.advance(start, 10.0)
@@ -191,14 +189,14 @@ def test_at_a_junction_the_straightest_way_is_taken_unless_told_otherwise(road: 
     assert followed.road == "left"
 
 
-def test_back_out_of_a_junction(road: Text, map_of: Text) -> None:
+def test_advance_backwards_leaves_a_junction(road: Text, map_of: Text) -> None:
     network = fork(road, map_of)
     back = network.advance(network.location("left", -1, 4.0), -20.0)
     assert back is not None
     assert back.road == "a"
 
 
-def test_distances_along_connected_roads(road: Text, map_of: Text) -> None:
+def test_distance_along_connected_roads(road: Text, map_of: Text) -> None:
     network = chained(road, map_of)
     a = network.location("a", -1, 90.0)
     b = network.location("b", 1, 80.0, -0.4)
@@ -209,6 +207,6 @@ def test_distances_along_connected_roads(road: Text, map_of: Text) -> None:
     assert network.distance(a, network.location("a", 1, 60.0)) == pytest.approx((-30.0, 3.0))
 
 
-def test_no_distance_between_roads_that_are_not_joined(road: Text, map_of: Text) -> None:
+def test_distance_between_unconnected_roads_is_none(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(map_of(road("a"), road("b", y=50.0)))
     assert network.distance(network.location("a", -1, 1.0), network.location("b", -1, 1.0)) is None

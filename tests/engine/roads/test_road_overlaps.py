@@ -1,4 +1,4 @@
-"""All lanes beneath a point, also where the roads of a junction lie over each other."""
+"""Tests of all lanes below a point, including overlapping roads of junctions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from eidrive_scenario.roads.geometry import poses as scalar
 
 
 def beneath(network: RoadNetwork, x: float, y: float) -> set[tuple[str, int]]:
-    """Every lane beneath a point, one road after the other, from a guess at every second meter."""
+    """Return all lanes below a point by a search on each road from every second meter."""
     found = set()
     for road in network.roads.values():
         for guess in np.arange(0.0, road.length + 2.0, 2.0):
@@ -25,7 +25,7 @@ def beneath(network: RoadNetwork, x: float, y: float) -> set[tuple[str, int]]:
 
 
 @pytest.mark.parametrize("name", ["coop_1", "coop_2"])
-def test_lanes_beneath_points_on_a_crossing(library: Path, name: str) -> None:
+def test_overlapped_lanes_of_points_on_a_crossing(library: Path, name: str) -> None:
     network = RoadNetwork.load(library / f"{name}.xodr")
     junction = next(iter(network.junctions))
     inside = [road for road in network.roads.values() if road.junction_id == junction]
@@ -51,7 +51,7 @@ def test_lanes_beneath_points_on_a_crossing(library: Path, name: str) -> None:
     assert np.hypot(again.x - x[point], again.y - y[point]).max() < 3.5
 
 
-def test_beside_a_junction_there_is_one_lane_at_most(library: Path) -> None:
+def test_overlapped_lanes_outside_a_junction_is_one_at_most(library: Path) -> None:
     network = RoadNetwork.load(library / "coop_2.xodr")
     row, _, point = network.touched(np.array([-40.0, -40.0]), np.array([0.0, 300.0]))
     assert point.tolist() == [0]

@@ -1,4 +1,4 @@
-"""What a file may say, and what is said about a file that is wrong."""
+"""Tests of the OpenDRIVE reader: supported content and diagnostics of invalid files."""
 
 import math
 from collections.abc import Callable
@@ -21,12 +21,12 @@ def diagnostics(text: str) -> list[str]:
     return [str(diagnostic) for diagnostic in caught.value.diagnostics]
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_missing_file_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(RoadError, match=r"none\.xodr: cannot read: No such file or directory; give the path"):
         RoadNetwork.load(tmp_path / "none.xodr")
 
 
-def test_a_document_type_is_refused_before_anything_is_read() -> None:
+def test_document_type_declaration_is_an_error() -> None:
     bomb = '<!DOCTYPE x [<!ENTITY a "b"><!ENTITY c "&a;&a;&a;&a;">]><OpenDRIVE>&c;</OpenDRIVE>'
     (found,) = diagnostics(bomb)
     assert found.startswith("town.xodr:1: the file has a document type declaration (DOCTYPE)")
@@ -34,7 +34,7 @@ def test_a_document_type_is_refused_before_anything_is_read() -> None:
     assert diagnostics(outside) == [found]
 
 
-def test_broken_xml_and_other_xml() -> None:
+def test_malformed_xml_and_other_xml_are_errors() -> None:
     (found,) = diagnostics("<OpenDRIVE>\n<road></OpenDRIVE>")
     assert found.startswith("town.xodr:2: not well-formed XML: an end tag does not match its start tag")
     assert diagnostics("<OpenSCENARIO/>") == [
@@ -42,7 +42,7 @@ def test_broken_xml_and_other_xml() -> None:
     ]
 
 
-def test_all_findings_come_in_one_go_with_line_and_remedy(road: Text, map_of: Text) -> None:
+def test_all_errors_are_reported_with_line_and_hint(road: Text, map_of: Text) -> None:
     text = map_of(
         "\n"
         + road("1", geometry='<geometry s="0" x="0" y="nan" hdg="0" length="100"><arc curvatur="0.1"/></geometry>'),
@@ -53,7 +53,7 @@ def test_all_findings_come_in_one_go_with_line_and_remedy(road: Text, map_of: Te
     assert diagnostics(text) == [
         "town.xodr:2: <geometry> has y='nan'; give a finite number",
         "town.xodr:2: <arc> lacks the attribute 'curvature'; did you mean 'curvatur'? (rename it to curvature)",
-        "town.xodr:3: road '1' occurs twice; give each road its own id",
+        "town.xodr:3: road '1' occurs twice; give each road a unique id",
         "town.xodr:3: road '1' has rule='LTH'; did you mean 'LHT'?",
         "town.xodr:4: <successor> has contactPoint='begin'; known: end, start",
         "town.xodr:4: road '2' links to road '7', which does not exist; known: 1, 2, 3",
@@ -63,7 +63,7 @@ def test_all_findings_come_in_one_go_with_line_and_remedy(road: Text, map_of: Te
 
 
 def sides(*parts: str) -> str:
-    """A lane section whose lanes stand where these parts say."""
+    """Return a lane section with these sides."""
     return f'<laneSection s="0">{"".join(parts)}</laneSection>'
 
 
@@ -71,46 +71,46 @@ def one_lane(number: int) -> str:
     return f'<lane id="{number}" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
 
 
-def test_lanes_that_occur_twice_or_are_no_center(road: Text, map_of: Text) -> None:
+def test_duplicate_lanes_and_misplaced_center_are_errors(road: Text, map_of: Text) -> None:
     center, right = f"<center>{one_lane(0)}{one_lane(1)}</center>", f"<right>{one_lane(-1)}{one_lane(-1)}</right>"
     found = diagnostics(map_of(road(lanes=sides(f"<left>{one_lane(0)}</left>", center, right))))
     assert [line.split(": ", 1)[1] for line in found] == [
-        "lane 0 stands under <left>; left lanes have ids above 0, the center lane 0, right lanes below 0",
-        "lane 1 stands under <center>; left lanes have ids above 0, the center lane 0, right lanes below 0",
-        "lane -1 occurs twice in its section; give each lane its own id",
+        "lane 0 is listed under <left>; left lanes have ids above 0, the center lane 0, right lanes ids below 0",
+        "lane 1 is listed under <center>; left lanes have ids above 0, the center lane 0, right lanes ids below 0",
+        "lane -1 occurs twice in its section; give each lane a unique id",
     ]
 
 
-def test_lanes_under_the_wrong_side_lie_where_their_ids_say(road: Text, map_of: Text) -> None:
+def test_side_of_a_lane_follows_its_id(road: Text, map_of: Text) -> None:
     left, right = f"<left>{one_lane(-1)}\n{one_lane(-2)}</left>", f"<right>{one_lane(1)}</right>"
     text = map_of(road(lanes=sides(left, "<center/>", right)))
     network = RoadNetwork.parse(text, "town.xodr")
     assert [network.lane_pose_at("1", lane, 10.0).y for lane in (1, -1, -2)] == [1.5, -1.5, -4.5]
-    (doubt,) = network.map_warnings
-    assert doubt.rule == "lane-side"
-    assert str(doubt) == (
-        "town.xodr:1: lane -1 stands under <left>, and is taken by its id; "
+    (warning,) = network.map_warnings
+    assert warning.rule == "lane-side"
+    assert str(warning) == (
+        "town.xodr:1: lane -1 is listed under <left>; its id determines the side; "
         "2 more of lanes under the wrong side: line 2, 2; "
-        "left lanes have ids above 0, the center lane 0, right lanes below 0"
+        "left lanes have ids above 0, the center lane 0, right lanes ids below 0"
     )
 
 
-def test_a_road_that_leads_to_no_junction_ends_there(road: Text, map_of: Text) -> None:
+def test_road_linked_to_missing_junction_ends_there(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(
         map_of(road(link='<successor elementType="junction" elementId="7"/>'), road("2", y=50.0)), "town.xodr"
     )
-    (doubt,) = network.map_warnings
-    assert doubt.rule == "road-link"
-    assert str(doubt) == (
+    (warning,) = network.map_warnings
+    assert warning.rule == "road-link"
+    assert str(warning) == (
         "town.xodr:1: road '1' links to junction '7', which does not exist; "
-        "take the link out, or add the junction with its connections"
+        "remove the link or add the junction with its connections"
     )
     assert network.roads["1"].successor is None
     assert network.advance(network.location("1", -1, 90.0), 20.0) is None
 
 
 @pytest.mark.parametrize(("length", "there"), [(100.0, "20 m before"), (50.0, "30 m after")])
-def test_road_length_that_differs_from_geometry_gives_way_with_a_warning(
+def test_road_length_that_differs_from_geometry_is_replaced_with_a_warning(
     road: Text, map_of: Text, length: float, there: str
 ) -> None:
     short = '<geometry s="0" x="0" y="0" hdg="0" length="80"><line/></geometry>'
@@ -123,12 +123,13 @@ def test_road_length_that_differs_from_geometry_gives_way_with_a_warning(
     second = road("2", x=80.0, link=link.format("prede", 1, "end"), lanes=one_lane.format("prede"))
     network = RoadNetwork.parse(map_of(first, second), "town.xodr")
     assert network.roads["1"].length == 80.0
-    assert [(doubt.rule, doubt.message) for doubt in network.map_warnings] == [
-        ("geometry-gap", f"road '1' has length {length:g} m, but its geometry ends {there} that: the geometry counts")
+    assert [(warning.rule, warning.message) for warning in network.map_warnings] == [
+        ("geometry-gap", f"road '1' has length {length:g} m, but its geometry ends {there} that and has priority")
     ]
     ahead = network.advance(network.location("1", -1, 70.0), 25.0)
     assert ahead is not None
-    assert (ahead.road, ahead.s) == ("2", pytest.approx(15.0))
+    assert ahead.road == "2"
+    assert ahead.s == pytest.approx(15.0)
     assert surface_meshes(network)
 
 
@@ -141,19 +142,19 @@ def test_road_length_that_differs_from_geometry_gives_way_with_a_warning(
         ('length="3" space="nan"', "<line> has space='nan'"),
     ],
 )
-def test_incomplete_line_of_a_road_mark_is_a_warning_and_drawn_by_its_type(
+def test_incomplete_road_mark_line_is_a_warning_and_follows_its_type(
     road: Text, map_of: Text, line: str, what: str
 ) -> None:
-    """A broken line of 3 m dashes at a pitch of 9 m on 100 m: 12 dashes, the last of 1 m."""
+    """A broken line with 3 m dashes at a pitch of 9 m on 100 m has 12 dashes, the last of 1 m."""
     lanes = (
         '<laneSection s="0"><center><lane id="0" type="none"><roadMark sOffset="0" type="broken" width="0.2">'
         f'<type name="x"><line {line}/></type></roadMark></lane></center><right><lane id="-1" type="driving">'
         '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
     )
     network = RoadNetwork.parse(map_of(road(lanes=lanes)), "town.xodr")
-    (doubt,) = network.map_warnings
-    assert (doubt.rule, doubt.line) == ("road-mark", 1)
-    assert doubt.message == f"{what}, and is drawn without it"
+    (warning,) = network.map_warnings
+    assert (warning.rule, warning.line) == ("road-mark", 1)
+    assert warning.message == f"{what}, and is drawn without it"
     paint = next(mesh for mesh in surface_meshes(network) if mesh.kind == "marking_white")
     assert len(paint.faces) == 2 * 12
 
@@ -166,7 +167,7 @@ def test_incomplete_line_of_a_road_mark_is_a_warning_and_drawn_by_its_type(
         '<poly3 a="0" b="0" c="0" d="1e6"/>',
     ],
 )
-def test_curve_that_leads_immensely_far_is_refused(road: Text, map_of: Text, curve: str) -> None:
+def test_curve_of_excessive_extent_is_an_error(road: Text, map_of: Text, curve: str) -> None:
     """A grid over such a road would take gigabytes."""
     text = road("1", geometry=f'<geometry s="0" x="0" y="0" hdg="0" length="100">{curve}</geometry>')
     far = [found for found in diagnostics(map_of(text)) if "a geometry of road '1' leads " in found]
@@ -174,14 +175,14 @@ def test_curve_that_leads_immensely_far_is_refused(road: Text, map_of: Text, cur
     assert "at most 1e+06 m are read" in far[0]
 
 
-def test_a_namespace_is_no_obstacle(road: Text, map_of: Text) -> None:
+def test_namespace_is_ignored(road: Text, map_of: Text) -> None:
     text = map_of(road()).replace(
         "<OpenDRIVE>", '<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">'
     )
     assert list(RoadNetwork.parse(text).roads) == ["1"]
 
 
-def test_borders_say_the_same_as_widths(road: Text, map_of: Text) -> None:
+def test_borders_equal_widths(road: Text, map_of: Text) -> None:
     def lane(number: int, entry: str) -> str:
         return f'<lane id="{number}" type="driving">{entry}</lane>'
 
@@ -204,7 +205,7 @@ def test_borders_say_the_same_as_widths(road: Text, map_of: Text) -> None:
             assert one.lane_pose_at("1", number, s) == pytest.approx(two.lane_pose_at("1", number, s))
 
 
-def test_sections_of_one_side_only(road: Text, map_of: Text) -> None:
+def test_single_side_sections_continue_the_other_side(road: Text, map_of: Text) -> None:
     def part(s: int, tag: str, number: int, a: float, b: float) -> str:
         lane = f'<lane id="{number}" type="driving"><width sOffset="0" a="{a}" b="{b}" c="0" d="0"/></lane>'
         center = '<center><lane id="0"/></center>'
@@ -219,7 +220,7 @@ def test_sections_of_one_side_only(road: Text, map_of: Text) -> None:
     assert moved.s == pytest.approx(90.0, abs=0.2)
 
 
-def test_speed_limits_of_roads_and_lanes(road: Text, map_of: Text) -> None:
+def test_speed_limit_of_lane_overrides_road(road: Text, map_of: Text) -> None:
     lane = (
         '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/>'
         '<speed sOffset="20" max="30" unit="mph"/></lane>'
@@ -256,20 +257,20 @@ def test_signals_references_and_controllers(road: Text, map_of: Text) -> None:
     assert pose[:4] == pytest.approx((90.0, -4.0, 5.0, math.pi + 0.1))
 
 
-def test_a_reference_to_a_signal_that_does_not_exist(road: Text, map_of: Text) -> None:
+def test_reference_to_unknown_signal_is_an_error(road: Text, map_of: Text) -> None:
     extra = '<signals><signalReference s="5" t="3" id="9" orientation="-"/></signals>'
     (found,) = diagnostics(map_of(road(extra=extra)))
-    assert found == "town.xodr:1: reference to signal '9', which does not exist; correct the id"
+    assert found == "town.xodr:1: <signalReference> refers to signal '9', which does not exist; correct the id"
 
 
-def test_signals_that_share_an_id_keep_apart(road: Text, map_of: Text) -> None:
+def test_signals_with_equal_ids_are_kept_separate(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(map_of(road(extra=SIGNALS), road("2", y=50.0, extra=SIGNALS)))
     assert {key: signal.place.road for key, signal in network.signals.items()} == {"7": "1", "7#2": "2"}
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_a_garbled_file_is_refused_or_gives_a_network_that_works(library: Path, data: st.DataObject) -> None:
+def test_mutated_file_is_an_error_or_gives_a_usable_network(library: Path, data: st.DataObject) -> None:
     root = etree.parse(str(library / "coop_2.xodr")).getroot()
     elements = [element for element in root.iter() if element.attrib]
     for _ in range(data.draw(st.integers(1, 4))):
@@ -298,8 +299,8 @@ def test_a_garbled_file_is_refused_or_gives_a_network_that_works(library: Path, 
         network.advance(network.location(key.road, key.lane, start), 30.0)
 
 
-def test_a_virtual_junction_does_not_lead_from_the_ends_of_its_main_road(road: Text, map_of: Text) -> None:
-    """A driveway leaves road 1 at s = 50; whoever comes to the end of road 1 must not get into it."""
+def test_virtual_junction_is_unreachable_from_road_ends(road: Text, map_of: Text) -> None:
+    """A driveway leaves road 1 at s = 50. It must be unreachable from the end of road 1."""
     leaves = '<predecessor elementType="road" elementId="1" elementS="50" elementDir="+"/>'
     connection = (
         '<connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start"><laneLink from="-1" to="-1"/>'
@@ -312,8 +313,8 @@ def test_a_virtual_junction_does_not_lead_from_the_ends_of_its_main_road(road: T
     driveway = road("2", x=50.0, y=-2.0, hdg=-1.5, length=20.0, link=leaves, junction="9")
     network = RoadNetwork.parse(map_of(road("1"), driveway, rest=virtual), "town.xodr")
     assert network.advance(network.location("1", -1, 90.0), 20.0) is None
-    (doubt,) = network.map_warnings
-    assert str(doubt) == (
-        "town.xodr:1: a road leads to road '1' between its ends, and ends there instead; "
-        "split that road there, and join the parts by a junction"
+    (warning,) = network.map_warnings
+    assert str(warning) == (
+        "town.xodr:1: a road is linked to road '1' between its ends; the link is ignored; "
+        "split that road there and connect the parts by a junction"
     )

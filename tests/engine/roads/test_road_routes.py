@@ -1,4 +1,4 @@
-"""Routes over the lane graph."""
+"""Tests of routes over the lane graph."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ def crossing(library: Path) -> RoadNetwork:
 
 
 def ring(road: Text, map_of: Text) -> RoadNetwork:
-    """Two half circles of radius 50 m that follow each other; two lanes, both counter-clockwise."""
+    """Return two consecutive half circles of radius 50 m with two lanes, both counter-clockwise."""
     lanes = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'
         + "".join(
@@ -41,7 +41,7 @@ def ring(road: Text, map_of: Text) -> RoadNetwork:
     return RoadNetwork.parse(map_of(*roads))
 
 
-def test_straight_over_the_crossing(crossing: RoadNetwork) -> None:
+def test_route_straight_over_the_crossing(crossing: RoadNetwork) -> None:
     route = crossing.route(crossing.location("1", -1, 80.0), crossing.location("2", -1, 40.0))
     assert [key.road for key in route.lanes] == ["1", "101", "2"]
     assert route.length == pytest.approx(94.5)
@@ -51,7 +51,7 @@ def test_straight_over_the_crossing(crossing: RoadNetwork) -> None:
     assert np.diff(line[:, 0]).max() <= 10.0 + 1e-9
 
 
-def test_a_left_turn_leads_from_lane_to_lane_without_a_kink(crossing: RoadNetwork) -> None:
+def test_route_of_a_left_turn_has_continuous_heading(crossing: RoadNetwork) -> None:
     route = crossing.route(crossing.location("1", -1, 80.0), crossing.location("3", -1, 30.0))
     line = route.polyline(0.5)
     steps = np.diff(line[:, :2], axis=0)
@@ -61,7 +61,7 @@ def test_a_left_turn_leads_from_lane_to_lane_without_a_kink(crossing: RoadNetwor
     assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(route.length, rel=1e-3)
 
 
-def test_a_lane_change_costs_less_than_the_way_round(road: Text, map_of: Text) -> None:
+def test_route_prefers_lane_change_to_detour(road: Text, map_of: Text) -> None:
     network = ring(road, map_of)
     start, end = network.location("a", -1, 10.0), network.location("b", -2, 10.0)
     route = network.route(start, end)
@@ -75,7 +75,7 @@ def test_a_lane_change_costs_less_than_the_way_round(road: Text, map_of: Text) -
     assert route.location_at(route.length).lane == -2
 
 
-def test_a_goal_behind_the_start_is_reached_by_the_way_round(road: Text, map_of: Text) -> None:
+def test_route_to_goal_behind_the_start_goes_round(road: Text, map_of: Text) -> None:
     network = ring(road, map_of)
     for lane in (-1, -2):
         route = network.route(network.location("a", -1, 20.0), network.location("a", lane, 10.0))
@@ -83,7 +83,7 @@ def test_a_goal_behind_the_start_is_reached_by_the_way_round(road: Text, map_of:
         assert route.length > 2 * math.pi * 52.0 - 15.0
 
 
-def test_the_cheapest_way_is_the_one_that_dijkstra_finds(crossing: RoadNetwork) -> None:
+def test_route_cost_equals_dijkstra(crossing: RoadNetwork) -> None:
     lanes = [key for key, drivable in crossing.graph.nodes(data="drivable") if drivable]
     roads = crossing.roads
 
@@ -101,12 +101,12 @@ def test_the_cheapest_way_is_the_one_that_dijkstra_finds(crossing: RoadNetwork) 
     assert checked > 100
 
 
-def test_no_way_against_the_traffic(crossing: RoadNetwork) -> None:
-    with pytest.raises(RouteError, match=r"no way over the lanes from road '2' lane -1 .* to road '1' lane -1"):
+def test_route_against_the_traffic_is_an_error(crossing: RoadNetwork) -> None:
+    with pytest.raises(RouteError, match=r"no route over the lanes leads from road '2' lane -1 .* to road '1' lane -1"):
         crossing.route(crossing.location("2", -1, 5.0), crossing.location("1", -1, 5.0))
 
 
-def test_by_way_of_a_place(road: Text, map_of: Text) -> None:
+def test_route_passes_intermediate_locations(road: Text, map_of: Text) -> None:
     network = ring(road, map_of)
     a, b = network.location("a", -1, 10.0), network.location("a", -1, 60.0)
     once = network.route(a, b)
@@ -115,7 +115,7 @@ def test_by_way_of_a_place(road: Text, map_of: Text) -> None:
     assert round_.length == pytest.approx(once.length + 2 * math.pi * 52.0, rel=1e-3)
 
 
-def test_places_along_a_route(crossing: RoadNetwork) -> None:
+def test_locations_along_a_route(crossing: RoadNetwork) -> None:
     route = crossing.route(crossing.location("3", 3, 25.0), crossing.location("4", 3, 30.0))
     assert route.s_along(crossing.location("3", 3, 5.0)) == pytest.approx(20.0)
     assert route.s_along(crossing.location("1", -1, 5.0)) is None
@@ -128,18 +128,18 @@ def test_places_along_a_route(crossing: RoadNetwork) -> None:
     assert (place.road, place.lane, place.s) == pytest.approx(("3", 3, 15.0))
 
 
-def test_who_stands_at_a_destination_does_not_go_round_to_it(road: Text, map_of: Text) -> None:
+def test_route_from_start_at_destination_has_length_zero(road: Text, map_of: Text) -> None:
     network = ring(road, map_of)
     there, beyond = network.location("a", -1, 30.0), network.location("a", -1, 30.0 + 1e-13)
     assert network.route(beyond, there).length == pytest.approx(0.0, abs=1e-6)
     onward = network.route(beyond, network.location("b", -1, 10.0), via=[there])
     assert [key.road for key in onward.lanes] == ["a", "b"]
-    # A meter behind is a lap ahead.
+    # A meter behind the start is one lap ahead.
     assert network.route(network.location("a", -1, 31.0), there).length > 300.0
 
 
 def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
-    """Road a ends at a junction, from where b leads round to the start of a, and c leads out; all of 100 m."""
+    """Return road a, which ends at a junction: b leads round to the start of a, c leads out; each is 100 m long."""
     lane = (
         '<laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">'
         '<link><predecessor id="-1"/><successor id="-1"/></link>'
@@ -170,7 +170,7 @@ def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
     )
 
 
-def test_a_route_that_comes_by_twice_takes_each_time_its_own_branch(road: Text, map_of: Text) -> None:
+def test_route_through_a_junction_twice_selects_the_branch_of_each_visit(road: Text, map_of: Text) -> None:
     network = round_and_out(road, map_of)
     start, end = network.location("a", -1, 10.0), network.location("c", -1, 50.0)
     route = network.route(start, end, via=[network.location("b", -1, 50.0)])
@@ -179,7 +179,7 @@ def test_a_route_that_comes_by_twice_takes_each_time_its_own_branch(road: Text, 
     assert arrived is not None
     assert arrived.road == "c"
     assert arrived.s == pytest.approx(40.0)
-    # In steps, as somebody drives it who remembers where on the route that is.
+    # In small steps with the visit of the previous step.
     place: LaneLocation | None = start
     visit, passed = 0, ["a"]
     while place is not None and len(passed) < 6:

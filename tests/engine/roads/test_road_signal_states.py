@@ -1,4 +1,4 @@
-"""States of traffic lights, as the tools spell them, and what their lamps do."""
+"""Tests of traffic light states in the notations of several tools, and of their lamps."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ GREEN, RED = (("red", "off"), ("yellow", "off"), ("green", "on")), (("red", "on"
         ("off;on", (("red", "off"), ("green", "on"))),
     ],
 )
-def test_a_state_lights_lamps(state: str, expected: tuple[tuple[str, str], ...]) -> None:
+def test_signal_state_lights_lamps(state: str, expected: tuple[tuple[str, str], ...]) -> None:
     assert lamps(state) == expected
 
 
-def test_a_light_with_one_lamp_is_on_or_off() -> None:
+def test_single_lamp_is_on_or_off() -> None:
     assert lamps("on", ("yellow",)) == (("yellow", "on"),)
     assert lamps("off", ("yellow",)) == (("yellow", "off"),)
 
@@ -40,10 +40,10 @@ def test_a_light_with_one_lamp_is_on_or_off() -> None:
     ("state", "stops"),
     [("red", True), ("yellow", True), ("redYellow", True), ("green", False), ("flashing", False), ("off", False)],
 )
-def test_red_and_yellow_stop(state: str, stops: bool) -> None:
+def test_red_and_yellow_require_a_stop(state: str, stops: bool) -> None:
     assert must_stop(state) is stops
 
 
-def test_a_flashing_lamp_shines_every_other_half_second() -> None:
+def test_flashing_lamp_is_lit_half_of_each_second() -> None:
     shown = [lit("flashing", ("red", "yellow", "green"), time)[1] for time in (0.0, 0.4, 0.5, 0.9, 1.0, 1.45)]
     assert shown == [True, True, False, False, True, True]

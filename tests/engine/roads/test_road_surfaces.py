@@ -1,4 +1,4 @@
-"""What is drawn of a road."""
+"""Tests of road surfaces and markings."""
 
 import math
 from collections.abc import Callable
@@ -29,7 +29,7 @@ def marked(kind: str, color: str = "white") -> str:
     )
 
 
-def test_a_straight_lane_needs_few_triangles(road: Text, map_of: Text) -> None:
+def test_straight_lane_has_few_triangles(road: Text, map_of: Text) -> None:
     mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked("none")))))["driving"]
     assert area(mesh) == pytest.approx(400.0)
     assert len(mesh.faces) <= 12
@@ -37,14 +37,14 @@ def test_a_straight_lane_needs_few_triangles(road: Text, map_of: Text) -> None:
     assert mesh.color == KINDS["driving"]
 
 
-def test_a_bend_is_drawn_to_the_centimeter(road: Text, map_of: Text) -> None:
+def test_bend_is_approximated_to_one_centimeter(road: Text, map_of: Text) -> None:
     length = 20 * math.pi
     bend = f'<geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="0.05"/></geometry>'
     mesh = by_kind(RoadNetwork.parse(map_of(road(length=length, geometry=bend, lanes=marked("none")))))["driving"]
     assert area(mesh) == pytest.approx(math.pi / 2 * (24.0**2 - 20.0**2), rel=2e-3)
 
 
-def test_marks_are_as_long_and_as_wide_as_they_should_be(road: Text, map_of: Text) -> None:
+def test_road_marks_have_specified_length_and_width(road: Text, map_of: Text) -> None:
     expected = {"solid": 20.0, "broken": 0.2 * 34, "solid solid": 40.0, "broken solid": 20.0 + 0.2 * 34}
     for kind, size in expected.items():
         mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked(kind, "yellow")))))["marking_yellow"]
@@ -52,7 +52,7 @@ def test_marks_are_as_long_and_as_wide_as_they_should_be(road: Text, map_of: Tex
         assert mesh.vertices[:, 2].min() > 0.0
 
 
-def test_the_broken_line_of_a_center_lane_lies_on_the_left_if_it_is_named_first(road: Text, map_of: Text) -> None:
+def test_broken_solid_center_line_has_its_broken_line_left(road: Text, map_of: Text) -> None:
     mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked("broken solid")))))["marking_white"]
     left = mesh.vertices[mesh.faces][np.mean(mesh.vertices[mesh.faces][:, :, 1], axis=1) > 0.0]
     assert left[:, :, 0].max() - left[:, :, 0].min() == pytest.approx(100.0, abs=1.1)
@@ -60,7 +60,7 @@ def test_the_broken_line_of_a_center_lane_lies_on_the_left_if_it_is_named_first(
 
 
 @pytest.mark.parametrize("name", ["coop_1", "coop_2"])
-def test_faces_of_the_ground_look_upwards(library: Path, name: str) -> None:
+def test_ground_faces_point_upwards(library: Path, name: str) -> None:
     for mesh in surface_meshes(RoadNetwork.load(library / f"{name}.xodr")):
         a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
         normal = np.cross(b - a, c - a)
@@ -69,7 +69,7 @@ def test_faces_of_the_ground_look_upwards(library: Path, name: str) -> None:
             assert np.all(normal[:, 2] > -1e-9), mesh.kind
 
 
-def test_a_crosswalk_is_striped_and_a_curb_is_raised(library: Path) -> None:
+def test_crosswalk_is_striped_and_curb_is_raised(library: Path) -> None:
     network = RoadNetwork.load(library / "coop_2.xodr")
     meshes = by_kind(network)
     assert meshes["sidewalk"].vertices[:, 2] == pytest.approx(0.12)
@@ -81,7 +81,7 @@ def test_a_crosswalk_is_striped_and_a_curb_is_raised(library: Path) -> None:
     assert np.ptp(ground[:, 0]) == pytest.approx(2 * (3.5 + 3.5 + 0.5 + 0.63))
 
 
-def test_objects_repeat_along_the_road(road: Text, map_of: Text) -> None:
+def test_repeated_object_is_placed_along_the_road(road: Text, map_of: Text) -> None:
     objects = (
         '<objects><object id="1" type="pole" s="0" t="0" radius="0.1" height="1">'
         '<repeat s="10" length="40" distance="20" tStart="4" tEnd="6" heightStart="1" heightEnd="2" '
@@ -95,7 +95,7 @@ def test_objects_repeat_along_the_road(road: Text, map_of: Text) -> None:
     assert np.array([(p.pose.x, p.length) for p in parts]) == pytest.approx(np.array([(2, 4), (6, 4), (10, 4)]))
 
 
-def test_cycle_lanes_pass_below_the_lanes_of_cars_in_junctions(road: Text, map_of: Text) -> None:
+def test_cycle_lanes_in_junctions_are_below_driving_lanes(road: Text, map_of: Text) -> None:
     both = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'
         '<lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'

@@ -1,4 +1,4 @@
-"""Poses of single points and of arrays are written apart, for speed: both are compared on many random roads."""
+"""Comparison of scalar and array poses, which are implemented separately, on many random roads."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def curve(draw: np.random.Generator, kind: int) -> str:
 
 
 def random_road(draw: np.random.Generator, number: int, road: Text) -> str:
-    """Bends, climbs, twists, and has lanes whose widths change; a quarter of the roads is level across."""
+    """Return a road with bends, slopes and lanes of changing width; a quarter of the roads has no superelevation."""
     x, y, hdg = (float(value) for value in draw.uniform(-3.0, 3.0, 3))
     shape = curve(draw, number % 4)
     widths = [
@@ -78,12 +78,12 @@ def test_poses_of_points_and_arrays_agree_on_random_roads(network: RoadNetwork, 
         many = np.column_stack(network.road_pose(number, s, offset))
         single = [network.road_pose_at(number, float(a), float(b)) for a, b in zip(s, offset, strict=True)]
         assert many == pytest.approx(np.array(single), abs=1e-11, rel=0.0), number
-    assert np.ptp(rolls) > 1.0  # the roads are banked to both sides
+    assert np.ptp(rolls) > 1.0  # The roads are banked to both sides.
 
 
 @pytest.mark.parametrize("number", range(16))
-def test_points_and_arrays_on_random_roads_are_located_alike(number: int, road: Text, map_of: Text) -> None:
-    """Each road in a network of its own, as they overlap; both find the place that the pose was made from."""
+def test_locate_points_equals_locate_arrays_on_random_roads(number: int, road: Text, map_of: Text) -> None:
+    """Each road is in a separate network, as random roads overlap. Both methods find the position of the pose."""
     draw = np.random.default_rng(number)
     network = RoadNetwork.parse(map_of(random_road(draw, number, road)))
     s, t = draw.uniform(1.0, LENGTH - 1.0, 40), draw.uniform(-5.0, 3.0, 40)

@@ -1,4 +1,4 @@
-"""The network of a road file is shared by all who load it, as long as the file says the same."""
+"""Tests of the sharing of road networks between loads of an unchanged file."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def road_file(tmp_path: Path) -> Path:
     return copy
 
 
-def test_the_same_file_gives_the_same_network_with_its_graph(road_file: Path) -> None:
+def test_load_of_unchanged_file_returns_the_same_network(road_file: Path) -> None:
     first, second = RoadNetwork.load(road_file), RoadNetwork.load(str(road_file))
     assert first is second
     assert first.graph is second.graph
 
 
-def test_a_file_that_says_something_else_is_read_anew(road_file: Path) -> None:
+def test_load_of_changed_file_returns_a_new_network(road_file: Path) -> None:
     first = RoadNetwork.load(road_file)
     road_file.write_bytes(road_file.read_bytes() + b"<!-- changed -->")
     second = RoadNetwork.load(road_file)
@@ -38,7 +38,7 @@ def test_a_file_that_says_something_else_is_read_anew(road_file: Path) -> None:
         RoadNetwork.load(road_file)
 
 
-def test_findings_name_the_file_that_was_asked_for(road_file: Path) -> None:
+def test_diagnostics_have_the_path_of_the_loaded_file(road_file: Path) -> None:
     other = road_file.with_name("other.xodr")
     other.write_bytes(road_file.read_bytes())
     assert RoadNetwork.load(road_file).source == str(road_file)

@@ -99,7 +99,7 @@ def test_a_range_over_several_roads_follows_their_links() -> None:
 
 
 def test_roads_must_exist_and_be_linked(street: Street) -> None:
-    with pytest.raises(InputError, match="there is no road '2'"):
+    with pytest.raises(InputError, match="road '2' does not exist"):
         road_range(street(), [Cursor("1"), Cursor("2")])
     lane = '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
     lanes = f'<laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'

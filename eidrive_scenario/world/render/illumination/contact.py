@@ -31,7 +31,7 @@ class _Window(NamedTuple):
 
 
 def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.bool_], eye: CameraView) -> Floats:
-    """Return (H, W) share of the sky's light that bodies leave to the ground that the pixels show; `upright` by triangle."""
+    """(H, W) share of the sky's light that bodies leave to the ground that the pixels show; `upright` by triangle."""
     share = np.ones(eye.shape, dtype=np.float32)
     for body in bodies:
         half = body.model.half
@@ -78,7 +78,7 @@ def _dim(
 
 
 def _window(middle: Array, body: MeshInstance, half: Array, eye: CameraView) -> _Window | None:
-    """Return the part of the picture that the dimmed ground around a body can fill; None if it is out of the picture."""
+    """The part of the picture that the dimmed ground around a body can fill; None if it is out of the picture."""
     pinhole = eye.pinhole
     signs = np.array([(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)], dtype=float)
     reach = np.array([half[0] + _REACH, half[1] + _REACH, 0.0])

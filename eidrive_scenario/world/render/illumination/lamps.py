@@ -106,7 +106,7 @@ def shine(beam: Beam, eye: Array, canvas: Canvas, sample: Sample) -> tuple[NDArr
 def _within(
     place: Floats, axes: Floats, x: Floats, y: Floats, z: Floats
 ) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats, Floats]:
-    """Return the rows of the points that the lamps may reach, where these lie from the lamps in the world's axes, how far
+    """The rows of the points that the lamps may reach, where these lie from the lamps in the world's axes, how far
     ahead they lie, and the tangents of the angles to the axis, sideways and upwards."""
     (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = axes
     dx, dy, dz = x - place[0], y - place[1], z - place[2]

@@ -100,7 +100,7 @@ class ShadowMap:
         return slice(self.top, self.top + height), slice(self.left, self.left + width)
 
     def lit(self, x: Floats, y: Floats, z: Floats) -> Floats | None:
-        """Return (n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid. None if all of
+        """(n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid. None if all of
         it reaches all of them."""
         height, width = self.heights.shape
         column, row = self.grid.cells(x, y, z)
@@ -169,7 +169,7 @@ def shadow_grid(towards: Array, eye: CameraView) -> ShadowGrid | None:
 
 
 def _seen_ground(eye: CameraView) -> Array:
-    """Return (M, 3) points, relative to the camera, around the part of the view within reach, near the ground and above."""
+    """(M, 3) points, relative to the camera, around the part of the view within reach, near the ground and above."""
     pinhole, pose = eye.pinhole, eye.pose
     columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
     rows = np.array([0.0, 0.5, 1.0]) * pinhole.height

@@ -24,7 +24,7 @@ _NIGHT_CLOUDS = 0.3
 
 
 def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
-    """Return the dome's light (…, 3) in directions given by the parts (H, W) of unit vectors; below the horizon that at it."""
+    """The dome's light (…, 3) in directions given by the parts (H, W) of unit vectors; below the horizon that at it."""
     level = np.maximum(z, np.float32(0.0))
     scale = np.float32((SIZE - 2) / 2) / (np.float32(1.0) + level)
     middle = np.float32((SIZE - 1) / 2)

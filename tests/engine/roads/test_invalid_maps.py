@@ -1,4 +1,4 @@
-"""Broken maps, and bends too tight: places one at a time and many at once are the same, and all are numbers."""
+"""Tests of invalid maps and tight bends: scalar and array poses are equal and finite."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def geometry(s: float, x: float, length: float, shape: str = "<line/>", y: float
 
 
 def same_one_at_a_time(network: RoadNetwork, road: str) -> None:
-    """Poses of lanes as arrays are those of the scalar path."""
+    """Assert that array poses of lanes equal scalar poses."""
     length = network.roads[road].length
     s = np.linspace(0.0, length, 9)
     for lane in (1, -1):
@@ -50,7 +50,7 @@ def same_one_at_a_time(network: RoadNetwork, road: str) -> None:
     ],
     ids=["before the road", "behind the road", "begins late", "two before the road"],
 )
-def test_geometries_outside_of_their_road_do_not_reach_into_others(road: Text, map_of: Text, broken: str) -> None:
+def test_geometry_outside_its_road_does_not_affect_other_roads(road: Text, map_of: Text, broken: str) -> None:
     network = RoadNetwork.parse(
         map_of(
             road("before", lanes=section(), y=50.0),
@@ -64,7 +64,7 @@ def test_geometries_outside_of_their_road_do_not_reach_into_others(road: Text, m
     assert network.lane_pose("behind", -1, [0.1]).y == pytest.approx([-52.0])
 
 
-def test_a_lane_offset_before_its_road_does_not_reach_into_others(road: Text, map_of: Text) -> None:
+def test_lane_offset_before_its_road_does_not_affect_other_roads(road: Text, map_of: Text) -> None:
     offset = '<laneOffset s="-4" a="1" b="0.1" c="0" d="0"/><laneOffset s="50" a="0" b="0" c="0" d="0"/>'
     network = RoadNetwork.parse(
         map_of(road("before", lanes=section(), y=50.0), road("broken", lanes=section(before=offset)))
@@ -75,8 +75,8 @@ def test_a_lane_offset_before_its_road_does_not_reach_into_others(road: Text, ma
 
 
 @pytest.mark.parametrize("narrowing", [0.0, -0.01])
-def test_a_lane_inside_the_center_of_its_bend_does_not_turn_round(road: Text, map_of: Text, narrowing: float) -> None:
-    """A turn of half a circle with a radius of 1.5 m, as at the ends of dead-end streets: lane 1 lies inside of it."""
+def test_lane_inside_the_center_of_its_bend_keeps_its_heading(road: Text, map_of: Text, narrowing: float) -> None:
+    """A half circle with a radius of 1.5 m, as at the ends of dead-end streets, contains lane 1."""
     turn = geometry(0.0, 0.0, 1.5 * math.pi, f'<arc curvature="{1 / 1.5!r}"/>')
     network = RoadNetwork.parse(map_of(road(length=1.5 * math.pi, lanes=section(narrowing), geometry=turn)))
     same_one_at_a_time(network, "1")
@@ -85,7 +85,7 @@ def test_a_lane_inside_the_center_of_its_bend_does_not_turn_round(road: Text, ma
         assert abs(turned) < math.radians(15.0)
 
 
-def test_numbers_that_no_road_has_are_refused(road: Text, map_of: Text) -> None:
+def test_implausible_number_is_an_error(road: Text, map_of: Text) -> None:
     with pytest.raises(RoadError) as caught:
         RoadNetwork.parse(map_of(road(geometry=geometry(0.0, 1e12, 100.0))), "town.xodr")
     assert [str(diagnostic) for diagnostic in caught.value.diagnostics] == [
@@ -93,7 +93,7 @@ def test_numbers_that_no_road_has_are_refused(road: Text, map_of: Text) -> None:
     ]
 
 
-def test_a_route_over_a_jump_of_the_map_has_no_more_points_than_its_lanes(road: Text, map_of: Text) -> None:
+def test_route_over_a_geometry_gap_adds_no_points(road: Text, map_of: Text) -> None:
     far = geometry(0.0, 0.0, 50.0) + geometry(50.0, 9e8, 50.0)
     network = RoadNetwork.parse(map_of(road(lanes=section(), geometry=far)))
     route = network.route(network.location("1", -1, 10.0), network.location("1", -1, 90.0))
@@ -109,26 +109,26 @@ def diagnostics(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("text", ["1_0", "\u0663", "nan", "1,5"])
-def test_numbers_are_written_as_in_xml(road: Text, map_of: Text, text: str) -> None:
+def test_number_in_python_notation_is_an_error(road: Text, map_of: Text, text: str) -> None:
     lanes = section().replace('a="4"', f'a="{text}"', 1).replace('id="-1"', f'id="-{text}"', 1)
     found = diagnostics(map_of(road(lanes=lanes)))
     assert f"town.xodr:1: <width> has a={text!r}; give a finite number" in found
     assert f"town.xodr:1: <lane> has id={'-' + text!r}; give a whole number" in found
 
 
-def test_an_object_that_repeats_without_end(road: Text, map_of: Text) -> None:
+def test_object_with_too_many_repetitions_is_an_error(road: Text, map_of: Text) -> None:
     repeat = '<repeat s="0" length="50" distance="1e-9" tStart="3" tEnd="3"/>'
     objects = f'<objects><object id="1" type="pole" s="0" t="3" radius="0.1" height="1">{repeat}</object></objects>'
     assert diagnostics(map_of(road(extra=objects))) == [
-        "town.xodr:1: <repeat> has length=50 and distance=1e-09: the object stands there too often; "
-        "at most 100000 of it are read"
+        "town.xodr:1: <repeat> has length=50 and distance=1e-09: too many repetitions; "
+        "at most 100000 repetitions are read"
     ]
     nowhere = objects.replace('length="50" distance="1e-9"', 'length="0" distance="0"')
     assert list(placed_objects(RoadNetwork.parse(map_of(road(extra=nowhere))))) == []
 
 
 @pytest.mark.parametrize("line", ['length="3" space="6" sOffset="-1.4"', 'length="1e-9" space="1e-9" sOffset="0"'])
-def test_dashes_stay_on_their_road(road: Text, map_of: Text, line: str) -> None:
+def test_dashes_start_and_end_on_their_road(road: Text, map_of: Text, line: str) -> None:
     mark = (
         f'<roadMark sOffset="0" type="broken"><type name="b"><line {line} tOffset="0" width="0.1"/></type></roadMark>'
     )
@@ -139,7 +139,7 @@ def test_dashes_stay_on_their_road(road: Text, map_of: Text, line: str) -> None:
     assert 95.0 < along.max() <= 100.0
 
 
-def test_a_crosswalk_has_a_bounded_number_of_stripes(road: Text, map_of: Text) -> None:
+def test_crosswalk_has_a_bounded_number_of_stripes(road: Text, map_of: Text) -> None:
     corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0"/>' for u, v in ((0, 0), (4, 0), (4, 9e5), (0, 9e5)))
     crosswalk = f'<object id="1" type="crosswalk" s="50" t="0"><outline>{corners}</outline></object>'
     network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<objects>{crosswalk}</objects>")))
@@ -147,7 +147,7 @@ def test_a_crosswalk_has_a_bounded_number_of_stripes(road: Text, map_of: Text) -
     assert len(paint.faces) == 1000
 
 
-def test_a_geometry_that_stands_there_twice_is_passed_in_both_directions(road: Text, map_of: Text) -> None:
+def test_advance_passes_duplicate_geometry_in_both_directions(road: Text, map_of: Text) -> None:
     twice = geometry(0.0, 0.0, 60.0) + 2 * geometry(60.0, 60.0, 40.0)
     network = RoadNetwork.parse(map_of(road(lanes=section(), geometry=twice)))
     for lane, start, end in ((1, 80.0, 30.0), (-1, 30.0, 80.0)):
@@ -156,7 +156,7 @@ def test_a_geometry_that_stands_there_twice_is_passed_in_both_directions(road: T
         assert moved.s == pytest.approx(end)
 
 
-def test_a_signal_beyond_its_road_stands_at_its_end(road: Text, map_of: Text) -> None:
+def test_signal_beyond_its_road_is_moved_to_its_end(road: Text, map_of: Text) -> None:
     signals = "".join(
         f'<signal id="{n}" s="{s}" t="-5" dynamic="yes" orientation="+" zOffset="2" type="1000001"/>'
         for n, s in enumerate((-3.0, 100.02, 140.0))
@@ -166,13 +166,13 @@ def test_a_signal_beyond_its_road_stands_at_its_end(road: Text, map_of: Text) ->
     (doubt,) = network.map_warnings
     assert doubt.rule == "signal-off-road"
     assert str(doubt) == (
-        "town.xodr:1: a signal stands at s = -3 m of road '1', and is put at s = 0 m; "
-        "1 more of signals beyond their roads: line 1; the road runs from 0 to 100 m"
+        "town.xodr:1: a signal is at s = -3 m of road '1'; s = 0 m is used; "
+        "1 more of signals beyond the ends of their roads: line 1; the road extends from 0 to 100 m"
     )
 
 
 @pytest.mark.parametrize("s", ["10", "100000"])
-def test_the_first_lane_section_begins_with_its_road(road: Text, map_of: Text, s: str) -> None:
+def test_first_lane_section_starts_at_zero(road: Text, map_of: Text, s: str) -> None:
     late = section().replace('s="0"', f's="{s}"')
     network = RoadNetwork.parse(map_of(road(lanes=late)))
     (only,) = network.roads["1"].sections
@@ -180,14 +180,14 @@ def test_the_first_lane_section_begins_with_its_road(road: Text, map_of: Text, s
     assert network.lane_width("1", -1, 1.0) == 4.0
 
 
-def test_a_first_lane_section_that_begins_late_reaches_the_second(road: Text, map_of: Text) -> None:
+def test_late_first_lane_section_extends_to_the_second(road: Text, map_of: Text) -> None:
     lanes = section().replace('s="0"', 's="10"') + section().replace('s="0"', 's="60"')
     network = RoadNetwork.parse(map_of(road(lanes=lanes)))
     assert [(part.s, part.end) for part in network.roads["1"].sections] == [(0.0, 60.0), (60.0, 100.0)]
 
 
-def test_a_lane_that_ends_where_one_comes_to_rest(road: Text, map_of: Text) -> None:
-    """Moved to where its lane ends: the next section, which begins there, has no such lane."""
+def test_advance_exactly_to_the_end_of_a_lane(road: Text, map_of: Text) -> None:
+    """The next section, which starts at the end position, has no such lane."""
     wide = section().replace("</right>", LANE.format(-2, 0.0) + "</right>")
     only_left = f'<laneSection s="50"><left>{LANE.format(1, 0.0)}</left><center><lane id="0"/></center></laneSection>'
     network = RoadNetwork.parse(map_of(road(lanes=wide + only_left)))

@@ -1,4 +1,4 @@
-"""What is doubtful in a road file that can be read: each kind, told once, and no more than that."""
+"""Tests of the warnings of readable road files."""
 
 import math
 from collections.abc import Callable
@@ -24,8 +24,8 @@ def section(s: float, *right: str) -> str:
     )
 
 
-def told(text: str) -> list[tuple[str, str]]:
-    """Rule and message of each finding."""
+def map_warnings(text: str) -> list[tuple[str, str]]:
+    """Return rule and message of each warning."""
     return [(diagnostic.rule, diagnostic.message) for diagnostic in RoadNetwork.parse(text, "town.xodr").map_warnings]
 
 
@@ -37,32 +37,36 @@ def two_lines(s: float = 50.0, x: float = 50.0, y: float = 0.0, h: float = 0.0) 
     ("second", "rule", "message"),
     [
         ({"y": 0.3, "x": 50.4}, "geometry-gap", "road '1' jumps by 0.5 m at s = 50 m"),
-        ({"s": 50.2}, "geometry-gap", "road '1': the geometry at s = 0 m ends before the next one begins, by 0.2 m"),
-        ({"s": 49.8}, "geometry-gap", "road '1': the geometry at s = 0 m runs on into the next one, by 0.2 m"),
+        ({"s": 50.2}, "geometry-gap", "road '1': the geometry at s = 0 m ends before the next one starts, by 0.2 m"),
+        ({"s": 49.8}, "geometry-gap", "road '1': the geometry at s = 0 m overlaps the next one, by 0.2 m"),
         ({"h": 0.02}, "heading-discontinuity", "road '1' has a kink of 0.02 rad at s = 50 m"),
         ({"h": 2 * math.pi - 0.02}, "heading-discontinuity", "road '1' has a kink of 0.02 rad at s = 50 m"),
     ],
 )
-def test_geometries_that_do_not_join(road: Text, map_of: Text, second: dict, rule: str, message: str) -> None:
-    assert told(map_of(road(geometry=two_lines(**second))))[0] == (rule, message)
+def test_disconnected_geometries_are_a_warning(
+    road: Text, map_of: Text, second: dict[str, float], rule: str, message: str
+) -> None:
+    assert map_warnings(map_of(road(geometry=two_lines(**second))))[0] == (rule, message)
 
 
 @pytest.mark.parametrize("second", [{"y": 0.008}, {"h": 0.0008}, {"h": 2 * math.pi}, {"h": 0.5}, {"s": 50.004}])
-def test_rounding_and_corners_are_left_alone(road: Text, map_of: Text, second: dict) -> None:
-    assert told(map_of(road(geometry=two_lines(**second)))) == []
+def test_rounding_and_corners_give_no_warning(road: Text, map_of: Text, second: dict[str, float]) -> None:
+    assert map_warnings(map_of(road(geometry=two_lines(**second)))) == []
 
 
-def test_a_length_that_is_not_that_of_the_geometry(road: Text, map_of: Text) -> None:
+def test_length_that_differs_from_geometry_is_a_warning(road: Text, map_of: Text) -> None:
     text = map_of(road(length=100.05, geometry=two_lines()))
-    assert told(text) == [("geometry-gap", "road '1' has length 100.05 m, but its geometry ends 0.05 m before that")]
+    assert map_warnings(text) == [
+        ("geometry-gap", "road '1' has length 100.05 m, but its geometry ends 0.05 m before that")
+    ]
 
 
-def test_each_kind_is_told_once_with_the_places_of_the_others(road: Text, map_of: Text) -> None:
+def test_warnings_of_one_kind_are_grouped_with_their_lines(road: Text, map_of: Text) -> None:
     text = map_of(*("\n" + road(str(n), geometry=two_lines(y=1.0)) for n in range(8)))
     (diagnostic,) = RoadNetwork.parse(text, "town.xodr").map_warnings
     assert str(diagnostic) == (
         "town.xodr:3: road '0' jumps by 1 m at s = 50 m; 7 more of such jumps: line 5, 7, 9, 11, …; "
-        "let each geometry begin where the one before ends"
+        "start each geometry at the end of its predecessor"
     )
 
 
@@ -72,74 +76,79 @@ def test_each_kind_is_told_once_with_the_places_of_the_others(road: Text, map_of
         ("", "has no width"),
         (WIDTH.format(5, 3.5, 0, 0, 0), "has no width before its sOffset 5"),
         (WIDTH.format(0, 2, -0.03, 0, 0), "becomes -1 m wide"),
-        # 1 - 6 (ds/100)² + 5 (ds/100)³ is least at 80 m: 1 - 3.84 + 2.56.
+        # 1 - 6 (ds/100)² + 5 (ds/100)³ has its minimum at 80 m: 1 - 3.84 + 2.56.
         (WIDTH.format(0, 1, 0, -6e-4, 5e-6), "becomes -0.28 m wide"),
         (WIDTH.format(0, 350, 0, 0, 0), "becomes 350 m wide"),
         (WIDTH.format(0, 3.5, 0, 0, 1), "becomes 1e+06 m wide"),
     ],
 )
-def test_widths(road: Text, map_of: Text, width: str, message: str) -> None:
+def test_missing_negative_and_implausible_widths_are_warnings(
+    road: Text, map_of: Text, width: str, message: str
+) -> None:
     text = map_of(road(lanes=section(0, lane(-1), lane(-2, width=width, kind="shoulder"))))
-    assert told(text) == [("lane-width", f"lane -2 of road '1' (section at s = 0 m) {message}")]
+    assert map_warnings(text) == [("lane-width", f"lane -2 of road '1' (section at s = 0 m) {message}")]
 
 
-def test_a_width_of_0_and_one_that_ends_there_are_sound(road: Text, map_of: Text) -> None:
+def test_lanes_of_zero_and_vanishing_width_give_no_warning(road: Text, map_of: Text) -> None:
     tapering = WIDTH.format(0, 3.5, -0.035, 0, 0)
     assert (
-        told(
+        map_warnings(
             map_of(road(lanes=section(0, lane(-1), lane(-2, width=tapering), lane(-3, width=WIDTH.format(0, *"0000")))))
         )
         == []
     )
 
 
-def test_links_within_a_road(road: Text, map_of: Text) -> None:
+def test_invalid_lane_links_within_a_road_are_warnings(road: Text, map_of: Text) -> None:
     link = '<successor id="{}"/>'.format
     later = section(60, lane(-1, '<predecessor id="-1"/>'))
-    broken = told(map_of(road(lanes=section(0, lane(-1), lane(-2, link(-2))) + later)))
+    broken = map_warnings(map_of(road(lanes=section(0, lane(-1), lane(-2, link(-2))) + later)))
     assert broken == [
         (
             "lane-link",
             "lane -2 of road '1' has the successor -2, which the next lane section (s = 60 m) does not have",
         ),
-        ("lane-link", "lane -2 of road '1' (section at s = 0 m) leads nowhere, and the road goes on"),
+        ("lane-link", "lane -2 of road '1' (section at s = 0 m) has no successor although the road continues"),
     ]
     merging = section(0, lane(-1), lane(-2, width=WIDTH.format(0, 3.0, -0.05, 0, 0))) + later
-    assert told(map_of(road(lanes=merging))) == []
+    assert map_warnings(map_of(road(lanes=merging))) == []
 
 
-def test_links_from_road_to_road(road: Text, map_of: Text) -> None:
+def test_invalid_lane_links_between_roads_are_warnings(road: Text, map_of: Text) -> None:
     onwards = '<successor elementType="road" elementId="2" contactPoint="start"/>'
     back = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
     other = road("2", x=100.0, link=back, lanes=section(0, lane(-1, '<predecessor id="-1"/>')))
     sound = road("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-1"/>')))
-    assert told(map_of(sound, other)) == []
+    assert map_warnings(map_of(sound, other)) == []
     loose = road("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-3"/>'), lane(-2)))
-    assert told(map_of(loose, other)) == [
+    assert map_warnings(map_of(loose, other)) == [
         ("lane-link", "lane -1 of road '1' has the successor -3, which the start of road '2' does not have"),
-        ("lane-link", "lane -2 of road '1' (section at s = 0 m) leads nowhere, and the road goes on in road '2'"),
+        (
+            "lane-link",
+            "lane -2 of road '1' (section at s = 0 m) has no successor although the road continues in road '2'",
+        ),
     ]
 
 
-def test_linked_lanes_that_do_not_meet(road: Text, map_of: Text) -> None:
-    """The reference lines need not: a lane of the second road, whose line is further right, goes on as the third."""
+def test_gap_between_linked_lanes_is_a_warning(road: Text, map_of: Text) -> None:
+    """Reference lines need not meet: a lane of the second road, whose line is further right, continues lane -2."""
     onwards = '<successor elementType="road" elementId="2" contactPoint="start"/>'
     back = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
     first = road("1", link=onwards, lanes=section(0, lane(-1), lane(-2, '<successor id="-1"/>')))
     first = first.replace('<lane id="-1" type="driving"', '<lane id="-1" type="shoulder"')
     for y, apart in ((-3.5, ""), (-3.505, ""), (-3.1, "0.4"), (0.0, "3.5")):
         second = road("2", x=100.0, y=y, link=back, lanes=section(0, lane(-1, '<predecessor id="-2"/>')))
-        what = f"lane -2 of road '1' and lane -1 of road '2' are linked, and their ends are {apart} m apart"
-        assert told(map_of(first, second)) == ([("geometry-gap", what)] if apart else [])
+        what = f"lane -2 of road '1' and lane -1 of road '2' are linked but their ends are {apart} m apart"
+        assert map_warnings(map_of(first, second)) == ([("geometry-gap", what)] if apart else [])
 
 
-def test_what_lies_across_a_road(road: Text, map_of: Text) -> None:
+def test_ignored_lateral_profiles_are_warnings(road: Text, map_of: Text) -> None:
     def profile(*entries: str) -> list[tuple[str, str]]:
-        return told(map_of(road(extra=f"<lateralProfile>{''.join(entries)}</lateralProfile>")))
+        return map_warnings(map_of(road(extra=f"<lateralProfile>{''.join(entries)}</lateralProfile>")))
 
     flat, bent = '<shape s="0" t="-4" a="0" b="0" c="0" d="0"/>', '<shape s="0" t="-4" a="0" b="0.02" c="0" d="0"/>'
     assert profile(flat, '<superelevation s="0" a="1.5" b="0" c="0" d="0"/>') == []
-    unread = "road '1' has <{}>, which is not read: its cross section is straight"
+    unread = "road '1' has <{}>, which is ignored: its cross section is straight"
     assert profile(flat, bent) == [("road-surface", unread.format("shape"))]
     assert profile('<crossfall side="right" s="0" a="0.02" b="0" c="0" d="0"/>') == [
         ("road-surface", unread.format("crossfall"))
@@ -150,7 +159,7 @@ def test_what_lies_across_a_road(road: Text, map_of: Text) -> None:
     ]
 
 
-def test_connections_that_do_not_fit(road: Text, map_of: Text) -> None:
+def test_invalid_connections_are_warnings(road: Text, map_of: Text) -> None:
     into = '<successor elementType="junction" elementId="9"/>'
     through = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
     arm = road("1", link=into, lanes=section(0, lane(-1)))
@@ -161,23 +170,23 @@ def test_connections_that_do_not_fit(road: Text, map_of: Text) -> None:
         return f'<junction id="9" name="">{connection}{links}</connection></junction>'
 
     fitting = '<laneLink from="-1" to="-1"/>'
-    assert told(map_of(arm, inner, rest=junction("1", "2", fitting))) == []
-    wrong = told(map_of(arm, inner, rest=junction("1", "2", '<laneLink from="-4" to="-1"/>')))
-    what = "connection '0' of junction '9' links lane -4 of road '1', which it does not have there"
+    assert map_warnings(map_of(arm, inner, rest=junction("1", "2", fitting))) == []
+    wrong = map_warnings(map_of(arm, inner, rest=junction("1", "2", '<laneLink from="-4" to="-1"/>')))
+    what = "connection '0' of junction '9' links lane -4 of road '1', which does not exist there"
     assert wrong == [("junction-connection", what)]
     against = map_of(arm, inner, rest=junction("1", "2", fitting)).replace('rule="RHT"', 'rule="LHT"')
-    what = "connection '0' of junction '9' leads against the traffic of the roads '1' and '2'"
-    assert told(against) == [("junction-connection", what)]
+    what = "connection '0' of junction '9' is opposite to the traffic of roads '1' and '2'"
+    assert map_warnings(against) == [("junction-connection", what)]
     elsewhere = road("3", y=50.0, lanes=section(0, lane(-1)))
-    outside = {message for _, message in told(map_of(arm, inner, elsewhere, rest=junction("3", "3", fitting)))}
+    outside = {message for _, message in map_warnings(map_of(arm, inner, elsewhere, rest=junction("3", "3", fitting)))}
     assert "connection '0' of junction '9' comes from road '3', which does not end at the junction" in outside
-    assert "connection '0' of junction '9' takes road '3', which is not of this junction" in outside
-    closed = told(map_of(arm, road("2", x=100.0, junction="9"), rest=junction("1", "2", "")))
-    assert closed == []  # without a <laneLink>, lanes of the same id belong together
+    assert "connection '0' of junction '9' uses road '3', which does not belong to the junction" in outside
+    closed = map_warnings(map_of(arm, road("2", x=100.0, junction="9"), rest=junction("1", "2", "")))
+    assert closed == []  # Without a <laneLink>, lanes of the same id are connected.
 
 
-def test_links_lead_past_a_section_of_no_length(road: Text, map_of: Text) -> None:
-    """Such a section is left out; Town06 has one, and renumbers its lanes there."""
+def test_links_bypass_a_section_of_zero_length(road: Text, map_of: Text) -> None:
+    """The section is omitted; Town06 has such a section, which renumbers its lanes."""
     first = section(0, lane(-1, '<successor id="-2"/>'), lane(-2, '<successor id="-3"/>'))
     none = section(60, lane(-1), lane(-2, '<successor id="-1"/>'), lane(-3, '<successor id="-2"/>'))
     last = section(60.0000004, lane(-1, '<predecessor id="-2"/>'), lane(-2, '<predecessor id="-3"/>'))
@@ -187,9 +196,9 @@ def test_links_lead_past_a_section_of_no_length(road: Text, map_of: Text) -> Non
         assert network.roads["1"].sections[0].lanes[number].successors == (number,)
 
 
-def test_real_maps_are_not_flooded(corpora: Path) -> None:
-    """Every map gives a finding or none for each kind; those below are true ones, looked up in the files."""
-    found = {}
+def test_corpus_maps_have_only_known_warnings(corpora: Path) -> None:
+    """Each map has at most one warning per kind. The expected ones were verified in the files."""
+    found: dict[tuple[str, str], list[int | None]] = {}
     for file in sorted(corpora.rglob("*.xodr")):
         for diagnostic in RoadNetwork.load(file).map_warnings:
             found.setdefault((file.name, diagnostic.rule), []).append(diagnostic.line)

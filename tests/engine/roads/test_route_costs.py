@@ -1,4 +1,4 @@
-"""What counts on the way from place to place: length, time, junctions or chance."""
+"""Tests of route costs: length, time, junctions or random factors."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ WAYS = {
     "b": (360.0, 30.0, ((20, 9), (180, None), (200, 6), (340, None), (360, 7))),
     "c": (420.0, 10.0, ((20, 9), (210, None), (400, None), (420, 7))),
 }
-"""Length [m], limit [m/s], and where each piece ends, of which junction it is."""
+"""Length [m], speed limit [m/s], end point and junction of each road."""
 
 
 @pytest.fixture
 def three_ways(road: Text, map_of: Text) -> RoadNetwork:
-    """From `start` to `end`, whose ends are 300 m apart: a is the shortest way, b the fastest, c has the fewest
-    junctions (two, the others three). b and c go up and down again."""
+    """Three routes from `start` to `end` 300 m further: a is the shortest, b the fastest, c has the fewest junctions.
+
+    Route c has two junctions, the others three. Routes b and c have slopes up and down.
+    """
 
     def link(tag: str, other: str) -> str:
         kind = "junction" if other.isdigit() else "road"
@@ -69,8 +71,8 @@ def three_ways(road: Text, map_of: Text) -> RoadNetwork:
     return RoadNetwork.parse(map_of(*roads, rest=junctions))
 
 
-def test_each_preference_has_its_way(three_ways: RoadNetwork) -> None:
-    """a: 300 m in 30 s, b: 360 m in 12 s, c: 420 m in 42 s; 50 m of `start` and 50 m of `end` belong to all."""
+def test_each_cost_selects_its_route(three_ways: RoadNetwork) -> None:
+    """a: 300 m in 30 s, b: 360 m in 12 s, c: 420 m in 42 s. All include 50 m of `start` and 50 m of `end`."""
     here, there = three_ways.location("start", -1, 50.0), three_ways.location("end", -1, 50.0)
 
     def way(cost: object) -> str:
@@ -82,13 +84,13 @@ def test_each_preference_has_its_way(three_ways: RoadNetwork) -> None:
     assert by_seed[7] == way(random_costs(three_ways, generator(7, "route", "r")))
 
 
-def test_each_leg_has_a_cost_of_its_own(three_ways: RoadNetwork) -> None:
+def test_each_leg_uses_its_cost(three_ways: RoadNetwork) -> None:
     places = [three_ways.location(*place) for place in (("start", -1, 50.0), ("b1", -1, 50.0), ("end", -1, 50.0))]
     route = three_ways.route(places[0], places[2], [places[1]], [fewest_junctions(three_ways), None])
     assert [key.road for key in route.lanes] == ["start", "b0", "b1", "b2", "b3", "b4", "end"]
 
 
-def test_the_strategy_of_a_waypoint_chooses_the_way_to_it(three_ways: RoadNetwork) -> None:
+def test_route_strategy_of_a_waypoint_selects_the_route_to_it(three_ways: RoadNetwork) -> None:
     def place(position: model.Position) -> ResolvedPosition:
         assert position.lane_position is not None
         location = three_ways.location(position.lane_position.road_id, -1, position.lane_position.s)
@@ -115,8 +117,8 @@ def test_the_strategy_of_a_waypoint_chooses_the_way_to_it(three_ways: RoadNetwor
     assert by_seed == [way(strategies.RANDOM, seed) for seed in range(30)]
 
 
-def test_distances_along_the_way_that_is_asked_for(three_ways: RoadNetwork) -> None:
-    """From 50 m before the fork to 50 m behind the merge; an assigned route leads along b though a is shorter."""
+def test_distance_follows_the_routing_algorithm(three_ways: RoadNetwork) -> None:
+    """From 50 m before the fork to 50 m after the merge. An assigned route leads along b although a is shorter."""
     here, there = three_ways.location("start", -1, 50.0), three_ways.location("end", -1, 50.0)
     assert three_ways.distance(here, there) == pytest.approx((400.0, 0.0))
     assert three_ways.distance(here, there, "fastest") == pytest.approx((460.0, 0.0))
