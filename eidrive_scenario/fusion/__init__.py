@@ -1,1 +1,1 @@
-"""Boxes of several senders become one picture."""
+"""Fusion of the object lists of several stations into one object list."""

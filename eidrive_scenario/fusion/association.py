@@ -1,4 +1,4 @@
-"""Which boxes of two lists show the same object."""
+"""Association of two lists of boxes."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ from scipy.optimize import linear_sum_assignment
 
 from eidrive_scenario.arrays import Array
 
-FEW = 64
-"""Up to so many pairs, plain numbers are faster than arrays."""
+MAX_SCALAR = 64
+"""Maximum number of pairs for scalar evaluation, which is then faster than arrays."""
 OUTSIDE = 1e6
-"""Cost of a pair beyond the gate: finite, so that a full assignment exists, and larger than any sum of gated costs."""
+"""Cost of a pair outside the gate: finite, so that a full assignment exists, and above any sum of gated costs."""
 
 
 def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]:
-    """Pairs (row of first, row of second) of centers (N, 3) and (M, 3) that lie nearer than `gate` [m].
+    """Return pairs (row of first, row of second) of centers (N, 3) and (M, 3) within `gate` [m].
 
-    The assignment pairs as many as possible and has the least sum of distances; each row is used at most once.
+    The assignment has the maximum number of pairs, and among these the minimum sum of distances. Each row is used at
+    most once.
     """
     if not len(first) or not len(second):
         return []
-    if len(first) * len(second) <= FEW:
-        return associate_few(first.tolist(), second.tolist(), gate)
+    if len(first) * len(second) <= MAX_SCALAR:
+        return associate_small(first.tolist(), second.tolist(), gate)
     offset = first[:, None, :] - second[None, :, :]
     distance = np.sqrt(np.einsum("nmi,nmi->nm", offset, offset))
     inside = distance < gate
@@ -34,10 +35,10 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
     return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
 
 
-def associate_few(
+def associate_small(
     first: Sequence[Sequence[float]], second: Sequence[Sequence[float]], gate: float
 ) -> list[tuple[int, int]]:
-    """The same as `associate` in plain numbers."""
+    """Return the result of `associate`, evaluated pair by pair."""
     near = [
         (row, column, distance)
         for row, one in enumerate(first)
@@ -48,9 +49,9 @@ def associate_few(
 
 
 def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
-    """Of the possible pairs (row, column) those chosen: as many as possible, then the least sum of costs.
+    """Return the assigned pairs of the candidate pairs (row, column): maximum number, then minimum sum of costs.
 
-    Each row and column is used at most once. Where two choices are equally good, the order of the numbers decides.
+    Each row and column is used at most once. The order of the indices resolves ties.
     """
     if len(set(rows)) == len(rows) and len(set(columns)) == len(columns):
         return list(zip(rows, columns, strict=True))
@@ -59,9 +60,9 @@ def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) 
     matrix = np.full((len(row_of), len(column_of)), OUTSIDE)
     for row, column, cost in zip(rows, columns, costs, strict=True):
         matrix[row_of[row], column_of[column]] = cost
-    chosen = {
+    assigned = {
         (row, column) for row, column in zip(*(side.tolist() for side in linear_sum_assignment(matrix)), strict=True)
     }
     return [
-        (row, column) for row, column in zip(rows, columns, strict=True) if (row_of[row], column_of[column]) in chosen
+        (row, column) for row, column in zip(rows, columns, strict=True) if (row_of[row], column_of[column]) in assigned
     ]

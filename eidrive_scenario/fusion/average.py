@@ -1,4 +1,4 @@
-"""Late fusion by averaging: one box per object, however many stations report it."""
+"""Late fusion by averaging: one box per object, independent of the number of reporting stations."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import NOT_ESTIMATED, Detections
-from eidrive_scenario.fusion.association import FEW as FEW_PAIRS
-from eidrive_scenario.fusion.association import associate, associate_few
+from eidrive_scenario.fusion.association import MAX_SCALAR as MAX_SCALAR_PAIRS
+from eidrive_scenario.fusion.association import associate, associate_small
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.records import replaced
 
 Indices = NDArray[np.intp]
 
-FEW = 16
-"""Up to so many boxes, plain numbers are faster than arrays."""
+MAX_SCALAR = 16
+"""Maximum number of boxes for scalar evaluation, which is then faster than arrays."""
 GATE = 4.0
-"""Two boxes nearer than this are one object, as in EI-Drive [m]."""
+"""Association gate: maximum distance between boxes of one object, as in EI-Drive [m]."""
 
 
 class AverageFusion(FusionMethod):
-    """Takes the stations in the order of their names and gives each box to the nearest object within the gate.
+    """Fusion by averaging. Stations are processed in order of their names, and boxes are assigned within the gate.
 
-    Boxes of one station are never joined: it reports different objects. Classes are not compared, as detectors confuse
-    them. Position, size and score are means, the yaw is a mean on the circle, the velocity a mean of those known, the
-    class that of the most reports. The covariance is the mean of those known: an upper bound, however much the
-    reports' errors depend on each other. The probability of existence is that of at least one report.
+    Boxes of one station are never fused, because they are different objects. Classes are not compared, because
+    detectors confuse them. Position, size and score are means, and yaw is a circular mean. Velocity is the mean of the
+    known values, and the class is the most frequent one. The covariance is the mean of the known ones, an upper bound
+    for any correlation of the errors. The existence probability is that of at least one correct report.
     """
 
     def __init__(self, gate: float = GATE) -> None:
@@ -48,22 +48,25 @@ class AverageFusion(FusionMethod):
                 return only
             return replaced(only, time=now)
         labels = self._labels(present)
-        fused = fuse_average_small(present, labels, now) if len(labels) <= FEW else fuse_average(present, labels, now)
+        small = len(labels) <= MAX_SCALAR
+        fused = fuse_average_small(present, labels, now) if small else fuse_average(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
         return replaced(fused, existence=joint_existence(present, labels))
 
     def _labels(self, reports: Sequence[Detections]) -> list[int]:
-        """The object of each box, over all boxes of all reports in order; objects are numbered as they appear."""
+        """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance."""
         objects = [_Object(*center) for center in reports[0].boxes[:, :3].tolist()]
         labels = list(range(len(objects)))
         for report in reports[1:]:
             centers = report.boxes[:, :3]
-            known = [(thing.x, thing.y, thing.z) for thing in objects]
+            known = [(entry.x, entry.y, entry.z) for entry in objects]
             plain: list[list[float]] = centers.tolist()
-            few = len(known) * len(plain) <= FEW_PAIRS
-            found = associate_few(known, plain, self.gate) if few else associate(np.array(known), centers, self.gate)
-            pairs = {column: row for row, column in found}
+            small = len(known) * len(plain) <= MAX_SCALAR_PAIRS
+            assigned = (
+                associate_small(known, plain, self.gate) if small else associate(np.array(known), centers, self.gate)
+            )
+            pairs = {column: row for row, column in assigned}
             for column, (x, y, z) in enumerate(plain):
                 label = pairs.get(column)
                 if label is None:
@@ -76,16 +79,19 @@ class AverageFusion(FusionMethod):
 
 
 def joint_existence(reports: Sequence[Detections], labels: Sequence[int]) -> Array:
-    """(G,) probabilities that at least one report of each object is right: 1 - prod (1 - r), as stations report what
-    their own sensors detect. Where a report states no existence, its score counts."""
-    doubt = np.ones(max(labels) + 1)
-    np.multiply.at(doubt, np.array(labels, dtype=np.intp), 1.0 - np.concatenate([r.confidence for r in reports]))
-    return np.asarray(1.0 - doubt)
+    """Return the probability that at least one report of each object is correct (G,): 1 - prod (1 - r).
+
+    Reports are independent, because stations report only detections of their sensors. The score replaces a missing
+    existence probability.
+    """
+    absence = np.ones(max(labels) + 1)
+    np.multiply.at(absence, np.array(labels, dtype=np.intp), 1.0 - np.concatenate([r.confidence for r in reports]))
+    return np.asarray(1.0 - absence)
 
 
 @dataclass
 class _Object:
-    """The mean of the centers so far."""
+    """Running mean of the centers of one object."""
 
     x: float
     y: float
@@ -100,7 +106,10 @@ class _Object:
 
 
 def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: float) -> Detections:
-    """Means over the boxes of each object, by the object's number; a box that is alone stays as it is, to the bit."""
+    """Return the means over the boxes of each object; a single box is unchanged to the bit.
+
+    numbers  object of each box
+    """
     labels = np.array(numbers, dtype=np.intp)
     boxes = np.concatenate([report.boxes for report in reports])
     counts = np.bincount(labels)
@@ -117,14 +126,14 @@ def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: flo
         now,
         means,
         _sums(np.concatenate([report.scores for report in reports]), labels, len(counts)) / counts,
-        tuple(map(_usual, votes)),
+        tuple(map(_most_frequent, votes)),
         _means_of_known(np.concatenate([report.velocity for report in reports]), labels, len(counts)),
         _means_of_known(np.concatenate([report.covariance for report in reports]), labels, len(counts)),
     )
 
 
 def fuse_average_small(reports: Sequence[Detections], labels: Sequence[int], now: float) -> Detections:
-    """The same as `joined` in plain numbers."""
+    """Return the result of `fuse_average`, evaluated box by box."""
     members: list[list[int]] = [[] for _ in range(max(labels) + 1)]
     for row, label in enumerate(labels):
         members[label].append(row)
@@ -137,14 +146,14 @@ def fuse_average_small(reports: Sequence[Detections], labels: Sequence[int], now
         now,
         np.array([_mean_box([boxes[row] for row in rows]) for rows in members]),
         np.array([sum([scores[row] for row in rows]) / len(rows) for rows in members]),
-        tuple([_usual([words[row] for row in rows]) for rows in members]),
+        tuple([_most_frequent([words[row] for row in rows]) for rows in members]),
         np.array([_mean_of_known([velocity[row] for row in rows]) for rows in members]),
         np.array([_mean_of_known([covariance[row] for row in rows]) for rows in members]).reshape(-1, 2, 2),
     )
 
 
-def _usual(words: Sequence[str]) -> str:
-    """The most frequent one, of equally frequent ones the first."""
+def _most_frequent(words: Sequence[str]) -> str:
+    """Return the most frequent word, the first one among equals."""
     return Counter(words).most_common(1)[0][0] if len(words) > 2 else words[0]
 
 
@@ -163,7 +172,7 @@ def _mean(rows: list[list[float]]) -> list[float]:
 
 
 def _mean_of_known(rows: list[list[float]]) -> list[float]:
-    """Of the rows without NaN; NaN where all have one."""
+    """Return the mean of the rows without NaN; NaN if there is none."""
     known = [row for row in rows if not math.isnan(sum(row))]
     if not known:
         return [math.nan] * len(rows[0])
@@ -171,14 +180,14 @@ def _mean_of_known(rows: list[list[float]]) -> list[float]:
 
 
 def _sums(values: Array, labels: Indices, count: int) -> Array:
-    """(count, ...) sums of values (K, ...) with the same label, added in order."""
+    """Return the sums (count, ...) of the values (K, ...) of each label, added in order."""
     total = np.zeros((count, *values.shape[1:]))
     np.add.at(total, labels, values)
     return total
 
 
 def _means_of_known(values: Array, labels: Indices, count: int) -> Array:
-    """(count, ...) means of the values (K, ...) without NaN; NaN where all of an object's have one."""
+    """Return the means (count, ...) of the values (K, ...) without NaN of each label; NaN if there is none."""
     flat = values.reshape(len(values), -1)
     known = ~np.isnan(flat).any(axis=1)
     number = np.bincount(labels[known], minlength=count)

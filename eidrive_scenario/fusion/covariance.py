@@ -1,4 +1,4 @@
-"""Covariance intersection: two estimates joined whose errors may depend on each other in a way that nobody knows."""
+"""Covariance intersection: fusion of two estimates whose errors have an unknown correlation."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 
 TRACE_TOLERANCE = 0.01
-"""How much larger than the least trace that of the result may be, so that estimates which are about as good count about
-the same: the least trace alone would take either of two equal ones whole, and rounding would say which."""
+"""Maximum relative excess of the trace of the result over the minimum trace.
+
+It gives estimates of similar accuracy similar weights. The minimum alone would select one of two equal estimates
+entirely, depending on rounding.
+"""
 
 
 def estimates(mean: Array, covariance: Array) -> Array:
-    """(5, ...) x, y, and xx, xy, yy of the inverse covariance, from means (..., 2) and covariances (..., 2, 2)."""
+    """Return estimates (5, ...): x, y, and xx, xy, yy of the inverse covariance.
+
+    mean  (..., 2);  covariance  (..., 2, 2)
+    """
     xx, xy, yy = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
     both = np.empty((5, *xx.shape))
     both[0], both[1] = mean[..., 0], mean[..., 1]
@@ -22,12 +28,12 @@ def estimates(mean: Array, covariance: Array) -> Array:
 
 
 def means(both: Array) -> Array:
-    """(..., 2) of estimates (5, ...)."""
+    """Return the means (..., 2) of estimates (5, ...)."""
     return np.stack([both[0], both[1]], axis=-1)
 
 
 def covariances(both: Array) -> Array:
-    """(..., 2, 2) of estimates (5, ...)."""
+    """Return the covariances (..., 2, 2) of estimates (5, ...)."""
     xx, xy, yy = both[2:] / (both[2] * both[4] - both[3] * both[3])
     covariance = np.empty((*xx.shape, 2, 2))
     covariance[..., 0, 0], covariance[..., 1, 1] = yy, xx
@@ -36,17 +42,17 @@ def covariances(both: Array) -> Array:
 
 
 def intersect(a: Array, cov_a: Array, b: Array, cov_b: Array) -> tuple[Array, Array, Array]:
-    """The estimate from means (..., 2) with covariances (..., 2, 2): its mean, its covariance, and the weight of a."""
+    """Return mean, covariance and weight of a, fused from means (..., 2) with covariances (..., 2, 2)."""
     both, w = intersect_batch(estimates(a, cov_a), estimates(b, cov_b))
     return means(both), covariances(both), w
 
 
 def intersect_batch(a: Array, b: Array) -> tuple[Array, Array]:
-    """The estimates (5, ...) from both, and the weights (...) of a.
+    """Return the fused estimates (5, ...) and the weights (...) of a.
 
-    P⁻¹ = w A⁻¹ + (1 - w) B⁻¹, x = P (w A⁻¹ a + (1 - w) B⁻¹ b). P is no smaller than the true covariance of the error,
-    whatever the correlation, for any w in [0, 1] (Julier and Uhlmann, A non-divergent estimation algorithm in the
-    presence of unknown correlations, American Control Conference 1997). `weight` says which w.
+    P⁻¹ = w A⁻¹ + (1 - w) B⁻¹, x = P (w A⁻¹ a + (1 - w) B⁻¹ b). P is at least the true covariance of the error for any
+    correlation and any w in [0, 1] (Julier and Uhlmann, A non-divergent estimation algorithm in the presence of unknown
+    correlations, American Control Conference 1997). `weight` computes w.
     """
     both = a - b
     dx, dy, axx, axy, ayy = both[0], both[1], a[2], a[3], a[4]
@@ -58,30 +64,29 @@ def intersect_batch(a: Array, b: Array) -> tuple[Array, Array]:
     both += b
     xx, xy, yy = both[2], both[3], both[4]
     share = w / (xx * yy - xy * xy)
-    # x = b + P w A⁻¹ (a - b): exactly b where the means agree.
+    # x = b + P w A⁻¹ (a - b): exactly b if the means agree.
     both[0] = b[0] + share * (yy * gx - xy * gy)
     both[1] = b[1] + share * (xx * gy - xy * gx)
     return both, w
 
 
 def weight(trace_a: Array, det_a: Array, trace_b: Array, det_b: Array, mixed: Array) -> Array:
-    """(...) the w nearest to a half for which the trace of (w A + (1 - w) B)⁻¹ is the least one, to within SLACK.
+    """Return the w nearest to 1/2 whose trace of (w A + (1 - w) B)⁻¹ is minimal within TRACE_TOLERANCE (...).
 
-    Given are the traces and determinants of A and B, 2 x 2 and positive definite, and the mixed discriminant
+    Arguments are the traces and determinants of A and B, 2 x 2 and positive definite, and the mixed discriminant
     a11 b22 + a22 b11 - 2 a12 b12. In two dimensions tr M⁻¹ = tr M / det M, here (u + v t) / (d + s t + p t²) with
     t = w - 1/2, which is convex. Its slope has the sign of v d - u s - 2 u p t - v p t².
     """
     p = det_a + det_b - mixed
     u, v = 0.5 * (trace_a + trace_b), trace_a - trace_b
     d, s = 0.25 * (det_a + det_b + mixed), det_a - det_b
-    # p = det(A - B). Not negative, one of the two is better in all directions. Else the slope grows all along
-    # [-1/2, 1/2], as |v| < 2 u, and this is its only root nearby, written without cancellation.
+    # p = det(A - B). If it is not negative, one estimate is better in all directions. Otherwise the slope increases on
+    # [-1/2, 1/2], because |v| < 2 u, and this is its only root there, computed without cancellation.
     part, rest = u * p, u * s - v * d
     mixes = p < 0.0
     root = rest / (np.sqrt(np.maximum(part * part - v * p * rest, 0.0)) - np.where(mixes, part, -1.0))
     best = np.where(mixes, np.minimum(np.maximum(root, -0.5), 0.5), np.copysign(0.5, v))
-    # Where the middle is too bad, go as far towards the best as need be: the root nearest to 0 of
-    # (u + v t) - limit (d + s t + p t²).
+    # If w = 1/2 exceeds the tolerance, the result is the root of (u + v t) - limit (d + s t + p t²) nearest to 0.
     limit = (1.0 + TRACE_TOLERANCE) * (u + v * best) / (d + best * (s + best * p))
     excess, slope = u - limit * d, v - limit * s
     if not (excess > 0.0).any():

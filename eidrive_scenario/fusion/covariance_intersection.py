@@ -1,4 +1,4 @@
-"""Late fusion by covariance intersection: every report brought to the same instant, errors of unknown correlation."""
+"""Late fusion by covariance intersection: tracks are predicted to a common time; error correlations are unknown."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.fusion.covariance import covariances, estimates, intersect_batch, means
 from eidrive_scenario.fusion.grouping import group_tracks
-from eidrive_scenario.fusion.headings import joined_heading
+from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import AssociationGate
 from eidrive_scenario.fusion.report_history import ReportHistory
@@ -23,13 +23,13 @@ from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 
 class CovarianceIntersectionSettings(Settings):
-    """The property `fusion_settings` of this method.
+    """Settings of covariance intersection (property `fusion_settings`).
 
-    gate           probability that two estimates of one object are within the gate
-    gate_distance  centers of one object are nearer than this where a report does not say how exact it is [m]
-    max_age        an object of which its station has said nothing for so long is forgotten, and a message later than
-                   this comes too late [s]. Objects at rest are told once a second (ETSI TS 103 324, T_GenCpmMax)
-    existence      an object is reported from this probability on that there is one; half is the likelier hypothesis
+    gate           probability that two estimates of one object are within the association gate
+    gate_distance  maximum distance between centers of one object if a report has no covariance [m]
+    max_age        time after the last report of an object at which its track is deleted, and maximum delay of reports
+                   [s]; objects at rest are reported once per second (ETSI TS 103 324, T_GenCpmMax)
+    existence      minimum existence probability of reported objects; from 0.5 existence is the likelier hypothesis
     """
 
     gate: float = Field(default=0.99, gt=0.0, lt=1.0)
@@ -39,14 +39,14 @@ class CovarianceIntersectionSettings(Settings):
 
 
 class CovarianceIntersectionFusion(FusionMethod):
-    """Keeps tracks of every station's objects, brings all to the present, and joins those of one object.
+    """Track-to-track fusion: tracks of every station are predicted to the current time and fused per object.
 
-    Within a station, reports follow each other in the order of measurement, however they arrive (see ReportMemory).
-    Between stations, nobody knows how errors depend on each other: the same model of motion, the same map, the same
-    look of an object from a like direction. Covariance intersection is right for any dependence, and so does not count
-    twice what it hears twice. Stations are taken in the order of their names; each object takes one track of a station
-    at most, as a station reports different objects. Probabilities of existence are those of different sensors, as
-    stations report only what their own detect: an object exists if at least one report is right, 1 - prod (1 - r).
+    Reports of one station are filtered in order of measurement, independent of their arrival (see ReportHistory). The
+    correlation of errors between stations is unknown: they share motion models, maps, and views of an object.
+    Covariance intersection is consistent for any correlation, and so avoids data incest. Stations are processed in
+    order of their names; each object has at most one track per station, because a station reports different objects.
+    Existence probabilities of stations are independent, because stations report only detections of their sensors: an
+    object exists if at least one report is correct, 1 - prod (1 - r).
     """
 
     settings_type: ClassVar[type[Settings] | None] = CovarianceIntersectionSettings
@@ -54,15 +54,15 @@ class CovarianceIntersectionFusion(FusionMethod):
     def __init__(self, settings: CovarianceIntersectionSettings | None = None) -> None:
         self.settings = settings or CovarianceIntersectionSettings()
         self._gate = AssociationGate.of(self.settings.gate, self.settings.gate_distance)
-        self._memory = ReportHistory(self.settings.max_age, self._gate)
+        self._history = ReportHistory(self.settings.max_age, self._gate)
 
     def add_report(self, report: Report) -> None:
-        self._memory.add_report(report)
+        self._history.add_report(report)
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
-        self._memory.evict_stale(now)
-        tracks = self._memory.tracks()
-        names = self._memory.stations
+        self._history.evict_stale(now)
+        tracks = self._history.tracks()
+        names = self._history.stations
         rank: dict[str | None, int] = {
             name: place for place, name in enumerate(sorted({report.station for report in reports}))
         }
@@ -75,16 +75,16 @@ class CovarianceIntersectionFusion(FusionMethod):
         predict_tracks(present, np.full(len(rows), now))
         present["station"] = station[rows]
         objects = group_tracks(present, self._gate)
-        return _joined(present, objects, now, self.settings.existence)
+        return _fuse_objects(present, objects, now, self.settings.existence)
 
 
-def _joined(tracks: Table, objects: list[list[int]], now: float, least: float) -> Detections:
-    """One box per object that is likely enough."""
+def _fuse_objects(tracks: Table, objects: list[list[int]], now: float, least: float) -> Detections:
+    """Return one box per object with an existence probability of at least `least`."""
     rows = np.array([row for members in objects for row in members], dtype=np.intp)
     starts = np.cumsum([0, *(len(members) for members in objects[:-1])])
     members = tracks[rows]
     existence = 1.0 - np.multiply.reduceat(1.0 - members["existence"], starts)
-    mean, covariance = _intersected(tracks, objects)
+    mean, covariance = _intersect_states(tracks, objects)
     known = np.logical_or.reduceat(members["moving"], starts)
     velocity = np.where(known[:, None], mean[:, 1], np.nan)
     weights = np.maximum(members["score"], 1e-6)
@@ -92,7 +92,7 @@ def _joined(tracks: Table, objects: list[list[int]], now: float, least: float) -
     body = np.add.reduceat(shares[:, None] * members["body"], starts, axis=0)
     boxes = np.empty((len(objects), 7))
     boxes[:, :2], boxes[:, 2:6] = mean[:, 0], body
-    boxes[:, 6] = joined_heading(members["heading"][:, 0], weights, starts, velocity)
+    boxes[:, 6] = fuse_headings(members["heading"][:, 0], weights, starts, velocity)
     votes = members["votes"] / np.maximum(members["votes"].sum(axis=1, keepdims=True), 1e-12)
     words = np.argmax(np.add.reduceat(weights[:, None] * votes, starts, axis=0), axis=1)
     fused = Detections(
@@ -108,11 +108,11 @@ def _joined(tracks: Table, objects: list[list[int]], now: float, least: float) -
     return fused if len(likely) == len(fused) else fused.subset(likely.tolist())
 
 
-def _intersected(tracks: Table, objects: list[list[int]]) -> tuple[Array, Array]:
-    """Positions and velocities (G, 2, 2) of the objects, and the covariances of their positions (G, 2, 2).
+def _intersect_states(tracks: Table, objects: list[list[int]]) -> tuple[Array, Array]:
+    """Return positions and velocities (G, 2, 2) of the objects, and covariances of their positions (G, 2, 2).
 
-    Position and velocity are intersected each for itself, as their units do not compare. Members are joined in pairs,
-    then those pairs, and so on: any order is consistent.
+    Position and velocity are intersected separately, because their units differ. Members are fused in pairs, then the
+    results in pairs, and so on: any order is consistent.
     """
     covariance = np.empty((len(tracks), 2, 2, 2))
     covariance[:, 0] = tracks["covariance"][:, :2, :2] + tracks["pose"]

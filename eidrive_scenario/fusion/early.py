@@ -1,4 +1,4 @@
-"""Early fusion: the points that others measured join the own ones before detection."""
+"""Early fusion: lidar points of other stations are merged with the own points before detection."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compressed
 
 
 class EarlyFusionSettings(CovarianceIntersectionSettings):
-    """The property `fusion_settings` of early fusion; the first four are for boxes of stations that share no points.
+    """Settings of early fusion (property `fusion_settings`). Inherited ones apply to stations without shared points.
 
-    cell         points are rounded to a grid of this cell before they are sent [m]
-    max_lateness points that were measured longer ago are not joined: they show where things were [s]
+    cell         cell size of the grid of transmitted points [m]
+    max_lateness maximum age of merged points; older ones show past positions [s]
     """
 
     cell: PositiveFloat = 0.1
@@ -31,11 +31,11 @@ class EarlyFusionSettings(CovarianceIntersectionSettings):
 
 
 class EarlyFusion(CovarianceIntersectionFusion):
-    """A station with this method sends its points beside its boxes, and looks for objects in all points that it has.
+    """Fusion of lidar points: a station sends its points with its boxes and detects objects in all available points.
 
-    Points are joined as they were measured: nothing knows how each of them moves, so that a late cloud shows moving
-    objects twice. Boxes of stations that share no points are joined by covariance intersection. What the station itself
-    reports are the objects in its own points alone, as others join those points themselves.
+    Points are merged as measured, because their motion is unknown. A late point cloud therefore shows moving objects
+    twice. Boxes of stations without shared points are fused by covariance intersection. The station reports only
+    objects in its own points, because receivers merge these points themselves.
     """
 
     settings_type: ClassVar[type[Settings] | None] = EarlyFusionSettings
@@ -45,25 +45,25 @@ class EarlyFusion(CovarianceIntersectionFusion):
         super().__init__(self.early)
 
     def shared_cloud(self, readings: Readings) -> PointCloud | None:
-        """The points of all LiDARs of a station as it sends them; None where none was read."""
+        """Return the points of all lidars of a station for transmission; None without a lidar reading."""
         if not readings.lidars:
             return None
         points = np.concatenate([_to_world(reading) for reading in readings.lidars.values()])
         return compressed(points, readings.time, self.early.cell)
 
-    def merge_readings(self, readings: Readings, heard: Sequence[Array]) -> Readings:
-        """The readings with points (N, 3) of others among those of the first LiDAR, as if it had measured them."""
-        if not readings.lidars or not heard:
+    def merge_readings(self, readings: Readings, received: Sequence[Array]) -> Readings:
+        """Return the readings with received points (N, 3) added to those of the first lidar."""
+        if not readings.lidars or not received:
             return readings
         name, first = next(iter(readings.lidars.items()))
         own = [_to_world(reading) for other, reading in readings.lidars.items() if other != name]
-        offset = np.concatenate([*own, *heard]) - first.pose[:3, 3]
+        offset = np.concatenate([*own, *received]) - first.pose[:3, 3]
         points = np.concatenate([first.points, offset @ first.pose[:3, :3]])
         intensity = np.concatenate([first.intensity, np.ones(len(offset))])
         return replace(readings, lidars={name: LidarReading(points, intensity, first.pose)})
 
 
 def _to_world(reading: LidarReading) -> Array:
-    """(N, 3)"""
+    """Return the points (N, 3) in the world frame [m]."""
     points: Array = reading.points @ reading.pose[:3, :3].T + reading.pose[:3, 3]
     return points

@@ -1,4 +1,4 @@
-"""Headings: filtered over time, joined on the circle, front and back told apart."""
+"""Headings: filtering over time, fusion on the circle, and disambiguation of front and back."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.tracking.motion_models import HEADING_DEVIATION, TURN_DENSITY, UNKNOWN_TURN
 
 SIGNIFICANT = 2.0
-"""A turn rate counts as known from so many of its standard deviations on; below, the object is taken to go straight."""
+"""Minimum turn rate in standard deviations; smaller rates are assumed to be 0."""
 FORGETTING = 0.8
-"""Of the votes for one end as the front, from report to report."""
+"""Factor of the accumulated votes for the front at each report."""
 
 
-def first_heading(yaw: Array) -> tuple[Array, Array]:
-    """Headings (N, 2), yaw and its rate, seen for the first time, and their covariances (N, 3): of yaw, both, rate."""
+def initiate_heading(yaw: Array) -> tuple[Array, Array]:
+    """Return initial headings (N, 2), yaw and yaw rate, and covariances (N, 3): yaw, cross term, yaw rate."""
     heading, covariance = np.zeros((len(yaw), 2)), np.empty((len(yaw), 3))
     heading[:, 0] = yaw
     covariance[:] = HEADING_DEVIATION**2, 0.0, UNKNOWN_TURN**2
     return heading, covariance
 
 
-def predicted_heading(heading: Array, covariance: Array, step: Array) -> tuple[Array, Array]:
-    """The same `step` (N,) seconds later: constant rate, white noise on it."""
+def predict_heading(heading: Array, covariance: Array, step: Array) -> tuple[Array, Array]:
+    """Return headings and covariances predicted by `step` (N,) [s]: constant yaw rate with white noise."""
     noise = TURN_DENSITY * np.abs(step)
     later = np.empty_like(covariance)
     own, both, rate = covariance[:, 0], covariance[:, 1], covariance[:, 2]
@@ -38,16 +38,16 @@ def predicted_heading(heading: Array, covariance: Array, step: Array) -> tuple[A
     return moved, later
 
 
-def known_turn(heading: Array, covariance: Array) -> Array:
-    """(N,) turn rates [rad/s], 0 where too little is known of them."""
+def significant_turn_rate(heading: Array, covariance: Array) -> Array:
+    """Return the turn rates (N,) [rad/s]; 0 if they are not significant."""
     rate = heading[:, 1]
     return np.where(rate * rate > SIGNIFICANT**2 * covariance[:, 2], rate, 0.0)
 
 
-def updated_heading(heading: Array, covariance: Array, facing: Array, yaw: Array) -> tuple[Array, Array, Array]:
-    """Heading, covariance and `facing` (N,) after a box was measured with this yaw (N,).
+def update_heading(heading: Array, covariance: Array, facing: Array, yaw: Array) -> tuple[Array, Array, Array]:
+    """Return heading, covariance and `facing` (N,) after a measurement of the yaw of a box (N,).
 
-    A box tells its axis; which end is the front is a vote of the reports, and may change.
+    A box determines its axis. The front is determined by votes of the reports and can change.
     """
     off = wrap_angle(yaw - heading[:, 0])
     against = np.abs(off) > math.pi / 2.0
@@ -62,12 +62,11 @@ def updated_heading(heading: Array, covariance: Array, facing: Array, yaw: Array
     return corrected, after, np.abs(votes)
 
 
-def joined_heading(yaw: Array, weights: Array, starts: NDArray[np.intp], velocity: Array) -> Array:
-    """(G,) one heading for each group of consecutive headings (K,) that begins at `starts` (G,), in (-pi, pi].
+def fuse_headings(yaw: Array, weights: Array, starts: NDArray[np.intp], velocity: Array) -> Array:
+    """Return one heading in (-pi, pi] for each group (G,) of consecutive headings (K,) that begins at `starts` (G,).
 
-    The axis is the weighted mean on the circle of doubled angles, so that it does not matter which end a report took
-    for the front. The front is where the greater weight says it is; where both ends have the same, where the object
-    drives to, `velocity` (G, 2), NaN where unknown.
+    The axis is the weighted circular mean of doubled angles, which is independent of the front of each report. The
+    front is that of the larger weight; for equal weights, that of the direction of `velocity` (G, 2), NaN if unknown.
     """
     counts = np.diff(starts, append=len(yaw))
     if len(counts) == len(yaw):

@@ -1,4 +1,4 @@
-"""The seam of fusion: a FusionMethod joins the reports of several stations."""
+"""Interface of fusion: a `FusionMethod` fuses the reports of several stations."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from eidrive_scenario.v2x.messages.message import StationState
 @fast_frozen
 @dataclass(frozen=True)
 class Report:
-    """What one station perceived, and how it reached this one: measured at `detections.time`, arrived at `arrived`.
+    """Detections of one station, measured at `detections.time` and received at `arrived` [s].
 
-    state     where the station said it was, if it did
-    complete  whether an object that is not in the list is no longer seen; else nothing is said of it
+    state     reported state of the station; None if it is not reported
+    complete  whether the list contains all detected objects; if False, objects that are not listed stay unchanged
     """
 
     station: str
@@ -30,19 +30,21 @@ class Report:
 
 
 class FusionMethod(ABC):
-    """Joins reports into one list of objects. Built anew for each station and run.
+    """Abstract base class of fusion methods, which fuse reports into one object list. One instance per station and run.
 
-    A class is registered in the entry points `eidrive_scenario.fusion`. It is built as `cls()`, or as `cls(settings)`
-    where it has a `settings_type`: an instance of that, read from the controller's property `fusion_settings`.
+    Classes are registered in the entry points `eidrive_scenario.fusion`. They are constructed as `cls()`, or, with a
+    `settings_type`, as `cls(settings)`. The settings are read from the controller property `fusion_settings`.
     """
 
     settings_type: ClassVar[type[Settings] | None] = None
-    """What the property `fusion_settings` may say; nothing where None."""
+    """Settings class of the property `fusion_settings`; None if the method has no settings."""
 
-    def add_report(self, report: Report) -> None:  # noqa: B027 - a hook for methods with a memory
-        """A report has come in: each one, in the order of arrival, before the next `fuse`. Also those that are older
-        than another of their station, and those that do not say all that their station knows."""
+    def add_report(self, report: Report) -> None:  # noqa: B027 - optional
+        """Process a received report. Every report is passed in order of arrival, before the next `fuse`.
+
+        This includes out-of-sequence and incomplete reports.
+        """
 
     @abstractmethod
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
-        """One box per object; `reports` holds at most the newest report of each station, the own one included."""
+        """Return one box per object; `reports` holds the newest report of each station, including the own one."""

@@ -1,4 +1,4 @@
-"""Pairs of estimates that may be of one object."""
+"""Association candidates: pairs of estimates within the gate."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from eidrive_scenario.fusion.association import assign
 Table = NDArray[np.void]
 Integers = NDArray[np.intp]
 
-LEFT_OVER = -2.0 * math.log(1e-6)
-"""One true pair in a hundred lies beyond a gate of 99 %, which would make two objects of one many times a second. What
-finds no partner within the gate is paired up to this squared Mahalanobis distance."""
+UNASSIGNED_GATE = -2.0 * math.log(1e-6)
+"""Maximum squared Mahalanobis distance of pairs of tracks without a partner within the gate.
+
+One true pair in a hundred is outside a gate of 99 %, which would split objects many times per second.
+"""
 CERTAIN = -1e3
-"""Cost of a pair whose station says that both are the same object: less than any other."""
+"""Cost of a pair with the same object id of a station: less than any other."""
 
 
 class AssociationGate(NamedTuple):
-    """When two positions may be of one object.
+    """Association gate of two positions.
 
-    chi_square  squared Mahalanobis distance at most
-    distance    where one of the two does not say how exact it is: between the centers at most [m]
+    chi_square  maximum squared Mahalanobis distance
+    distance    maximum distance between the centers if one covariance is unknown [m]
     """
 
     chi_square: float
@@ -33,13 +35,15 @@ class AssociationGate(NamedTuple):
 
     @classmethod
     def of(cls, probability: float, distance: float) -> AssociationGate:
-        """The gate that holds an estimate of the same object with this probability; in the plane, chi-square of 2."""
+        """Return the gate that contains estimates of the same object with this probability (chi-square, 2 degrees)."""
         return cls(-2.0 * math.log1p(-probability), distance)
 
 
 class Pairs(NamedTuple):
-    """Rows of the first and of the second table, what it costs to take both for one object, and whether that is within
-    the gate, or only for want of another partner."""
+    """Candidate pairs: rows of both tables, cost of the association, and whether the pair is inside the gate.
+
+    Pairs outside the gate are only used for tracks without another partner.
+    """
 
     first: list[int]
     second: list[int]
@@ -48,11 +52,11 @@ class Pairs(NamedTuple):
 
 
 def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_station: bool) -> Pairs:
-    """Pairs of tracks that may be one object: of the same station, or the second of a later one than the first.
+    """Return association candidates: tracks of the same station, or of two stations with the lower one first.
 
-    They may by the gate, by the station's own number, or because the center of one lies within half a width of the
-    other: two bodies cannot be in one place, however sure their reporters are that they stand apart. The cost is the
-    negative log-likelihood of the offset, but for constants.
+    Candidates are within the gate, have the same object id of the station, or have centers within half a width of each
+    other, because two bodies cannot overlap even if the covariances are small. The cost is the negative log-likelihood
+    of the offset without constants.
     """
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
@@ -85,32 +89,32 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
         certain = numbered[rows, columns]
         inside |= certain
         cost[certain] = CERTAIN
-    fits = inside | (~vague & (mahalanobis <= LEFT_OVER))
+    fits = inside | (~vague & (mahalanobis <= UNASSIGNED_GATE))
     return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
 
 
 def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
-    """Those chosen: first within the gate, then among the rows that are left over."""
+    """Return the assigned pairs: first within the gate, then among the unassigned rows."""
     if all(pairs.inside):
         return assign(pairs.first, pairs.second, pairs.cost)
-    chosen = (
+    assigned = (
         assign(*zip(*(pair[:3] for pair in zip(*pairs, strict=True) if pair[3]), strict=True))
         if any(pairs.inside)
         else []
     )
-    rows, columns = {row for row, _ in chosen}, {column for _, column in chosen}
+    rows, columns = {row for row, _ in assigned}, {column for _, column in assigned}
     rest = [
         (row, column, cost)
         for row, column, cost in zip(pairs.first, pairs.second, pairs.cost, strict=True)
         if row not in rows and column not in columns
     ]
-    return chosen + assign(*zip(*rest, strict=True)) if rest else chosen
+    return assigned + assign(*zip(*rest, strict=True)) if rest else assigned
 
 
 class _Side(NamedTuple):
-    """One side of the pairs, (N,) each: place, covariance of the place, width, and whether the place is vague.
+    """One side of the pairs, (N,) each: position, covariance, width, and whether the covariance is unknown.
 
-    reach  the farthest that any of the rules can take this side of a pair [m]
+    reach  maximum contribution of this side to the distance of a candidate pair [m]
     """
 
     x: Array
@@ -127,6 +131,6 @@ class _Side(NamedTuple):
         mean, covariance, pose, vague = (tracks[name] for name in ("mean", "covariance", "pose", "vague"))
         xx, yy = covariance[:, 0, 0] + pose[:, 0, 0], covariance[:, 1, 1] + pose[:, 1, 1]
         width = tracks["body"][:, 2]
-        statistical = math.sqrt(max(gate.chi_square, LEFT_OVER)) * np.sqrt(xx + yy)
+        statistical = math.sqrt(max(gate.chi_square, UNASSIGNED_GATE)) * np.sqrt(xx + yy)
         reach = np.maximum(statistical, np.where(vague, gate.distance, width))
         return cls(mean[:, 0], mean[:, 1], xx, covariance[:, 0, 1] + pose[:, 0, 1], yy, width, vague, reach)

@@ -1,4 +1,4 @@
-"""Where an object will be: constant velocity, or a turn of constant rate, each track by a step of its own."""
+"""Prediction of tracks by individual time steps: constant velocity, or coordinated turn."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _BOTH = np.eye(4, k=2) + np.eye(4, k=-2)
 
 
 def predict(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
-    """States (N, 4) x y vx vy and covariances (N, 4, 4), each `step` (N,) [s] later, turning by `turn` (N,) [rad/s].
+    """Return states (N, 4) x y vx vy and covariances (N, 4, 4), predicted by `step` (N,) [s].
 
-    White noise acceleration, and the coordinated turn of a known rate (Bar-Shalom, Li and Kirubarajan, Estimation with
-    applications to tracking and navigation, 2001, sections 6.3.2 and 11.7.1). A step may be negative, where a clock is
-    fast; then uncertainty grows as much.
+    The model is white noise acceleration with a coordinated turn of known rate `turn` (N,) [rad/s] (Bar-Shalom, Li and
+    Kirubarajan, Estimation with applications to tracking and navigation, 2001, sections 6.3.2 and 11.7.1). A step can
+    be negative if a clock is fast; the uncertainty grows by the same amount.
     """
     if not turn.any():
-        return _straight_on(mean, covariance, step)
+        return _predict_straight(mean, covariance, step)
     forward = np.zeros(covariance.shape)
     forward[:, 0, 0] = forward[:, 1, 1] = forward[:, 2, 2] = forward[:, 3, 3] = 1.0
     angle = turn * step
@@ -39,17 +39,17 @@ def predict(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[A
     return (forward @ mean[:, :, None])[:, :, 0], later
 
 
-def _straight_on(mean: Array, covariance: Array, step: Array) -> tuple[Array, Array]:
-    """The same without a turn. Tracks along the last axis: numpy is three times as fast along long axes."""
+def _predict_straight(mean: Array, covariance: Array, step: Array) -> tuple[Array, Array]:
+    """Return the prediction without a turn. Tracks are the last axis, which makes numpy three times as fast."""
     entries = np.ascontiguousarray(covariance.reshape(-1, 16).T).reshape(4, 4, -1)
     place, both, speed = entries[:2, :2], entries[:2, 2:], entries[2:, 2:]
     noise = ACCELERATION_DENSITY * np.abs(step) * np.eye(2)[:, :, None]
-    way = step * speed
+    change = step * speed
     later = np.empty_like(entries)
     later[2:, 2:] = speed + noise
-    later[:2, 2:] = both + way + 0.5 * step * noise
+    later[:2, 2:] = both + change + 0.5 * step * noise
     later[2:, :2] = later[:2, 2:].swapaxes(0, 1)
-    later[:2, :2] = place + step * (both + both.swapaxes(0, 1) + way + (step / 3.0) * noise)
+    later[:2, :2] = place + step * (both + both.swapaxes(0, 1) + change + (step / 3.0) * noise)
     moved = mean.copy()
     moved[:, :2] += step[:, None] * mean[:, 2:]
     return moved, later.reshape(16, -1).T.reshape(-1, 4, 4)

@@ -1,4 +1,4 @@
-"""Reports in the order in which they were measured, however late they arrive: roll back, and filter again."""
+"""Processing of out-of-sequence reports by rollback and refiltering."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from eidrive_scenario.fusion.tracks import TRACK, Table, update_tracks
 
 
 class _Entry(NamedTuple):
-    """A report of one station, and a table that holds the station's tracks just after it."""
+    """Report of one station, and a table with the tracks of the station after it."""
 
     report: Report
     tracks: Table
@@ -24,7 +24,7 @@ class _Entry(NamedTuple):
 
 @dataclass
 class _History:
-    """What is remembered of one station; nothing before `begin` [s], and that not any more."""
+    """Stored reports of one station; reports up to `begin` [s] are no longer accepted."""
 
     entries: list[_Entry] = field(default_factory=list)
     new: list[Report] = field(default_factory=list)
@@ -32,43 +32,44 @@ class _History:
 
 
 class ReportHistory:
-    """The tracks of every station as its reports make them, and the reports of the last `span` seconds.
+    """Tracks of every station, and its reports of the last `span` seconds.
 
-    A report older than another of its station rolls the station's tracks back to the last report before it, and takes
-    in anew what came after: the result is that of reports which arrive in the order of their measurement. This is the
-    exact treatment of out-of-sequence measurements, paid for with memory (Bar-Shalom, Update with out-of-sequence
-    measurements in tracking: exact solution, IEEE Transactions on Aerospace and Electronic Systems 38, 2002). One that
-    is older than all that is remembered comes too late. Of two of one instant the one that arrives last counts.
+    An out-of-sequence report rolls the tracks of its station back to the last earlier report, and later reports are
+    filtered again. The result equals that of reports in order of measurement. This is the exact solution for
+    out-of-sequence measurements at the cost of memory (Bar-Shalom, Update with out-of-sequence measurements in
+    tracking: exact solution, IEEE Transactions on Aerospace and Electronic Systems 38, 2002). Reports older than all
+    stored ones are ignored. Of two reports with the same time the last received one is used.
     """
 
     def __init__(self, span: float, gate: AssociationGate) -> None:
         self.span = span
         self.stations: list[str | None] = []
-        """Rows of `tracks` name a station by its place here; places of those who are forgotten are None, or reused."""
+        """Station names; rows of `tracks` refer to their index. Slots of evicted stations are None or reused."""
         self._gate = gate
         self._tracks: Table = np.zeros(0, TRACK)
         self._histories: list[_History] = []
         self._places: dict[str, int] = {}
 
     def add_report(self, report: Report) -> None:
-        """Remember a report; it enters the tracks when they are next asked for."""
+        """Store a report. It is processed at the next call of `tracks`."""
         place = self._places.get(report.station)
         if place is None:
             place = self._places[report.station] = self._allocate_slot(report.station)
         self._histories[place].new.append(report)
 
     def evict_stale(self, now: float) -> None:
-        """Drop the stations that have been silent for so long that nothing of what is known of them can count again.
+        """Evict stations whose last report is older than twice the retention time.
 
-        What is older than `span` is not used, and no newer report can continue a track that ended `span` before it.
+        Reports older than `span` [s] are not used, and no later report can continue a track that ended more than
+        `span` earlier.
         """
-        silent = [
+        stale = [
             place
             for place in self._places.values()
             if not (history := self._histories[place]).new
             and (not history.entries or history.entries[-1].report.detections.time < now - 2.0 * self.span)
         ]
-        for place in silent:
+        for place in stale:
             name = self.stations[place]
             assert name is not None
             del self._places[name]
@@ -85,7 +86,7 @@ class ReportHistory:
         return len(self.stations) - 1
 
     def tracks(self) -> Table:
-        """What all reports so far say, a row for each object of each station, as of its station's newest report."""
+        """Return the tracks after all reports: one row per station and object, at the newest report of the station."""
         due = {
             station: reports
             for station, history in enumerate(self._histories)
@@ -97,7 +98,7 @@ class ReportHistory:
         return self._tracks
 
     def _due(self, station: int, history: _History) -> Sequence[Report]:
-        """The reports that have yet to enter the tracks of a station, in order; what came after them is rolled back."""
+        """Return the unprocessed reports of a station in order, after rollback of the tracks to the first of them."""
         reports = [entry.report for entry in history.entries]
         kept = len(reports)
         for report in history.new:

@@ -1,4 +1,4 @@
-"""What one station has said of each object so far: a table of estimates, a row per station and object."""
+"""Table of tracks: one estimate per station and object."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
-from eidrive_scenario.fusion.headings import first_heading, known_turn, predicted_heading, updated_heading
+from eidrive_scenario.fusion.headings import initiate_heading, predict_heading, significant_turn_rate, update_heading
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, assigned_pairs, gated_pairs
 from eidrive_scenario.fusion.prediction import predict
@@ -24,39 +24,39 @@ Table = NDArray[np.void]
 TRACK = np.dtype(
     [
         ("station", "i8"),
-        ("number", "i8"),  # the station's own for the object, -1 where it has none
-        ("time", "f8"),  # of the estimate [s]
-        ("seen", "f8"),  # when the station last saw the object [s]
+        ("number", "i8"),  # object id of the station, -1 without one
+        ("time", "f8"),  # time of the estimate [s]
+        ("seen", "f8"),  # last detection by the station [s]
         ("mean", "f8", (4,)),  # x y vx vy [m, m/s]
         ("covariance", "f8", (4, 4)),
-        ("pose", "f8", (2, 2)),  # of x y, from where the station may really have been [m²]
-        ("vague", "?"),  # the station does not say how exact its positions are
+        ("pose", "f8", (2, 2)),  # of x y, caused by the pose covariance of the station [m²]
+        ("vague", "?"),  # the covariance of the position is unknown
         ("moving", "?"),  # the velocity is known
-        ("judged", "?"),  # the station itself tracks the object, and states its existence
+        ("judged", "?"),  # the station tracks the object and reports its existence probability
         ("body", "f8", (4,)),  # z l w h [m]
-        ("weight", "f8"),  # of the body: the sum of scores
+        ("weight", "f8"),  # weight of the body: sum of scores
         ("heading", "f8", (2,)),  # yaw and its rate [rad, rad/s]
-        ("heading_covariance", "f8", (3,)),  # of yaw, both, rate
-        ("facing", "f8"),  # how sure the front is the front
+        ("heading_covariance", "f8", (3,)),  # yaw, cross term, rate
+        ("facing", "f8"),  # votes for the front
         ("score", "f8"),
-        ("existence", "f8"),  # probability that there is such an object
+        ("existence", "f8"),  # existence probability
         ("votes", "f8", (len(CLASSES),)),
     ],
-    align=True,  # else numpy copies every number that stands behind a flag before it reckons with it
+    align=True,  # otherwise numpy copies every unaligned number before an operation
 )
 
-LEAST_EXISTENCE = 0.05
-"""Below this an object is given up; as `delete_existence` of trackers."""
-MOST_WEIGHT = 10.0
-"""So many sure reports of the size count at most, so that it can still change."""
+MIN_EXISTENCE = 0.05
+"""Minimum existence probability of a track; below, it is deleted, as by `delete_existence` of trackers."""
+MAX_WEIGHT = 10.0
+"""Maximum weight of earlier reports of the size, so that it can still change."""
 _ROW_OF_CLASS = {name: row for row, name in enumerate(CLASSES)}
 _MISC = _ROW_OF_CLASS["misc"]
 
 
 def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table:
-    """The objects of reports, a row each in their order, as if nothing had been known of them before.
+    """Return new tracks of the objects in reports, one row each, in order.
 
-    A box that is not finite, or has no size, is left out.
+    Boxes that are not finite or have no size are omitted.
     """
     lists = [report.detections for report in reports]
     boxes = np.concatenate([found.boxes for found in lists])
@@ -78,7 +78,7 @@ def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table
     table["moving"] = moving
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
     covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
-    table["heading"], table["heading_covariance"] = first_heading(boxes[:, 6])
+    table["heading"], table["heading_covariance"] = initiate_heading(boxes[:, 6])
     table["facing"] = 1.0
     table["station"] = np.repeat(stations, counts)
     table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
@@ -98,10 +98,10 @@ def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table
 
 
 def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
-    """(N, 2, 2) what the covariance (3, 3) of a station's x, y, yaw at (x, y) adds to points (N, 2) that it measured.
+    """Return the covariance (N, 2, 2) of measured points (N, 2) caused by the pose covariance (3, 3) of a station.
 
-    J P Jᵀ with J = [I | R'(ψ) p] for p in the station's frame, here by the points in the world: R'(ψ) p is the arm from
-    the station to the point, turned by a right angle.
+    The pose is x, y, yaw at (x, y). The result is J P Jᵀ with J = [I | R'(ψ) p] for p in the frame of the station. In
+    the world frame, R'(ψ) p is the vector from the station to the point, rotated by a right angle.
     """
     jacobian = np.zeros((len(points), 2, 3))
     jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
@@ -110,15 +110,15 @@ def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
 
 
 def predict_tracks(tracks: Table, time: Array) -> None:
-    """Predict these tracks to other times (N,) [s]."""
+    """Predict the tracks to `time` (N,) [s]."""
     step = time - tracks["time"]
     if not step.any():
         return
     mean, covariance, heading, of_heading = (
         tracks[name] for name in ("mean", "covariance", "heading", "heading_covariance")
     )
-    mean[:], covariance[:] = predict(mean, covariance, step, known_turn(heading, of_heading))
-    heading[:], of_heading[:] = predicted_heading(heading, of_heading, step)
+    mean[:], covariance[:] = predict(mean, covariance, step, significant_turn_rate(heading, of_heading))
+    heading[:], of_heading[:] = predict_heading(heading, of_heading, step)
     tracks["existence"] *= np.exp(np.abs(step) / -LIFETIME)
     tracks["time"] = time
 
@@ -126,11 +126,11 @@ def predict_tracks(tracks: Table, time: Array) -> None:
 def update_tracks(
     tracks: Table, stations: Sequence[int], reports: Sequence[Report], gate: AssociationGate, max_age: float
 ) -> Table:
-    """The tracks after one report of each of these stations, none of which is older than what is known of it.
+    """Return the tracks after one report of each of these stations, in sequence for each station.
 
-    What a station has not seen for `max_age` seconds it does not know any more. Tracks of other stations stay as they
-    are. A report with velocities replaces what was known: its sender has seen the object over time, and to filter it
-    again would count its past twice. Positions alone go through a Kalman filter.
+    Tracks that the station did not detect for `max_age` seconds are deleted. Tracks of other stations are unchanged. A
+    report with velocities replaces the state, because its sender has filtered the object, and filtering it again would
+    count its past twice. Reports with positions only are filtered by a Kalman filter.
     """
     born = initiate_tracks(stations, reports)
     time_of = np.full(max(stations, default=0) + 1 + int(tracks["station"].max(initial=0)), np.nan)
@@ -145,15 +145,15 @@ def update_tracks(
     columns = np.array([column for _, column in pairs], dtype=np.intp)
     if len(rows) == len(old):
         order = np.argsort(rows)
-        old = _updated(old, born[columns[order]])
+        old = _update(old, born[columns[order]])
     else:
-        old[rows] = _updated(old[rows], born[columns])
+        old[rows] = _update(old[rows], born[columns])
         missed = np.ones(len(old), dtype=bool)
         missed[rows] = False
         tracked = {station for station, report in zip(stations, reports, strict=True) if report.detections.tracks}
-        silent = {station for station, report in zip(stations, reports, strict=True) if not report.complete}
-        _coast(old, missed, tracked, silent)
-        old = old[old["existence"] >= LEAST_EXISTENCE]
+        incomplete = {station for station, report in zip(stations, reports, strict=True) if not report.complete}
+        _coast(old, missed, tracked, incomplete)
+        old = old[old["existence"] >= MIN_EXISTENCE]
     parts = [old]
     if not concerned.all():
         parts.insert(0, tracks[~concerned])
@@ -164,21 +164,21 @@ def update_tracks(
     return old if len(parts) == 1 else np.concatenate(parts)
 
 
-def _updated(old: Table, new: Table) -> Table:
-    """Tracks, predicted to the time of a report, with the boxes `new` of that report, which become the answer."""
+def _update(old: Table, new: Table) -> Table:
+    """Update predicted tracks with the boxes `new` of a report; return `new` with the updated state."""
     after = new
     still = ~new["moving"]
     if still.any():
         before, given = old[still], new[still]
-        # A station that tracks has counted its past; of others each report is news.
+        # The existence probability of a tracking station includes its past; other reports are independent.
         after["existence"][still] = np.where(given["judged"], given["existence"], _existence_after(before, given))
-        mean, covariance = _filtered(before, given)
+        mean, covariance = _kalman_update(before, given)
         after["mean"][still], after["covariance"][still] = mean, covariance
         after["moving"][still] = True
-    after["heading"], after["heading_covariance"], after["facing"] = updated_heading(
+    after["heading"], after["heading_covariance"], after["facing"] = update_heading(
         old["heading"], old["heading_covariance"], old["facing"], new["heading"][:, 0]
     )
-    weight = np.minimum(old["weight"], MOST_WEIGHT)
+    weight = np.minimum(old["weight"], MAX_WEIGHT)
     total = weight + new["weight"]
     share = np.divide(new["weight"], total, out=np.zeros(len(total)), where=total > 0.0)
     after["body"] = old["body"] + share[:, None] * (new["body"] - old["body"])
@@ -188,7 +188,7 @@ def _updated(old: Table, new: Table) -> Table:
 
 
 def _existence_after(old: Table, new: Table) -> Array:
-    """(N,) probabilities of existence of tracks that are detected again, as in `perception.existence`."""
+    """Return the existence probabilities (N,) of detected tracks, as in `perception.tracking.existence`."""
     spread = old["covariance"][:, :2, :2] + new["covariance"][:, :2, :2]
     offset = new["mean"][:, :2] - old["mean"][:, :2]
     x, y, a, b, d = offset[:, 0], offset[:, 1], spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
@@ -197,8 +197,8 @@ def _existence_after(old: Table, new: Table) -> Array:
     return detected(old["existence"], likelihood_ratio(squared, determinant, new["score"]))
 
 
-def _filtered(old: Table, new: Table) -> tuple[Array, Array]:
-    """Kalman's update by the positions of `new`, in Joseph's form."""
+def _kalman_update(old: Table, new: Table) -> tuple[Array, Array]:
+    """Return state and covariance after a Kalman update by the positions of `new`, in Joseph form."""
     covariance, noise = old["covariance"], new["covariance"][:, :2, :2]
     gain = covariance[:, :, :2] @ np.linalg.inv(covariance[:, :2, :2] + noise)
     innovation = new["mean"][:, :2] - old["mean"][:, :2]
@@ -208,11 +208,14 @@ def _filtered(old: Table, new: Table) -> tuple[Array, Array]:
     return old["mean"] + (gain @ innovation[:, :, None])[:, :, 0], after
 
 
-def _coast(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], silent: set[int]) -> None:
-    """Objects that a report does not show: they may be gone. A station that tracks has judged that itself."""
+def _coast(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], incomplete: set[int]) -> None:
+    """Reduce the existence probability of tracks after a missed detection; delete those of tracking stations.
+
+    Tracks of stations with incomplete reports are unchanged.
+    """
     for row in np.flatnonzero(missed).tolist():
         station = int(tracks["station"][row])
-        if station in silent:
+        if station in incomplete:
             continue
         before = min(float(tracks["existence"][row]), 0.999)
         after = 0.0 if station in tracked else float(after_miss(np.array(before)))
@@ -221,8 +224,10 @@ def _coast(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], silent: 
 
 
 def _make_plausible(covariance: Array) -> NDArray[np.bool_]:
-    """Fill in the positions of covariances (N, 4, 4) that are unknown, raise those too small to be true; which (N,)
-    were unknown."""
+    """Replace unknown position covariances in (N, 4, 4) and raise implausibly small ones.
+
+    Return whether each was unknown (N,).
+    """
     xx, yy = covariance[:, 0, 0], covariance[:, 1, 1]
     vague: NDArray[np.bool_] = ~np.isfinite(xx + yy + covariance[:, 0, 1])
     if vague.any():

@@ -1,4 +1,4 @@
-"""Reports as stations would make them."""
+"""Fixtures that build reports and fuse them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def make_report(
     arrived: float | None = None,
     state: StationState | None = None,
 ) -> Report:
-    """A report of objects at these places; `covariance` is a variance or one or more matrices."""
+    """Return a report of objects at these positions; `covariance` is a variance or one or more matrices."""
     count = len(places)
     boxes = np.zeros((count, 7))
     boxes[:, :2] = np.array(places, dtype=float).reshape(count, 2)
@@ -54,7 +54,7 @@ def make_report(
 def fuse_reports(
     reports: Sequence[Report], now: float, fusion: CovarianceIntersectionFusion | None = None
 ) -> Detections:
-    """What is known at `now` after these reports have come in, in this order."""
+    """Return the fused objects at `now` after these reports, received in this order."""
     fusion = fusion or CovarianceIntersectionFusion()
     newest: dict[str, Report] = {}
     for report in reports:

@@ -1,4 +1,4 @@
-"""Late fusion by hand."""
+"""Late fusion by averaging, with expectations calculated by hand."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def fuse(*reports: Report) -> Detections:
     return AverageFusion().fuse(reports, 1.0)
 
 
-def test_three_reports_of_one_car_give_one_box() -> None:
-    """The published code pairs boxes and leaves the third one over."""
+def test_average_of_three_reports_of_one_car_is_one_box() -> None:
+    """The published code pairs boxes and keeps the third one."""
     fused = fuse(report("A", (10.0, 0.0)), report("B", (11.0, 0.6)), report("C", (12.0, 0.0)))
     assert len(fused) == 1
     np.testing.assert_allclose(fused.boxes[0, :3], [11.0, 0.2, 0.75])
     assert fused.time == 1.0
 
 
-def test_position_size_and_velocity_are_means_and_yaw_is_one_on_the_circle() -> None:
+def test_average_box_has_mean_position_size_velocity_and_circular_yaw() -> None:
     fused = fuse(
         report("A", (10, 0), yaw=math.radians(179), length=4.0, velocity=(2.0, 0.0), covariance=1.0),
         report("B", (12, 0), yaw=math.radians(-177), length=5.0),
@@ -63,7 +63,7 @@ def test_position_size_and_velocity_are_means_and_yaw_is_one_on_the_circle() -> 
     np.testing.assert_allclose(fused.covariance[0], np.eye(2) * 1.5)
 
 
-def test_a_lone_box_stays_as_it_is() -> None:
+def test_average_of_a_single_box_is_unchanged() -> None:
     fused = fuse(report("A", (10, 0)), report("B", (30, 0), yaw=1.0, velocity=(1.0, 2.0), kind="truck"))
     assert len(fused) == 2
     np.testing.assert_array_equal(fused.boxes[1], [30, 0, 0.75, 4.5, 1.8, 1.5, 1.0])
@@ -72,20 +72,20 @@ def test_a_lone_box_stays_as_it_is() -> None:
     assert fused.classes == ("car", "truck")
 
 
-def test_the_gate_is_four_meters() -> None:
+def test_average_gate_is_four_meters() -> None:
     assert len(fuse(report("A", (10, 0)), report("B", (13.99, 0)))) == 1
     assert len(fuse(report("A", (10, 0)), report("B", (14.0, 0)))) == 2
 
 
-def test_two_cars_of_one_station_stay_two_however_near() -> None:
+def test_average_keeps_close_cars_of_one_station_separate() -> None:
     fused = fuse(report("A", (10, 0), (10, 2.5)), report("B", (10, 0.2), (10, 2.7)))
     assert len(fused) == 2
     np.testing.assert_allclose(np.sort(fused.boxes[:, 1]), [0.1, 2.6])
     assert len(fuse(report("A", (10, 0), (10, 2.5)))) == 2
 
 
-def test_each_box_goes_to_one_object_with_the_least_total_distance() -> None:
-    """B's middle box is nearest to A's left one, but then its right one would find none within the gate."""
+def test_associate_minimizes_total_distance_of_the_maximum_assignment() -> None:
+    """The nearest pair is not assigned, because the other boxes would then be outside the gate."""
     pairs = associate(
         np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]), np.array([[2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]]), gate=4.0
     )
@@ -94,14 +94,14 @@ def test_each_box_goes_to_one_object_with_the_least_total_distance() -> None:
     assert associate(np.empty((0, 3)), np.zeros((2, 3)), gate=4.0) == []
 
 
-def test_classes_are_not_compared_and_the_most_frequent_one_wins() -> None:
+def test_average_class_is_the_most_frequent_one() -> None:
     fused = fuse(
         report("A", (10, 0), kind="van"), report("B", (10, 0), kind="truck"), report("C", (10, 0), kind="truck")
     )
     assert fused.classes == ("truck",)
 
 
-def test_no_reports_and_empty_ones() -> None:
+def test_average_with_missing_and_empty_reports() -> None:
     assert len(fuse()) == 0
     assert len(fuse(report("A"), report("B"))) == 0
     assert len(fuse(report("A"), report("B", (1, 1)))) == 1
@@ -112,7 +112,7 @@ PLACES = st.lists(st.tuples(st.floats(-60, 60), st.floats(-60, 60)), max_size=5)
 
 @settings(max_examples=60, deadline=None)
 @given(PLACES, PLACES, PLACES)
-def test_the_order_of_the_reports_does_not_matter(a: list, b: list, c: list) -> None:  # type: ignore[type-arg]
+def test_average_is_independent_of_the_order_of_reports(a: list, b: list, c: list) -> None:  # type: ignore[type-arg]
     reports = [report("A", *a), report("B", *b), report("C", *c)]
     first = fuse(*reports)
     most = max(len(a), len(b), len(c))
@@ -125,20 +125,22 @@ def test_the_order_of_the_reports_does_not_matter(a: list, b: list, c: list) -> 
 
 @settings(max_examples=40, deadline=None)
 @given(st.floats(-3, 3), st.floats(-50, 50), st.floats(-50, 50))
-def test_turning_and_shifting_the_world_turns_and_shifts_the_result(angle: float, dx: float, dy: float) -> None:
+def test_average_is_equivariant_under_rotation_and_translation(angle: float, dx: float, dy: float) -> None:
     places = {"A": [(10.0, 0.0), (30.0, 5.0)], "B": [(11.0, 1.0), (31.0, 4.0)], "C": [(10.5, -1.0)]}
     cos, sin = math.cos(angle), math.sin(angle)
 
-    def moved(x: float, y: float) -> tuple[float, float]:
+    def transform(x: float, y: float) -> tuple[float, float]:
         return cos * x - sin * y + dx, sin * x + cos * y + dy
 
     plain = fuse(*(report(name, *points) for name, points in places.items()))
-    turned = fuse(*(report(name, *(moved(*point) for point in points), yaw=angle) for name, points in places.items()))
-    np.testing.assert_allclose(turned.boxes[:, :2], [moved(*box[:2]) for box in plain.boxes], atol=1e-9)
-    np.testing.assert_allclose(np.cos(turned.boxes[:, 6] - angle), 1.0)
+    rotated = fuse(
+        *(report(name, *(transform(*point) for point in points), yaw=angle) for name, points in places.items())
+    )
+    np.testing.assert_allclose(rotated.boxes[:, :2], [transform(*box[:2]) for box in plain.boxes], atol=1e-9)
+    np.testing.assert_allclose(np.cos(rotated.boxes[:, 6] - angle), 1.0)
 
 
-def test_it_comes_through_its_entry_point() -> None:
+def test_average_is_registered_as_entry_point() -> None:
     assert registry("fusion").load("average") is AverageFusion
 
 
@@ -148,8 +150,9 @@ perhaps = st.one_of(number, st.just(math.nan))
 
 @st.composite
 def several_reports(draw: st.DrawFn) -> tuple[list[Detections], list[int]]:
-    """Boxes of one to four stations, and which object each is: numbered as they appear, one to a station at most."""
-    reports, labels = [], []
+    """Draw boxes of one to four stations and the object of each, numbered by appearance, at most one per station."""
+    reports: list[Detections] = []
+    labels: list[int] = []
     for _ in range(draw(st.integers(1, 4))):
         count = draw(st.integers(1, 4))
         known = max(labels, default=-1) + 1
@@ -170,7 +173,7 @@ def several_reports(draw: st.DrawFn) -> tuple[list[Detections], list[int]]:
 
 @settings(max_examples=150, deadline=None)
 @given(several_reports())
-def test_few_and_many_boxes_are_joined_alike(given: tuple[list[Detections], list[int]]) -> None:
+def test_fuse_average_and_fuse_average_small_agree(given: tuple[list[Detections], list[int]]) -> None:
     few, many = fuse_average_small(*given, 1.0), fuse_average(*given, 1.0)
     assert (few.time, few.classes) == (many.time, many.classes)
     np.testing.assert_allclose(few.boxes[:, :6], many.boxes[:, :6], atol=1e-12)

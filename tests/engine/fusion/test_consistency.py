@@ -1,4 +1,4 @@
-"""Whether the error is as large as the covariance says, over 1,000 draws."""
+"""Consistency of fusion: normalized squared errors over 1,000 draws."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ Fuse = Callable[..., Detections]
 
 DRAWS = 1000
 UPPER = 1.09
-"""Of the mean of 1,000 normalized squared errors per dimension, if they are those of the covariance: a chi-square with
-2,000 degrees of freedom, over 2,000, is below 1.0 + 2.8 · sqrt(2 / 2000) with 99.7 %."""
+"""Maximum mean of 1,000 normalized squared errors per dimension of a consistent estimate.
+
+A chi-square of 2,000 degrees of freedom, divided by 2,000, is below 1.0 + 2.8 · sqrt(2 / 2000) with 99.7 %.
+"""
 
 
 def normalized(fused: Detections, truth: np.ndarray) -> np.ndarray:
-    """Squared errors (N,) in units of the covariance, per dimension."""
+    """Return the normalized squared errors (N,) per dimension."""
     nearest = np.argmin(np.linalg.norm(fused.boxes[:, None, :2] - truth, axis=2), axis=0)
     error = fused.boxes[nearest, :2] - truth
     found: np.ndarray = np.einsum("ni,nij,nj->n", error, np.linalg.inv(fused.covariance[nearest]), error) / 2.0
@@ -31,24 +33,26 @@ def normalized(fused: Detections, truth: np.ndarray) -> np.ndarray:
 
 
 def field(count: int) -> np.ndarray:
-    """Objects on a grid so wide that nobody takes one for another."""
+    """Return objects on a grid that is wider than the association gate."""
     return np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2) * 30.0
 
 
 @pytest.mark.parametrize(
     ("correlation", "expected", "independent"), [(0.0, 0.50, 1.00), (0.5, 0.70, 1.40), (0.9, 0.86, 1.72)]
 )
-def test_two_stations_whose_errors_depend_on_each_other(
+def test_fusion_with_correlated_errors_is_consistent(
     correlation: float, expected: float, independent: float, report: Make, fuse: Fuse
 ) -> None:
-    """Each is exact in one direction: diag(0.25, 1) and diag(1, 0.25) m². Taking the errors for independent would be
-    over-confident by the last number; see test_intersection for the expected values."""
+    """Covariances are diag(0.25, 1) and diag(1, 0.25) m². See test_covariance for the expected values.
+
+    `independent` is the normalized error of fusion that assumes independence, which is overconfident.
+    """
     rng = generator(11, "stations", round(10 * correlation))
     a, b = np.diag([0.25, 1.0]), np.diag([1.0, 0.25])
     cross = 0.5 * correlation * np.eye(2)
     root = np.linalg.cholesky(np.block([[a, cross], [cross, b]]))
     truth = field(10)
-    found, blind = [], []
+    found, naive = [], []
     for _ in range(DRAWS // len(truth)):
         errors = rng.normal(size=(len(truth), 4)) @ root.T
         first, second = truth + errors[:, :2], truth + errors[:, 2:]
@@ -57,15 +61,14 @@ def test_two_stations_whose_errors_depend_on_each_other(
         found.append(normalized(fused, truth))
         information = np.linalg.inv(a) + np.linalg.inv(b)
         both = errors[:, :2] @ np.linalg.inv(a) + errors[:, 2:] @ np.linalg.inv(b)
-        blind.append(np.einsum("ni,ij,nj->n", both, np.linalg.inv(information), both) / 2.0)
+        naive.append(np.einsum("ni,ij,nj->n", both, np.linalg.inv(information), both) / 2.0)
     assert np.mean(found) == pytest.approx(expected, rel=0.1)
     assert np.mean(found) < UPPER
-    assert np.mean(blind) == pytest.approx(independent, rel=0.1)
+    assert np.mean(naive) == pytest.approx(independent, rel=0.1)
 
 
-def test_positions_over_time_brought_to_now(report: Make, fuse: Fuse) -> None:
-    """Cars under white noise acceleration, positions with white errors, told 0.3 s late: the filter's own model, so
-    that the mean is 1."""
+def test_fusion_of_late_positions_is_consistent(report: Make, fuse: Fuse) -> None:
+    """White noise acceleration, white position errors and a delay of 0.3 s match the filter model: the mean is 1."""
     rng = generator(12, "filter")
     truth = field(10)
     found = []
@@ -88,8 +91,8 @@ def test_positions_over_time_brought_to_now(report: Make, fuse: Fuse) -> None:
     assert 0.9 < np.mean(found) < UPPER
 
 
-def test_a_sender_that_is_not_where_it_says(report: Make, fuse: Fuse) -> None:
-    """Ten reports with one wrong pose: the error stays, and the covariance knows."""
+def test_fusion_with_pose_error_of_the_sender_is_consistent(report: Make, fuse: Fuse) -> None:
+    """Ten reports with the same pose error: filtering does not reduce it, and the covariance includes it."""
     rng = generator(13, "pose")
     deviations = np.array([0.3, 0.3, math.radians(0.8)])
     truth = np.array([[40.0, 10.0]])

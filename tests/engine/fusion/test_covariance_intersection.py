@@ -1,4 +1,4 @@
-"""Late fusion by covariance intersection: what comes out of reports."""
+"""Late fusion by covariance intersection: fused objects of reports."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ Fuse = Callable[..., Detections]
 Place = tuple[float, float]
 
 
-def test_it_comes_through_its_entry_point() -> None:
+def test_covariance_intersection_is_registered_as_entry_point() -> None:
     assert registry("fusion").load("covariance_intersection") is CovarianceIntersectionFusion
 
 
-def test_three_reports_of_one_car_give_one_box(report: Make, fuse: Fuse) -> None:
+def test_fuse_three_reports_of_one_car_returns_one_box(report: Make, fuse: Fuse) -> None:
     fused = fuse(
         [report(name, 1.0, [place]) for name, place in (("A", (10.0, 0.0)), ("B", (10.3, 0.2)), ("C", (10.0, -0.2)))],
         1.0,
@@ -41,7 +41,7 @@ def test_three_reports_of_one_car_give_one_box(report: Make, fuse: Fuse) -> None
     assert fused.scores[0] == pytest.approx(1.0 - 0.1**3)
 
 
-def test_a_lone_report_of_now_is_passed_on(report: Make, fuse: Fuse) -> None:
+def test_fuse_single_current_report_is_unchanged(report: Make, fuse: Fuse) -> None:
     given = report("A", 1.0, [(10.0, 3.0)], yaw=0.7, velocity=(4.0, 1.0), kind="truck", size=(8.0, 2.5, 3.0))
     fused = fuse([given], 1.0)
     np.testing.assert_allclose(fused.boxes, given.detections.boxes, rtol=1e-14)
@@ -52,38 +52,38 @@ def test_a_lone_report_of_now_is_passed_on(report: Make, fuse: Fuse) -> None:
     assert np.isnan(fuse([report("A", 1.0, [(10.0, 3.0)])], 1.0).velocity).all()
 
 
-def test_cars_that_are_apart_stay_apart(report: Make, fuse: Fuse) -> None:
+def test_fuse_keeps_distant_cars_separate(report: Make, fuse: Fuse) -> None:
     places = [(10.0, 0.0), (10.0, 3.0), (30.0, 0.0)]
     fused = fuse([report("A", 0.0, places), report("B", 0.0, places[:2])], 0.0)
     np.testing.assert_allclose(sorted(fused.boxes[:, :2].tolist()), sorted(places), atol=1e-9)
 
 
-def test_the_gate_is_one_of_chi_square_and_the_left_over_find_each_other(report: Make, fuse: Fuse) -> None:
-    """With 0.5 m for each, the offset has a deviation of 0.707 m: 3.03 of them are 2.15 m, 5.26 are 3.72 m."""
+def test_fuse_gate_is_chi_square_with_wider_gate_for_unassigned_tracks(report: Make, fuse: Fuse) -> None:
+    """With 0.5 m each, the offset has a deviation of 0.707 m: 3.03 deviations are 2.15 m, 5.26 are 3.72 m."""
 
     def pair(*places: Place) -> Detections:
         return fuse([report("A", 0, [(0, 0)], covariance=0.25), report("B", 0, places, covariance=0.25)], 0)
 
     assert len(pair((2.1, 0.0))) == 1
-    assert len(pair((3.6, 0.0))) == 1, "nobody else is there to be it"
+    assert len(pair((3.6, 0.0))) == 1, "no other candidate exists"
     assert len(pair((3.8, 0.0))) == 2
     both = pair((2.0, 0.0), (-3.0, 0.0))
-    assert sorted(np.round(both.boxes[:, 0], 6).tolist()) == [-3.0, 1.0], "the one within the gate takes it"
+    assert sorted(np.round(both.boxes[:, 0], 6).tolist()) == [-3.0, 1.0], "the pair within the gate is preferred"
 
 
-def test_without_a_covariance_the_distance_decides(report: Make, fuse: Fuse) -> None:
+def test_fuse_without_covariance_uses_the_distance_gate(report: Make, fuse: Fuse) -> None:
     near, far = report("B", 0, [(3.9, 0.0)]), report("B", 0, [(4.1, 0.0)])
     vague = report("A", 0, [(0.0, 0.0)], covariance=math.nan)
     assert len(fuse([vague, near], 0)) == 1
     assert len(fuse([vague, far], 0)) == 2
 
 
-def test_two_bodies_are_not_in_one_place_however_sure_the_reports_are(report: Make, fuse: Fuse) -> None:
+def test_fuse_overlapping_bodies_with_small_covariance_returns_one_box(report: Make, fuse: Fuse) -> None:
     sure = [report(name, 0, [(x, 0.0)], covariance=1e-8) for name, x in (("A", 0.0), ("B", 0.8))]
     assert len(fuse(sure, 0)) == 1
 
 
-def test_size_by_confidence_and_class_by_votes(report: Make, fuse: Fuse) -> None:
+def test_fuse_weights_size_by_score_and_class_by_votes(report: Make, fuse: Fuse) -> None:
     reports = [
         report("A", 0, [(0, 0)], size=(4.0, 1.8, 1.5), score=0.9, kind="car"),
         report("B", 0, [(0, 0)], size=(5.0, 1.8, 1.5), score=0.3, kind="van"),
@@ -96,8 +96,8 @@ def test_size_by_confidence_and_class_by_votes(report: Make, fuse: Fuse) -> None
 
 
 @pytest.mark.parametrize("tracked", [True, False])
-def test_a_message_0_3_s_late_costs_less_than_half_with_prediction(tracked: bool, report: Make, fuse: Fuse) -> None:
-    """A car at 15 m/s that brakes with 5 m/s², told 0.3 s late: taken as it is, 4.3 m off; carried on, 0.225 m."""
+def test_fuse_late_report_prediction_halves_the_error(tracked: bool, report: Make, fuse: Fuse) -> None:
+    """A car at 15 m/s brakes with 5 m/s², and reports are 0.3 s late: error 4.3 m unpredicted, 0.225 m predicted."""
 
     def place(time: float) -> float:
         return 15.0 * time - 2.5 * time**2
@@ -121,11 +121,11 @@ def test_a_message_0_3_s_late_costs_less_than_half_with_prediction(tracked: bool
     assert error < 0.5 * stale
     if tracked:
         assert error == pytest.approx(0.5 * 5.0 * 0.3**2, abs=1e-6)
-    assert error < 3.0 * math.sqrt(fused.covariance[0, 0, 0]), "and it knows how wrong it may be"
+    assert error < 3.0 * math.sqrt(fused.covariance[0, 0, 0]), "the covariance includes the error"
 
 
-def test_a_car_in_a_bend_is_carried_on_along_the_bend(report: Make, fuse: Fuse) -> None:
-    """8 m/s on a radius of 10 m: straight on, 0.3 s are 0.29 m off; along the arc, a few centimeters."""
+def test_fuse_predicts_turning_car_along_the_arc(report: Make, fuse: Fuse) -> None:
+    """At 8 m/s and 10 m radius, a straight prediction by 0.3 s has an error of 0.29 m, the arc a few centimeters."""
     reports = []
     for time in np.arange(0.0, 1.001, 0.05).tolist():
         angle = 0.8 * time
@@ -140,14 +140,14 @@ def test_a_car_in_a_bend_is_carried_on_along_the_bend(report: Make, fuse: Fuse) 
     np.testing.assert_allclose(fused.velocity[0], [8.0 * math.cos(1.04), 8.0 * math.sin(1.04)], atol=0.3)
 
 
-def test_what_waits_grows_uncertain(report: Make, fuse: Fuse) -> None:
-    """P + T² P_v + q T³/3: (0.04 + 0.09 · 0.25 + 6 · 0.009) m²."""
+def test_fuse_covariance_grows_with_the_age_of_the_report(report: Make, fuse: Fuse) -> None:
+    """Closed form P + T² P_v + q T³/3: (0.04 + 0.09 · 0.25 + 6 · 0.009) m²."""
     fused = fuse([report("A", 0.0, [(0.0, 0.0)], velocity=(10.0, 0.0))], 0.3)
     assert fused.boxes[0, 0] == pytest.approx(3.0)
     np.testing.assert_allclose(fused.covariance[0], (0.04 + 0.09 * 0.25 + 6.0 * 0.009) * np.eye(2), rtol=1e-9)
 
 
-def test_the_newer_of_two_reports_counts_more(report: Make, fuse: Fuse) -> None:
+def test_fuse_weights_the_newer_report_more(report: Make, fuse: Fuse) -> None:
     fused = fuse(
         [
             report("A", 0.0, [(0.0, 0.0)], velocity=(10.0, 0.0), arrived=0.5),
@@ -159,8 +159,8 @@ def test_the_newer_of_two_reports_counts_more(report: Make, fuse: Fuse) -> None:
     assert 5.35 < fused.boxes[0, 0] < 5.4
 
 
-def test_ghosts_need_a_second_word(report: Make, fuse: Fuse) -> None:
-    """One unsure report is none; two of one station, or one of another beside it, are."""
+def test_fuse_confirms_uncertain_objects_by_a_second_report(report: Make, fuse: Fuse) -> None:
+    """One report of low score is tentative; a second one of the same or another station confirms the object."""
 
     def ghost(station: str, time: float) -> Report:
         return report(station, time, [(10.0, 0.0)], score=0.3)
@@ -171,37 +171,37 @@ def test_ghosts_need_a_second_word(report: Make, fuse: Fuse) -> None:
     assert len(fuse([ghost("A", 0.0), report("A", 0.05, []), ghost("A", 0.1)], 0.1)) == 0
 
 
-def test_what_a_station_no_longer_sees_goes(report: Make) -> None:
+def test_fuse_removes_objects_after_missed_detections(report: Make) -> None:
     fusion = CovarianceIntersectionFusion()
     counts = []
     for tick in range(8):
-        heard = report("A", 0.05 * tick, [(10.0, 0.0)] if tick < 4 else [])
-        fusion.add_report(heard)
-        counts.append(len(fusion.fuse([heard], 0.05 * tick)))
+        received = report("A", 0.05 * tick, [(10.0, 0.0)] if tick < 4 else [])
+        fusion.add_report(received)
+        counts.append(len(fusion.fuse([received], 0.05 * tick)))
     assert counts[:4] == [1] * 4
     assert counts[-1] == 0
     assert counts == sorted(counts, reverse=True)
 
 
-def test_a_station_that_tracks_is_believed_when_it_drops_an_object(report: Make, fuse: Fuse) -> None:
+def test_fuse_removes_objects_that_a_tracking_station_dropped(report: Make, fuse: Fuse) -> None:
     both = report("A", 0.0, [(10.0, 0.0), (20.0, 0.0)], tracks=(1, 2))
     assert len(fuse([both, report("A", 0.05, [(20.0, 0.0)], tracks=(2,))], 0.05)) == 1
 
 
-def test_a_list_that_is_not_complete_denies_nothing(report: Make, fuse: Fuse) -> None:
+def test_fuse_keeps_objects_omitted_in_incomplete_reports(report: Make, fuse: Fuse) -> None:
     both = report("A", 0.0, [(10.0, 0.0), (20.0, 0.0)], tracks=(1, 2))
     rest = [report("A", 0.05 * tick, [(20.0, 0.0)], tracks=(2,), complete=False) for tick in range(1, 8)]
     assert len(fuse([both, *rest], 0.35)) == 2
     later = [report("A", 0.05 * tick, [(20.0, 0.0)], tracks=(2,), complete=False) for tick in range(8, 33)]
-    assert len(fuse([both, *rest, *later], 1.6)) == 1, "but after a second and a half nobody has seen it"
+    assert len(fuse([both, *rest, *later], 1.6)) == 1, "the track is deleted after a second and a half"
 
 
-def test_the_stations_own_number_tells_that_it_is_the_same_object(report: Make, fuse: Fuse) -> None:
+def test_fuse_associates_reports_by_object_id(report: Make, fuse: Fuse) -> None:
     one, two = (report("A", time, [(x, 0.0)], tracks=(7,), covariance=0.01) for time, x in ((0.0, 0.0), (0.1, 9.0)))
     assert len(fuse([one, two], 0.1)) == 1
 
 
-def test_old_reports_are_forgotten_and_silent_stations_with_them(report: Make, fuse: Fuse) -> None:
+def test_fuse_deletes_tracks_after_the_maximum_age(report: Make, fuse: Fuse) -> None:
     seen = report("A", 0.0, [(10.0, 0.0)], velocity=(1.0, 0.0))
     assert len(fuse([seen], 1.5)) == 1
     assert len(fuse([seen], 1.51)) == 0
@@ -210,25 +210,25 @@ def test_old_reports_are_forgotten_and_silent_stations_with_them(report: Make, f
     assert len(CovarianceIntersectionFusion().fuse([], 1.0)) == 0
 
 
-def test_the_sender_may_be_somewhere_else(report: Make, fuse: Fuse) -> None:
-    """One degree at 80 m is 1.4 m across; along the ray only the position counts."""
+def test_fuse_adds_the_pose_covariance_of_the_sender(report: Make, fuse: Fuse) -> None:
+    """One degree at 80 m is 1.4 m across; along the ray only the position uncertainty counts."""
     pose = np.diag([0.04, 0.09, math.radians(1.0) ** 2])
     state = StationState(0.0, 20.0, 5.0, 0.0, 0.0, 0.0, pose)
     fused = fuse([report("A", 0.0, [(100.0, 5.0)], covariance=0.01, state=state)], 0.0)
     expected = np.diag([0.01 + 0.04, 0.01 + 0.09 + (80.0 * math.radians(1.0)) ** 2])
     np.testing.assert_allclose(fused.covariance[0], expected, rtol=1e-9)
     many = [report("A", 0.05 * tick, [(100.0, 5.0)], covariance=0.01, state=state) for tick in range(40)]
-    assert fuse(many, 1.95).covariance[0, 1, 1] > (80.0 * math.radians(1.0)) ** 2, "no report makes up for it"
+    assert fuse(many, 1.95).covariance[0, 1, 1] > (80.0 * math.radians(1.0)) ** 2, "repeated reports do not reduce it"
 
 
-def test_boxes_that_are_none_are_left_out(report: Make, fuse: Fuse) -> None:
+def test_fuse_omits_invalid_boxes(report: Make, fuse: Fuse) -> None:
     broken = report("A", 0.0, [(math.nan, 0.0), (10.0, 0.0), (math.inf, 1.0)])
     assert fuse([broken], 0.0).boxes[:, 0].tolist() == [10.0]
     assert len(fuse([report("A", 0.0, [(1.0, 1.0)], size=(0.0, 1.0, 1.0))], 0.0)) == 0
 
 
-def test_a_report_from_the_future_does_no_harm(report: Make, fuse: Fuse) -> None:
-    """The sender's clock is 20 ms fast."""
+def test_fuse_predicts_report_of_a_fast_clock_backwards(report: Make, fuse: Fuse) -> None:
+    """The clock of the sender is 20 ms fast."""
     fused = fuse([report("A", 1.02, [(10.2, 0.0)], velocity=(10.0, 0.0))], 1.0)
     assert fused.boxes[0, 0] == pytest.approx(10.0)
     assert fused.covariance[0, 0, 0] > 0.04
@@ -239,7 +239,7 @@ CARS = st.lists(st.tuples(st.floats(-60, 60), st.floats(-60, 60)), max_size=4)
 
 @settings(max_examples=40, deadline=None)
 @given(a=CARS, b=CARS, c=CARS)
-def test_the_order_of_the_stations_does_not_matter(
+def test_fuse_is_independent_of_the_order_of_stations(
     report: Make, fuse: Fuse, a: list[Place], b: list[Place], c: list[Place]
 ) -> None:
     reports = [report(name, 0.0, places) for name, places in (("A", a), ("B", b), ("C", c))]
@@ -253,7 +253,7 @@ def test_the_order_of_the_stations_does_not_matter(
 
 
 def scene(report: Make, turn: float, dx: float, dy: float, mirror: float) -> list[Report]:
-    """Two stations that follow three cars for half a second, seen in a world that is turned, shifted or mirrored."""
+    """Return reports of two stations on three cars over half a second, in a transformed world."""
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]) @ np.diag([1.0, mirror])
     rng = np.random.default_rng(5)
     starts, velocity = (
@@ -282,7 +282,7 @@ def scene(report: Make, turn: float, dx: float, dy: float, mirror: float) -> lis
 
 @settings(max_examples=30, deadline=None)
 @given(turn=st.floats(-3, 3), dx=st.floats(-50, 50), dy=st.floats(-50, 50), mirror=st.sampled_from([1.0, -1.0]))
-def test_turned_shifted_and_mirrored_scenes_give_such_results(
+def test_fuse_is_equivariant_under_rotation_translation_and_mirroring(
     report: Make, fuse: Fuse, turn: float, dx: float, dy: float, mirror: float
 ) -> None:
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]) @ np.diag([1.0, mirror])
@@ -296,8 +296,8 @@ def test_turned_shifted_and_mirrored_scenes_give_such_results(
     np.testing.assert_allclose(other.boxes[:, 2:6], plain.boxes[:, 2:6], atol=1e-9)
 
 
-def test_of_two_equally_good_choices_the_order_of_the_numbers_decides(report: Make, fuse: Fuse) -> None:
-    """Two cars of A, and two of B that are as far from either."""
+def test_fuse_with_tied_assignments_is_independent_of_the_order(report: Make, fuse: Fuse) -> None:
+    """Each car of B has the same distance from both cars of A."""
     a = report("A", 0.0, [(0.0, 1.0), (0.0, -1.0)], covariance=1.0)
     b = report("B", 0.0, [(1.0, 0.0), (-1.0, 0.0)], covariance=1.0)
     first, second = fuse([a, b], 0.0), fuse([b, a], 0.0)

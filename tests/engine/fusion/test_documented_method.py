@@ -1,4 +1,4 @@
-"""The example in docs/fusion.md."""
+"""Example of docs/fusion.md."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def example() -> str:
     return found[1]
 
 
-def test_it_takes_thirty_lines_at_most() -> None:
+def test_documented_method_has_at_most_thirty_lines() -> None:
     assert len(example().strip().splitlines()) <= 30
 
 
-def test_it_works(report: Callable[..., Report]) -> None:
+def test_documented_method_fuses_newest_reports(report: Callable[..., Report]) -> None:
     names: dict[str, Any] = {}
     exec(compile(example(), str(PAGE), "exec"), names)
     method: FusionMethod = names["Newest"]()

@@ -1,4 +1,4 @@
-"""Points of others among the own ones."""
+"""Early fusion of lidar points."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def ground() -> np.ndarray:
 
 
 def car(x: float, y: float, sides: str, length: float = 4.5) -> np.ndarray:
-    """Points on the sides of a car, 1.8 m wide and 1.5 m high, that heads along x: f, b, l, r."""
+    """Return points on the sides (f, b, l, r) of a car with heading x, 1.8 m wide and 1.5 m high."""
     end = length / 2.0
     along, across, up = np.arange(-end, end + 0.01, 0.15), np.arange(-0.9, 0.91, 0.15), np.arange(0.2, 1.5, 0.15)
     faces = {
@@ -56,7 +56,7 @@ def car(x: float, y: float, sides: str, length: float = 4.5) -> np.ndarray:
 
 
 def readings(time: float, at: tuple[float, float, float], *objects: np.ndarray, height: float = 0.0) -> Readings:
-    """A station at x, y, yaw whose LiDAR gets these points of the world, and those of the ground; all at a height."""
+    """Return lidar readings at x, y, yaw of these points and of the ground, shifted by `height`."""
     sensor = pose(*at)
     points = (np.concatenate([ground(), *objects]) - sensor[:3, 3]) @ sensor[:3, :3]
     sensor[2, 3] += height
@@ -70,62 +70,62 @@ def agent(spec: ActorSpec, **more: object) -> Agent:
     return build_agent(AgentSettings.model_validate(settings), spec, None, seed=0, dt=0.05)
 
 
-def test_it_comes_through_its_entry_point() -> None:
+def test_early_fusion_is_registered_as_entry_point() -> None:
     assert registry("fusion").load("early") is EarlyFusion
 
 
-def test_points_of_others_stand_where_they_were_measured() -> None:
+def test_merge_readings_keeps_world_positions_of_received_points() -> None:
     fusion = EarlyFusion(EarlyFusionSettings(cell=0.05))
     other = readings(0.0, (40.0, -5.0, 2.5), car(*CAR, "f"))
     cloud = fusion.shared_cloud(other)
     assert cloud is not None
     own = readings(0.0, (1.0, 2.0, 0.3))
-    joined = fusion.merge_readings(own, [cloud.points()]).lidars["lidar"]
-    world = joined.points @ joined.pose[:3, :3].T + joined.pose[:3, 3]
+    merged = fusion.merge_readings(own, [cloud.points()]).lidars["lidar"]
+    world = merged.points @ merged.pose[:3, :3].T + merged.pose[:3, 3]
     count = len(own.lidars["lidar"].points)
-    np.testing.assert_array_equal(joined.points[:count], own.lidars["lidar"].points)
+    np.testing.assert_array_equal(merged.points[:count], own.lidars["lidar"].points)
     np.testing.assert_allclose(world[count:], cloud.points(), atol=1e-9)
-    assert len(joined.intensity) == len(joined.points)
+    assert len(merged.intensity) == len(merged.points)
     assert fusion.shared_cloud(Readings(0.0, own.ego)) is None
 
 
-def test_a_car_that_only_the_other_can_see_is_found_and_passed_to_nobody() -> None:
+def test_early_fusion_detects_car_in_received_points_without_forwarding_it() -> None:
     ego, rsu = agent(EGO), agent(RSU)
-    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox
-    assert told[0].points is not None
-    assert told[0].size == 121 + 35 * (1 + len(told[0].detections)) + told[0].points.size > 1000
-    step = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(told[0], 0.05)], 0.05, None)
+    sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox
+    assert sent[0].points is not None
+    assert sent[0].size == 121 + 35 * (1 + len(sent[0].detections)) + sent[0].points.size > 1000
+    step = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(sent[0], 0.05)], 0.05, None)
     assert len(step.detections) == 0
-    assert len(step.outbox[0].detections) == 0, "what the ego sees itself"
+    assert len(step.outbox[0].detections) == 0, "objects in the own points only"
     assert len(step.fused) == 1
     assert math.dist(step.fused.boxes[0, :2], CAR) < 0.5
 
 
-def test_both_sides_of_a_car_give_a_better_box_than_either() -> None:
-    """The ego sees the rear, the unit the front and the left of a car that is longer than most."""
+def test_early_fusion_box_from_several_sides_is_more_accurate() -> None:
+    """The ego measures the rear, the unit the front and the left side of a long car."""
     ego, rsu = agent(EGO), agent(RSU)
     rear = car(*CAR, "b", 5.4)
-    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl", 5.4)), (), 0.0, None).outbox
+    sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl", 5.4)), (), 0.0, None).outbox
     alone = agent(EGO).act(readings(0.05, (0.0, 4.0, 0.0), rear), (), 0.05, None).fused
-    both = ego.act(readings(0.05, (0.0, 4.0, 0.0), rear), [ReceivedMessage(told[0], 0.05)], 0.05, None).fused
+    both = ego.act(readings(0.05, (0.0, 4.0, 0.0), rear), [ReceivedMessage(sent[0], 0.05)], 0.05, None).fused
     assert len(alone) == len(both) == 1
     assert math.dist(both.boxes[0, :2], CAR) < 0.1 < math.dist(alone.boxes[0, :2], CAR)
     assert both.boxes[0, 3] == pytest.approx(5.4, abs=0.1)
 
 
 @pytest.mark.parametrize("height", [0.0, 60.0, -20.0])
-def test_the_own_body_in_the_points_of_others_is_no_obstacle(height: float) -> None:
-    """The ego drives at 15 m/s, and the cloud is 0.3 s old; roads lie at any height."""
+def test_early_fusion_ignores_ego_body_in_received_points(height: float) -> None:
+    """The ego drives at 15 m/s, and the point cloud is 0.3 s old; roads have any height."""
     ego, rsu = agent(EGO), agent(RSU)
     here = [readings(0.05 * tick, (0.75 * tick, 0.0, 0.0), height=height) for tick in range(8)]
     body = car(EGO.offset[0], 0.0, "fblr")
-    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), body, height=height), (), 0.0, None).outbox[0]
+    sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), body, height=height), (), 0.0, None).outbox[0]
     for tick, given in enumerate(here[:-1]):
         ego.act(given, (), 0.05 * tick, None)
-    assert len(ego.act(here[-1], [ReceivedMessage(told, 0.35)], 0.35, None).fused) == 0
+    assert len(ego.act(here[-1], [ReceivedMessage(sent, 0.35)], 0.35, None).fused) == 0
 
 
-def test_old_points_are_not_joined_and_late_ones_do_not_replace_newer() -> None:
+def test_early_fusion_ignores_old_points_and_keeps_the_newest() -> None:
     ego, rsu = agent(EGO, fusion_settings={"max_lateness": 0.2}), agent(RSU)
     old = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
     new = rsu.act(readings(0.1, (40.0, 12.0, math.pi)), (), 0.1, None).outbox[0]
@@ -136,21 +136,21 @@ def test_old_points_are_not_joined_and_late_ones_do_not_replace_newer() -> None:
     assert len(step.fused) == 0
 
 
-def test_stations_that_share_no_points_are_heard_too() -> None:
+def test_early_fusion_uses_boxes_of_stations_without_points() -> None:
     ego, plain = agent(EGO), agent(RSU, fusion="covariance_intersection")
-    told = plain.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
-    assert told.points is None
-    fused = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(told, 0.05)], 0.05, None).fused
+    sent = plain.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    assert sent.points is None
+    fused = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(sent, 0.05)], 0.05, None).fused
     assert len(fused) == 1
 
 
-def test_it_takes_a_detector_for_lidar() -> None:
+def test_early_fusion_without_lidar_detector_raises() -> None:
     with pytest.raises(SettingError, match=r"fusion 'early' joins points, and detector 'oracle' looks at none"):
         agent(EGO, detector="oracle")
 
 
 def edited(tmp_path: Path, *replacements: tuple[str, str]) -> Path:
-    """Scenario 1 with other words, its references still leading to the library."""
+    """Write scenario 1 with text replacements; references still point to the library."""
     source = resolve_scenario("coop/scenario_1")
     text = source.read_text().replace('"../', f'"{source.parent.parent}/')
     for old, new in replacements:
@@ -179,10 +179,10 @@ EARLY = ('name="fusion" value="average"/>', 'name="fusion" value="early"/>')
              'value="{gate: 1.3}"/>'),
             "less than 1",
         ),
-        ((EARLY[0], EARLY[0] + '<Property name="fusion_settings" value="{gate: 0.9}"/>'), "has no settings of its own"),
+        ((EARLY[0], EARLY[0] + '<Property name="fusion_settings" value="{gate: 0.9}"/>'), "has no settings"),
     ],
 )  # fmt: skip
-def test_wrong_settings_are_told_with_file_and_line(
+def test_fusion_with_invalid_settings_raises_with_file_and_line(
     replacement: tuple[str, str], expected: str, tmp_path: Path
 ) -> None:
     path = edited(tmp_path, replacement)
@@ -193,8 +193,8 @@ def test_wrong_settings_are_told_with_file_and_line(
     assert "fusion" in path.read_text().splitlines()[(diagnostic.line or 0) - 1]
 
 
-def test_a_run_with_lidars(tmp_path: Path) -> None:
-    """The points travel with their size, and the car behind the truck is known."""
+def test_run_with_early_fusion_detects_the_hidden_car(tmp_path: Path) -> None:
+    """Messages contain the size of the points, and the car behind the truck is in the fused objects."""
     frames: list[Frame] = []
 
     class Watch:

@@ -1,4 +1,4 @@
-"""Existence of fused objects: what is counted once, and in which order."""
+"""Existence probability of fused objects."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ ALL = CovarianceIntersectionSettings(existence=0.0)
 
 
 def judged(report: Report, *existence: float) -> Report:
-    """The same report of a station that tracks and states these probabilities."""
+    """Return the report with tracks and these existence probabilities."""
     found = report.detections
     tracks = found.tracks or tuple(range(1, len(found) + 1))
     return replace(report, detections=replace(found, existence=np.array(existence), tracks=tracks))
 
 
-def test_lone_station_existence_is_passed_on(report: Make, fuse: Fuse) -> None:
+def test_existence_of_a_single_station_is_unchanged(report: Make, fuse: Fuse) -> None:
     fused = fuse([judged(report("A", 0.0, [(10.0, 0.0)], score=0.9), 0.7)], 0.0)
     assert fused.existence.tolist() == pytest.approx([0.7])
     assert fused.scores.tolist() == pytest.approx([0.9])
 
 
-def test_repeated_reports_of_a_station_that_tracks_count_once(report: Make, fuse: Fuse) -> None:
-    """Ten reports of a track with 0.6 leave 0.6: its station has counted the past already."""
+def test_existence_of_a_tracking_station_is_not_accumulated(report: Make, fuse: Fuse) -> None:
+    """Ten reports of a track with 0.6 result in 0.6, because the station has accumulated its past."""
     velocity = (5.0, 0.0)
     reports = [
         judged(report("A", 0.05 * tick, [(10.0 + 0.25 * tick, 0.0)], velocity=velocity), 0.6) for tick in range(10)
     ]
     assert fuse(reports, 0.45).existence.tolist() == pytest.approx([0.6])
     still = [judged(report("A", 0.05 * tick, [(10.0, 0.0)]), 0.6) for tick in range(10)]
-    assert fuse(still, 0.45).existence.tolist() == pytest.approx([0.6]), "also where it states no velocity"
+    assert fuse(still, 0.45).existence.tolist() == pytest.approx([0.6]), "also without velocity"
 
 
-def test_a_track_that_loses_existence_at_its_station_loses_it_everywhere(report: Make) -> None:
+def test_fusion_removes_objects_with_falling_existence_of_their_station(report: Make) -> None:
     fusion = CovarianceIntersectionFusion()
     counts = []
     for tick, existence in enumerate((0.95, 0.7, 0.45, 0.2)):
@@ -55,7 +55,7 @@ def test_a_track_that_loses_existence_at_its_station_loses_it_everywhere(report:
     assert counts == [1, 1, 0, 0]
 
 
-def test_existence_of_two_stations_is_that_of_at_least_one(report: Make) -> None:
+def test_existence_of_two_stations_is_that_of_at_least_one_report(report: Make) -> None:
     one, other = judged(report("A", 0.0, [(10.0, 0.0)]), 0.6), judged(report("B", 0.0, [(10.1, 0.0)]), 0.5)
     for fusion in (CovarianceIntersectionFusion(), AverageFusion()):
         for held in (one, other):
@@ -63,7 +63,7 @@ def test_existence_of_two_stations_is_that_of_at_least_one(report: Make) -> None
         assert fusion.fuse([one, other], 0.0).existence.tolist() == pytest.approx([0.8])
 
 
-def test_existence_does_not_depend_on_the_order_of_stations(report: Make) -> None:
+def test_existence_is_independent_of_the_order_of_stations(report: Make) -> None:
     reports = [
         judged(report(name, 0.0, [(10.0 + shift, 0.0), (30.0, 5.0)]), *existence)
         for name, shift, existence in (("A", 0.0, (0.6, 0.9)), ("B", 0.2, (0.3, 0.5)), ("C", -0.1, (0.8, 0.2)))
@@ -80,8 +80,8 @@ def test_existence_does_not_depend_on_the_order_of_stations(report: Make) -> Non
     np.testing.assert_allclose(np.sort(found[0]), np.sort([1 - 0.4 * 0.7 * 0.2, 1 - 0.1 * 0.5 * 0.8]))
 
 
-def test_untracked_miss_follows_the_tracker_and_time_takes_its_share(report: Make) -> None:
-    """One report of 0.9, one without it 0.1 s later: survival, then r (1 - p) / (1 - r p)."""
+def test_existence_after_missed_detection_equals_that_of_the_tracker(report: Make) -> None:
+    """A report with 0.9, then one without the object after 0.1 s: survival, then r (1 - p) / (1 - r p)."""
     fusion = CovarianceIntersectionFusion(ALL)
     for held in (report("A", 0.0, [(10.0, 0.0)], score=0.9), report("A", 0.1, [])):
         fusion.add_report(held)
@@ -89,21 +89,21 @@ def test_untracked_miss_follows_the_tracker_and_time_takes_its_share(report: Mak
     assert found[0] == pytest.approx(float(missed(np.array(0.9 * np.exp(-0.1 / LIFETIME)))), rel=1e-6)
 
 
-def test_average_without_existence_states_none(report: Make) -> None:
+def test_average_without_existence_returns_none(report: Make) -> None:
     fused = AverageFusion().fuse([report("A", 0.0, [(10.0, 0.0)]), report("B", 0.0, [(10.5, 0.0)])], 0.0)
     assert fused.existence.shape == (0,)
     np.testing.assert_array_equal(fused.confidence, fused.scores)
 
 
-def test_average_takes_scores_where_one_station_states_no_existence(report: Make) -> None:
+def test_average_existence_uses_scores_of_stations_without_existence(report: Make) -> None:
     one, other = judged(report("A", 0.0, [(10.0, 0.0)]), 0.5), report("B", 0.0, [(10.5, 0.0)], score=0.9)
     assert AverageFusion().fuse([one, other], 0.0).existence.tolist() == pytest.approx([0.95])
     alone = AverageFusion().fuse([one], 0.3)
     assert (alone.time, alone.existence.tolist()) == (0.3, [0.5])
 
 
-def test_average_ways_agree_on_all_but_existence(report: Make) -> None:
-    """The ways in plain numbers and in arrays leave existence to their caller."""
+def test_fuse_average_variants_do_not_set_existence(report: Make) -> None:
+    """The caller sets the existence probability."""
     known = [report("A", 0.0, [(10.0, 0.0)]).detections, report("B", 0.0, [(10.5, 0.0)]).detections]
     assert (
         fuse_average(known, [0, 0], 0.0).existence.shape

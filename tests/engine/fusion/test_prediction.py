@@ -1,4 +1,4 @@
-"""Objects carried on in time."""
+"""Prediction of tracks."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ STATE = np.array([[1.0, 2.0, 10.0, -3.0]])
 SPREAD = np.array([[[0.5, 0.1, 0.02, 0.0], [0.1, 0.4, 0.0, 0.03], [0.02, 0.0, 0.2, 0.05], [0.0, 0.03, 0.05, 0.3]]])
 
 
-def test_straight_on_as_the_tracker_has_it() -> None:
-    """White noise acceleration: q [[T³/3, T²/2], [T²/2, T]] for each axis."""
+def test_predict_without_turn_equals_the_tracker() -> None:
+    """White noise acceleration has the process noise q [[T³/3, T²/2], [T²/2, T]] for each axis."""
     mean, covariance = predict(STATE, SPREAD, np.array([0.3]), np.array([0.0]))
     other = ConstantVelocity().predict(Estimates(STATE, SPREAD), 0.3)
     np.testing.assert_allclose(mean, other.state, atol=1e-12)
@@ -28,7 +28,7 @@ def test_straight_on_as_the_tracker_has_it() -> None:
     np.testing.assert_allclose(still, mean)
 
 
-def test_a_turn_is_an_arc() -> None:
+def test_predict_with_turn_follows_an_arc() -> None:
     """A quarter of a circle at 10 m/s and 1 rad/s: radius 10 m."""
     quarter = math.pi / 2.0
     mean, _ = predict(np.array([[0.0, 0.0, 10.0, 0.0]]), SPREAD, np.array([quarter]), np.array([1.0]))
@@ -38,8 +38,8 @@ def test_a_turn_is_an_arc() -> None:
 
 
 @pytest.mark.parametrize("turn", [0.7, -0.2, 1e-7])
-def test_the_transition_of_a_turn_solves_its_differential_equation(turn: float) -> None:
-    """x' = v, v' = ω v turned by a right angle."""
+def test_predict_with_turn_solves_its_differential_equation(turn: float) -> None:
+    """x' = v, v' = ω v rotated by a right angle."""
     generator = np.zeros((4, 4))
     generator[0, 2] = generator[1, 3] = 1.0
     generator[2, 3], generator[3, 2] = -turn, turn
@@ -50,7 +50,7 @@ def test_the_transition_of_a_turn_solves_its_differential_equation(turn: float) 
     np.testing.assert_allclose((covariance - noise)[0], forward @ SPREAD[0] @ forward.T, atol=1e-9)
 
 
-def test_two_steps_are_one_and_each_track_has_its_own() -> None:
+def test_predict_two_steps_equal_one_per_track() -> None:
     steps = np.array([0.1, 0.25])
     both = predict(np.repeat(STATE, 2, 0), np.repeat(SPREAD, 2, 0), steps, np.zeros(2))
     half = predict(*predict(STATE, SPREAD, np.array([0.1]), np.zeros(1)), np.array([0.15]), np.zeros(1))
@@ -58,7 +58,7 @@ def test_two_steps_are_one_and_each_track_has_its_own() -> None:
     np.testing.assert_allclose(both[1][1], half[1][0], atol=1e-12)
 
 
-def test_a_clock_that_is_fast_makes_nothing_more_certain() -> None:
+def test_predict_negative_step_increases_the_covariance() -> None:
     _, covariance = predict(STATE, SPREAD, np.array([-0.02]), np.zeros(1))
     assert np.linalg.eigvalsh(covariance[0]).min() > 0.0
     assert covariance[0, 2, 2] > SPREAD[0, 2, 2]

@@ -1,4 +1,4 @@
-"""Covariance intersection itself."""
+"""Covariance intersection of two estimates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from eidrive_scenario.randomness import generator
 
 
 def random_covariances(count: int, *key: int) -> np.ndarray:
-    """(count, 2, 2, 2) pairs of covariances: of all shapes, nearly equal ones, and round ones."""
+    """Return pairs of covariances (count, 2, 2, 2): arbitrary, nearly equal, and isotropic ones."""
     rng = generator(1, "covariances", *key)
     roots = rng.normal(size=(count, 2, 2, 2)) * rng.choice([0.01, 1.0, 10.0], size=(count, 2, 1, 1))
     pairs = roots @ np.swapaxes(roots, -1, -2) + 1e-4 * np.eye(2)
@@ -20,15 +20,15 @@ def random_covariances(count: int, *key: int) -> np.ndarray:
     return pairs
 
 
-def test_two_sensors_that_are_good_in_one_direction_each() -> None:
-    """By hand: w = 1/2, P⁻¹ = diag(5/8, 5/8); taking the errors for independent would say 0.8 I."""
+def test_intersect_of_complementary_sensors_equals_hand_calculation() -> None:
+    """w = 1/2, P⁻¹ = diag(5/8, 5/8); independent errors would result in 0.8 I."""
     mean, covariance, weight = intersect(np.zeros(2), np.diag([1.0, 4.0]), np.ones(2), np.diag([4.0, 1.0]))
     assert weight == pytest.approx(0.5, abs=1e-12)
     np.testing.assert_allclose(covariance, 1.6 * np.eye(2), atol=1e-12)
     np.testing.assert_allclose(mean, [0.2, 0.8], atol=1e-12)
 
 
-def test_the_trace_is_the_least_of_all_weights_to_within_one_percent() -> None:
+def test_intersect_trace_is_minimal_within_one_percent() -> None:
     pairs = random_covariances(600)
     zeros = np.zeros((len(pairs), 2))
     _, covariance, weight = intersect(zeros, pairs[:, 0], zeros, pairs[:, 1])
@@ -43,7 +43,7 @@ def test_the_trace_is_the_least_of_all_weights_to_within_one_percent() -> None:
     assert np.all((weight >= 0.0) & (weight <= 1.0))
 
 
-def test_who_comes_first_does_not_matter() -> None:
+def test_intersect_is_symmetric_in_its_arguments() -> None:
     pairs = random_covariances(600)
     means = generator(1, "means").normal(size=(600, 2, 2))
     one = intersect(means[:, 0], pairs[:, 0], means[:, 1], pairs[:, 1])
@@ -53,37 +53,37 @@ def test_who_comes_first_does_not_matter() -> None:
     np.testing.assert_allclose(one[2], 1.0 - other[2], atol=1e-9)
 
 
-def test_the_weight_does_not_jump_where_both_are_about_as_good() -> None:
-    """The least trace alone would leap from one estimate to the other at ratio 1."""
+def test_intersect_weight_is_continuous_for_similar_covariances() -> None:
+    """The minimum trace alone would switch from one estimate to the other at ratio 1."""
     ratios = np.linspace(0.97, 1.03, 121)
     own = np.broadcast_to(np.eye(2), (len(ratios), 2, 2))
     weight = intersect(np.zeros((121, 2)), own, np.ones((121, 2)), ratios[:, None, None] * own)[2]
     assert weight[60] == 0.5
     assert np.abs(np.diff(weight)).max() < 0.1
-    assert np.all(np.diff(weight) >= -1e-12), "the better it is, the more it counts"
+    assert np.all(np.diff(weight) >= -1e-12), "the weight grows with the accuracy"
 
 
-def test_the_better_of_two_of_one_shape_is_taken_nearly_whole() -> None:
+def test_intersect_of_similar_shapes_weights_the_more_accurate_one() -> None:
     mean, covariance, weight = intersect(np.zeros(2), np.eye(2), np.ones(2), 9.0 * np.eye(2))
     assert weight > 0.98
     assert np.trace(covariance) <= 2.0 * (1.0 + TRACE_TOLERANCE) + 1e-12
     assert mean[0] < 0.01
 
 
-def test_hearing_the_same_twice_tells_nothing_new() -> None:
+def test_intersect_of_equal_estimates_is_unchanged() -> None:
     covariance = np.array([[2.0, 0.5], [0.5, 1.0]])
-    mean, joined, _ = intersect(np.array([3.0, 4.0]), covariance, np.array([3.0, 4.0]), covariance)
+    mean, fused, _ = intersect(np.array([3.0, 4.0]), covariance, np.array([3.0, 4.0]), covariance)
     np.testing.assert_array_equal(mean, [3.0, 4.0])
-    np.testing.assert_allclose(joined, covariance, rtol=1e-14)
+    np.testing.assert_allclose(fused, covariance, rtol=1e-14)
 
 
 @pytest.mark.parametrize(
     ("correlation", "expected", "naive"), [(0.0, 0.50, 1.00), (0.5, 0.70, 1.40), (0.9, 0.86, 1.73)]
 )
-def test_consistent_for_any_correlation_where_the_naive_rule_is_not(
+def test_intersect_is_consistent_for_any_correlation_unlike_independent_fusion(
     correlation: float, expected: float, naive: float
 ) -> None:
-    """Errors of diag(1, 4) and diag(4, 1) that depend on each other as far as that goes: normalized squared error.
+    """Normalized squared error of estimates with errors diag(1, 4) and diag(4, 1) and a given correlation.
 
     With A = diag(1, 4), B = diag(4, 1) and cross-covariance c sqrt(A) sqrt(B) = 2 c I, the error of the result has the
     variance (w² a⁻¹ + (1-w)² b⁻¹ + 4 c w (1-w) / (a b)) p² per axis, p² = 2.56: 0.8 + 0.64 c, of 1.6; and
@@ -98,9 +98,11 @@ def test_consistent_for_any_correlation_where_the_naive_rule_is_not(
     mean, covariance, _ = intersect(errors[:, :2], np.tile(a, (draws, 1, 1)), errors[:, 2:], np.tile(b, (draws, 1, 1)))
     found = np.einsum("ni,nij,nj->n", mean, np.linalg.inv(covariance), mean).mean() / 2.0
     information = np.linalg.inv(a) + np.linalg.inv(b)
-    blind = np.linalg.solve(information, (np.linalg.inv(a) @ errors[:, :2].T + np.linalg.inv(b) @ errors[:, 2:].T)).T
-    overconfident = np.einsum("ni,ij,nj->n", blind, information, blind).mean() / 2.0
+    independent = np.linalg.solve(
+        information, (np.linalg.inv(a) @ errors[:, :2].T + np.linalg.inv(b) @ errors[:, 2:].T)
+    ).T
+    overconfident = np.einsum("ni,ij,nj->n", independent, information, independent).mean() / 2.0
     # The mean of 1,000 values of a chi-square with 2 degrees of freedom, halved, deviates by 3 % (one sigma).
     assert found == pytest.approx(expected, rel=0.1)
     assert overconfident == pytest.approx(naive, rel=0.1)
-    assert found < 1.0, "no more error than it says"
+    assert found < 1.0, "the error does not exceed the covariance"

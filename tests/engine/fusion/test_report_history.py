@@ -1,4 +1,4 @@
-"""Reports that overtake each other."""
+"""Out-of-sequence reports, retention and eviction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ Fuse = Callable[..., Detections]
 
 
 def drive(report: Make, seed: int, *, tracked: bool) -> list[Report]:
-    """Two stations on three cars for 1.5 s at 20 Hz: noise, misses, one car that enters late, some boxes reversed."""
+    """Return reports of two stations on three cars over 1.5 s at 20 Hz.
+
+    They have noise, missed detections, a car that enters late, and some reversed boxes.
+    """
     rng = generator(seed, "drive")
     reports = []
     for tick in range(30):
@@ -52,7 +55,9 @@ def assert_equal(one: Detections, other: Detections) -> None:
 
 @pytest.mark.parametrize("tracked", [True, False])
 @pytest.mark.parametrize("seed", range(6))
-def test_out_of_order_is_as_good_as_in_order(seed: int, tracked: bool, report: Make, fuse: Fuse) -> None:
+def test_fuse_out_of_sequence_reports_equals_reports_in_sequence(
+    seed: int, tracked: bool, report: Make, fuse: Fuse
+) -> None:
     reports = drive(report, seed, tracked=tracked)
     rng = generator(seed, "delays")
     late = sorted(reports, key=lambda given: given.detections.time + rng.uniform(0.0, 0.6))
@@ -61,8 +66,8 @@ def test_out_of_order_is_as_good_as_in_order(seed: int, tracked: bool, report: M
 
 
 @pytest.mark.parametrize("tracked", [True, False])
-def test_so_it_is_when_each_is_fused_as_it_comes(tracked: bool, report: Make) -> None:
-    """Between the arrivals somebody asks for the objects: what is rolled back was in use already."""
+def test_fuse_after_each_report_equals_reports_in_sequence(tracked: bool, report: Make) -> None:
+    """Rollback also applies to tracks that were already returned."""
     reports = drive(report, 3, tracked=tracked)
     rng = generator(3, "delays")
     late = sorted(reports, key=lambda given: given.detections.time + rng.uniform(0.0, 0.6))
@@ -76,75 +81,75 @@ def test_so_it_is_when_each_is_fused_as_it_comes(tracked: bool, report: Make) ->
     assert_equal(in_order.fuse(newest, 1.5), out_of_order.fuse(newest, 1.5))
 
 
-def test_a_late_report_counts(report: Make, fuse: Fuse) -> None:
-    """Two places and the way between them make a velocity, whichever of both comes first."""
+def test_fuse_late_report_contributes_to_the_velocity(report: Make, fuse: Fuse) -> None:
+    """Two positions determine a velocity in any order of arrival."""
     first, second = report("A", 0.0, [(0.0, 0.0)], covariance=1e-4), report("A", 0.5, [(5.0, 0.0)], covariance=1e-4)
     fused = fuse([second, first], 0.5)
     assert fused.velocity[0, 0] == pytest.approx(10.0, abs=0.2)
     assert np.isnan(fuse([second], 0.5).velocity).all()
 
 
-def test_one_that_is_older_than_all_that_is_remembered_comes_too_late(report: Make) -> None:
-    """Then it does not count, and is not taken for the start of all."""
-    memory = ReportHistory(1.0, AssociationGate.of(0.99, 4.0))
+def test_report_history_ignores_reports_older_than_all_stored_ones(report: Make) -> None:
+    """Such a report does not restart the tracks either."""
+    history = ReportHistory(1.0, AssociationGate.of(0.99, 4.0))
     times = np.arange(0.0, 3.01, 0.1).tolist()
     for time in times:
-        memory.add_report(report("A", time, [(10.0 * time, 0.0)], covariance=0.01))
-        memory.tracks()
-    before = memory.tracks().copy()
-    memory.add_report(report("A", 1.0, [(10.0, 0.0)], covariance=0.01))
-    np.testing.assert_array_equal(memory.tracks(), before)
-    memory.add_report(report("A", 2.05, [(20.5, 0.0)], covariance=0.01))
-    assert not np.array_equal(memory.tracks(), before)
+        history.add_report(report("A", time, [(10.0 * time, 0.0)], covariance=0.01))
+        history.tracks()
+    before = history.tracks().copy()
+    history.add_report(report("A", 1.0, [(10.0, 0.0)], covariance=0.01))
+    np.testing.assert_array_equal(history.tracks(), before)
+    history.add_report(report("A", 2.05, [(20.5, 0.0)], covariance=0.01))
+    assert not np.array_equal(history.tracks(), before)
 
 
-def test_a_report_heard_twice_counts_once(report: Make, fuse: Fuse) -> None:
+def test_fuse_duplicate_reports_count_once(report: Make, fuse: Fuse) -> None:
     reports = drive(report, 1, tracked=False)
     assert_equal(fuse(reports, 1.5), fuse([*reports, *reports[-8:], reports[-3]], 1.5))
 
 
-def test_the_memory_stays_small(report: Make) -> None:
-    memory = ReportHistory(1.0, AssociationGate.of(0.99, 4.0))
+def test_report_history_has_bounded_size(report: Make) -> None:
+    history = ReportHistory(1.0, AssociationGate.of(0.99, 4.0))
     for tick in range(400):
-        memory.add_report(report("A", 0.05 * tick, [(0.5 * tick, 0.0)], covariance=0.01))
-        memory.tracks()
-    assert len(memory._histories[0].entries) <= 22
-    assert len(memory.tracks()) == 1
+        history.add_report(report("A", 0.05 * tick, [(0.5 * tick, 0.0)], covariance=0.01))
+        history.tracks()
+    assert len(history._histories[0].entries) <= 22
+    assert len(history.tracks()) == 1
 
 
-def test_stations_that_have_gone_are_forgotten_and_nobody_notices(
-    report: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A new car passes every second, for a minute; one station comes back after a while, late and out of order."""
+def test_evict_stale_does_not_change_the_fused_objects(report: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new station passes every second for a minute; one station returns later with out-of-sequence reports."""
     rng = generator(1, "passers-by")
-    heard: list[tuple[float, Report]] = []
+    arrivals: list[tuple[float, Report]] = []
     for tick in range(1200):
         time = 0.05 * tick
         for number in range(60):
             if number <= time < number + 3.0 or (number == 2 and time > 30.0):
                 place = (10.0 * time + rng.normal(0.0, 0.2), 8.0 * (number % 3))
-                said = report(f"car {number}", time, [place], velocity=(math.nan, math.nan))
-                heard.append((time + rng.uniform(0.0, 0.4), said))
-    heard.sort(key=lambda entry: entry[0])
+                sent = report(f"car {number}", time, [place], velocity=(math.nan, math.nan))
+                arrivals.append((time + rng.uniform(0.0, 0.4), sent))
+    arrivals.sort(key=lambda entry: entry[0])
 
-    def fused() -> tuple[list[Detections], CovarianceIntersectionFusion]:
+    def fuse_all() -> tuple[list[Detections], CovarianceIntersectionFusion]:
         fusion = CovarianceIntersectionFusion()
-        pictures, newest, waiting = [], {}, list(reversed(heard))
+        lists: list[Detections] = []
+        newest: dict[str, Report] = {}
+        pending = list(reversed(arrivals))
         for tick in range(1200):
             now = 0.05 * tick
-            while waiting and waiting[-1][0] <= now:
-                said = waiting.pop()[1]
-                fusion.add_report(said)
-                newest[said.station] = max(said, newest.get(said.station, said), key=lambda one: one.detections.time)
-            pictures.append(fusion.fuse(list(newest.values()), now))
-        return pictures, fusion
+            while pending and pending[-1][0] <= now:
+                sent = pending.pop()[1]
+                fusion.add_report(sent)
+                newest[sent.station] = max(sent, newest.get(sent.station, sent), key=lambda one: one.detections.time)
+            lists.append(fusion.fuse(list(newest.values()), now))
+        return lists, fusion
 
-    forgetting, fusion = fused()
-    assert len(fusion._memory.stations) < 12
-    assert len(fusion._memory.tracks()) < 12
-    monkeypatch.setattr(ReportHistory, "evict_stale", lambda memory, now: None)
-    remembering, fusion = fused()
-    assert len(fusion._memory.stations) == 60
-    assert max(map(len, forgetting)) > 2
-    for one, other in zip(forgetting, remembering, strict=True):
+    evicting, fusion = fuse_all()
+    assert len(fusion._history.stations) < 12
+    assert len(fusion._history.tracks()) < 12
+    monkeypatch.setattr(ReportHistory, "evict_stale", lambda history, now: None)
+    retaining, fusion = fuse_all()
+    assert len(fusion._history.stations) == 60
+    assert max(map(len, evicting)) > 2
+    for one, other in zip(evicting, retaining, strict=True):
         assert_equal(one, other)
