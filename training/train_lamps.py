@@ -50,14 +50,14 @@ def samples(scenes: Iterable[LightScene], seed: int) -> Samples:
             if light is None or (light.box is not None and not light.to_read):
                 continue
             state = light.state if light.to_read else NONE
-            middles = np.array(view.middle) + view.height * SHIFT * rng.standard_normal((VERSIONS, 2))
+            middles = np.array(view.center) + view.height * SHIFT * rng.standard_normal((VERSIONS, 2))
             heights = view.height * np.exp(STRETCH * rng.standard_normal(VERSIONS))
             parts.append(crops(coarser(scene.reading.rgb, middles, heights, rng), middles, heights))
             shown += [SHOWN.index(state)] * VERSIONS
         height, width = scene.reading.rgb.shape[:2]
         places = rng.uniform((0, 0), (width, height), (EMPTY_PER_PICTURE, 2))
         sizes = np.exp(rng.uniform(np.log(LEAST_HEIGHT), np.log(80.0), EMPTY_PER_PICTURE))
-        near = [np.abs(places - view.middle).max(axis=1) < view.height + sizes for view in views]
+        near = [np.abs(places - view.center).max(axis=1) < view.height + sizes for view in views]
         free = ~np.any(near, axis=0) if near else np.ones(EMPTY_PER_PICTURE, dtype=bool)
         parts.append(crops(scene.reading.rgb, places[free], sizes[free]))
         shown += [SHOWN.index(NONE)] * int(free.sum())

@@ -1,1 +1,1 @@
-"""Sensors: with the criteria, the only readers of the world's truth."""
+"""Sensors. Apart from the criteria, only sensors read the true state of the world."""

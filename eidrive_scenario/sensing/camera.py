@@ -1,4 +1,4 @@
-"""The camera."""
+"""Camera sensor."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.exposure import develop, metered
+from eidrive_scenario.sensing.exposure import develop, meter_exposure
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.optics import Optics, lens_of
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
@@ -19,39 +19,39 @@ from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
 DROPS_STAY = 2.0
-"""How long drops sit on a lens before others have come [s]."""
+"""Time that drops stay on a lens before others replace them [s]."""
 
 
 class Camera:
-    """A camera with square pixels, its principal point in the middle of the picture.
+    """Camera with square pixels and its principal point in the center of the image.
 
-    Its noise and the drops before its lens are drawn by seed, station, name and tick. On a mast it does not see that,
-    which throws its shadow all the same.
+    Noise and drops in front of the lens are drawn by seed, station, name and tick. The image of a camera on a mast does
+    not contain the mast, but its shadow.
     """
 
     def __init__(self, settings: CameraSettings, spec: ActorSpec, name: str = "camera", seed: int = 0) -> None:
         self.settings = settings
         self.name = name
         self.mounting = mounting(settings, spec, "front")
-        self._photographer = ImageSensor(settings)
-        self._unseen = (spec.name,) if spec.wheelbase <= 0.0 else ()
+        self._image_sensor = ImageSensor(settings)
+        self._ignored = (spec.name,) if spec.wheelbase <= 0.0 else ()
         self._key = (seed, "camera", spec.name, name)
 
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
-        """A picture from the actor in this row."""
+        """Return an image from the actor in this row."""
         seed, *key = self._key
-        return self._photographer.capture(
+        return self._image_sensor.capture(
             scene,
             self.mounting.camera_pose(view, row),
             generator(seed, *key, view.tick),
-            ignore=(*view.unseen_by.get(self.name, ()), *self._unseen),
+            ignore=(*view.unseen_by.get(self.name, ()), *self._ignored),
             velocity=view.velocity[row],
             lens=generator(seed, *key, "lens", int(view.time / DROPS_STAY)),
         )
 
 
 class ImageSensor:
-    """Takes pictures with a camera of these settings, from anywhere."""
+    """Image sensor with these camera settings that captures images at any pose."""
 
     def __init__(self, settings: CameraSettings) -> None:
         self.settings = settings
@@ -69,16 +69,19 @@ class ImageSensor:
         velocity: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
         lens: np.random.Generator | None = None,
     ) -> CameraReading:
-        """A picture from `pose` (4, 4): camera to world, x right, y down, z forward; actors in `ignore` are not seen.
+        """Return an image at `pose` (4, 4): camera to world, x right, y down, z forward, without the actors in
+        `ignore`.
 
-        `draws` are for noise and falling drops, `lens` for drops that sit on it (None: there are none); velocity (3,)
-        of the camera [m/s]. The same scene, pose and state of the generators give the same picture.
+        `draws` generates noise and falling drops, `lens` the drops on the lens (None: no drops); velocity (3,) of the
+        camera [m/s]. Equal scenes, poses and generator states give equal images.
         """
         settings = self.settings
-        seen = self._optics.bent(scene.radiance(pose, self._optics.pinhole, ignore=ignore))
-        draw_precipitation(seen.luminance, scene.weather, pose, self._lens, draws, velocity)
+        radiance = self._optics.distort(scene.radiance(pose, self._optics.pinhole, ignore=ignore))
+        draw_precipitation(radiance.luminance, scene.weather, pose, self._lens, draws, velocity)
         if lens is not None and settings.lens_drops:
-            draw_drops_on_lens(seen.luminance, scene.weather, lens)
-        exposure = metered(seen.luminance, settings)
-        rgb = develop(seen.luminance, exposure, settings.noise, draws)
-        return CameraReading(rgb, seen.depth, seen.segmentation, self.intrinsics, pose, np.array(settings.distortion))
+            draw_drops_on_lens(radiance.luminance, scene.weather, lens)
+        exposure = meter_exposure(radiance.luminance, settings)
+        rgb = develop(radiance.luminance, exposure, settings.noise, draws)
+        return CameraReading(
+            rgb, radiance.depth, radiance.segmentation, self.intrinsics, pose, np.array(settings.distortion)
+        )

@@ -1,4 +1,4 @@
-"""Rays and upright boxes: where they cross, and rays that start behind a box that they cross."""
+"""Intersection of rays and upright boxes, and rays that start behind a box."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from eidrive_scenario.arrays import Array
 Point = tuple[float, float, float]
 
 BEYOND_OWN_BODY = 1e-3
-"""A ray that leaves the own body starts this share of its length behind it."""
+"""Offset of the start of a ray behind the ego body, as a share of its length."""
 PARALLEL = 1e-12
-"""A way across a slab that is shorter than this counts as so long [m]."""
+"""Minimum extent of a ray across a slab [m]; shorter ones are replaced by it."""
 
 
 def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array]:
-    """Where rays (P, K, 3) enter and leave boxes (P, 7), as shares of the way; enter > leave where they miss.
+    """Return where rays (P, K, 3) enter and leave boxes (P, 7), as shares of their length; enter > leave without
+    intersection.
 
     The slab method (Kay and Kajiya, Ray tracing complex scenes, 1986) in the frame of the box.
     """
     cos, sin = np.cos(boxes[:, 6])[:, None], np.sin(boxes[:, 6])[:, None]
     enter = np.full(origins.shape[:2], -np.inf)
     leave = np.full(origins.shape[:2], np.inf)
-    start, way = origins - boxes[:, None, :3], targets - origins
+    start, ray = origins - boxes[:, None, :3], targets - origins
     axes = (
-        (cos * start[..., 0] + sin * start[..., 1], cos * way[..., 0] + sin * way[..., 1]),
-        (cos * start[..., 1] - sin * start[..., 0], cos * way[..., 1] - sin * way[..., 0]),
-        (start[..., 2], way[..., 2]),
+        (cos * start[..., 0] + sin * start[..., 1], cos * ray[..., 0] + sin * ray[..., 1]),
+        (cos * start[..., 1] - sin * start[..., 0], cos * ray[..., 1] - sin * ray[..., 0]),
+        (start[..., 2], ray[..., 2]),
     )
     for axis, (place, step) in enumerate(axes):
         half = boxes[:, None, 3 + axis] / 2.0
@@ -41,7 +42,7 @@ def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array
 
 
 def is_occluded_by(origins: Array, targets: Array, boxes: Array) -> Array:
-    """(P, K, 3) starts of the rays: behind the box where a ray crosses it on its way, else where it was."""
+    """Return starts (P, K, 3) of the rays: behind the box if the ray intersects it, else unchanged."""
     enter, leave = crossing(origins, targets, boxes)
     crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
     share = np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
@@ -49,9 +50,9 @@ def is_occluded_by(origins: Array, targets: Array, boxes: Array) -> Array:
 
 
 def is_occluded_by_small(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
-    """The same as `is_occluded_by` in plain numbers, for a few rays from one origin.
+    """Return the same as `is_occluded_by` in scalar arithmetic, for a few rays from one origin.
 
-    Targets that lie above each other are quicker where they come one after the other.
+    Targets above each other are faster if they are consecutive.
     """
     x, y, z, length, width, height, yaw = box
     cos, sin = math.cos(yaw), math.sin(yaw)

@@ -1,4 +1,4 @@
-"""From the light that reaches a lens to the numbers of a picture: exposure, noise, tones."""
+"""Conversion of luminance to image values: exposure, noise, tone mapping."""
 
 from __future__ import annotations
 
@@ -14,74 +14,77 @@ from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings
 from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
 
 LENS = 0.65
-"""H = 0.65 L t / N²: exposure [lx s] behind a lens of f-number N of a thing of luminance L [cd/m²] (ISO 12232)."""
+"""H = 0.65 L t / N²: exposure [lx s] behind a lens of f-number N for a luminance L [cd/m²] (ISO 12232)."""
 SATURATION = 78.0
-"""H_sat = 78 / S: exposure at which a sensor of speed S saturates [lx s] (ISO 12232)."""
+"""H_sat = 78 / S: exposure that saturates a sensor of speed S [lx s] (ISO 12232)."""
 BASE_SPEED = 100.0
 """Speed of the sensor at a gain of 0 dB."""
-_AT_ONCE = 49_152
-"""Numbers that are developed at once: as many as a processor keeps near it; a multiple of four."""
+_BLOCK_SIZE = 49_152
+"""Number of values per block, which fit into the processor cache; a multiple of four."""
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """time [s], gain [dB], and the luminance that fills the sensor's wells [cd/m²]."""
+    """Exposure time [s], gain [dB], and the luminance at saturation [cd/m²]."""
 
     time: float
     gain: float
     saturation: float
 
 
-def metered(luminance: Floats, settings: CameraSettings) -> Exposure:
-    """The exposure of a picture (H, W, 3) [cd/m²]: what the settings fix, and for the rest an ideal meter.
+def meter_exposure(luminance: Floats, settings: CameraSettings) -> Exposure:
+    """Return the exposure of an image (H, W, 3) [cd/m²]: fixed settings, and an ideal meter for the others.
 
-    It turns up time first, then gain, up to their limits.
+    The meter increases time first, then gain, up to their limits.
     """
     optics = SATURATION / BASE_SPEED * settings.f_number**2 / LENS
     time, gain = settings.exposure_time, settings.gain
     if time is None or gain is None:
-        wanted = optics / white_level(luminance)
+        required = optics / white_level(luminance)
         if time is None:
-            time = min(wanted / (1.0 if gain is None else _linear(gain)), settings.max_exposure_time)
+            time = min(required / (1.0 if gain is None else _linear(gain)), settings.max_exposure_time)
         if gain is None:
-            gain = min(max(20.0 * math.log10(wanted / time), 0.0), settings.max_gain)
+            gain = min(max(20.0 * math.log10(required / time), 0.0), settings.max_gain)
     return Exposure(time, gain, optics / (time * _linear(gain)))
 
 
 def develop(
     luminance: Floats, exposure: Exposure, noise: NoiseSettings | None, draws: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """The picture (H, W, 3) that a sensor makes of luminance (H, W, 3) [cd/m²]; clips what overfills its wells.
+    """Return the image (H, W, 3) of luminance (H, W, 3) [cd/m²]; values above saturation are clipped.
 
-    Noise is the linear model of EMVA 1288 (release 4.0): of a mean of n electrons, their number varies by
-    n + read noise²; gain shows fewer electrons as full scale. Electrons are drawn as normal numbers, one per channel.
+    Noise is the linear model of EMVA 1288 (release 4.0): for a mean of n electrons, the variance is n + read noise²;
+    gain reduces the electrons of full scale. Electrons are drawn from a normal distribution, one value per channel.
     """
-    picture = np.empty(luminance.shape, dtype=np.uint8)
-    light, shown = luminance.reshape(-1), picture.reshape(-1)
-    for start in range(0, len(light), _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
+    image = np.empty(luminance.shape, dtype=np.uint8)
+    light, values = luminance.reshape(-1), image.reshape(-1)
+    for start in range(0, len(light), _BLOCK_SIZE):
+        part = slice(start, start + _BLOCK_SIZE)
         signal = light[part] * np.float32(1.0 / exposure.saturation)
         if noise is not None:
             signal += noise_of(signal, exposure, noise, draws)
-        shown[part] = tone_map(signal)
-    return picture
+        values[part] = tone_map(signal)
+    return image
 
 
 def noise_of(signal: Floats, exposure: Exposure, noise: NoiseSettings, draws: np.random.Generator) -> Floats:
-    """Noise, as shares of full scale, of a signal given as such."""
+    """Return the noise of a signal; both as shares of full scale."""
     well = noise.full_well / _linear(exposure.gain)
     deviation: Floats = np.maximum(signal, np.float32(0.0))
     deviation *= np.float32(1.0 / well)
     deviation += np.float32((noise.read_noise / well) ** 2)
     np.sqrt(deviation, out=deviation)
-    # Four numbers of 16 bits in each that the generator gives.
+    # Each value of the generator contains four numbers of 16 bits.
     raw: NDArray[np.uint64] = draws.bit_generator.random_raw(-(-signal.size // 4))
     deviation *= _NORMAL.take(raw.view(np.uint16)[: signal.size]).reshape(signal.shape)
     return deviation
 
 
 def _quantiles(count: int) -> Floats:
-    """Equally likely normal numbers, of deviation 1: drawing among them is four times as fast as drawing normally."""
+    """Return equally likely values of the standard normal distribution.
+
+    Drawing from them is four times as fast as drawing normal values.
+    """
     numbers = ndtri((np.arange(count) + 0.5) / count)
     found: Floats = (numbers / numbers.std()).astype(np.float32)
     return found

@@ -1,4 +1,4 @@
-"""The satellite receiver and the inertial unit."""
+"""GNSS receiver and inertial measurement unit (IMU)."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
 EXACT = 1e-3
-"""Standard deviation that an oracle's reading states, as filters need one above 0 [m]."""
+"""Standard deviation that an oracle reading states, as filters require a positive one [m]."""
 FIRST_INTERVAL = 0.05
-"""How long the first reading of a unit that is read each tick integrates [s]."""
+"""Integration time of the first reading of a unit that is read each tick [s]."""
 
 
 class Gnss:
-    """Position of the reference point: the truth, a bias that wanders, and white noise.
+    """GNSS position of the reference point: the true position, a random-walk bias, and white noise.
 
-    The covariance of a reading is that of the noise and of the bias at the start; that it has wandered off since, a
-    receiver does not know. Noise and wandering are drawn by seed, station, name and tick.
+    The covariance of a reading contains the noise and the initial bias; a receiver cannot measure the later drift of
+    the bias. Noise and random walk are drawn by seed, station, name and tick.
     """
 
     def __init__(self, settings: GnssSettings, spec: ActorSpec, name: str = "gnss", seed: int = 0) -> None:
         self.settings = settings
         self._key = (seed, "gnss", spec.name, name)
-        self._bias = _Wandering(self._key, 2, settings.bias, settings.bias_walk)
+        self._bias = _RandomWalkBias(self._key, 2, settings.bias, settings.bias_walk)
         across = settings.position_noise**2 + settings.bias**2
         self._covariance = np.diag([max(v, EXACT**2) for v in (across, across, settings.height_noise**2)])
 
     def read(self, view: WorldView, row: int) -> GnssReading:
-        """Where the actor in this row seems to be."""
+        """Return the measured position of the actor in this row."""
         position = view.position[row]
         if self.settings.oracle:
             return GnssReading(position, np.eye(3) * EXACT**2)
@@ -49,21 +49,25 @@ class Gnss:
 
 
 class Imu:
-    """Acceleration and turn rates in the body's frame: the truth, biases that wander, and white noise.
+    """Acceleration and turn rates in the body frame: true values, random-walk biases, and white noise.
 
-    Noise of density n in readings of an interval T has the deviation n / √T (IEEE 952, annex C). It and the wandering
-    are drawn by seed, station, name and tick.
+    Noise of density n in readings of an interval T has the standard deviation n / √T (IEEE 952, annex C). Noise and
+    random walk are drawn by seed, station, name and tick.
     """
 
     def __init__(self, settings: ImuSettings, spec: ActorSpec, name: str = "imu", seed: int = 0) -> None:
         self.settings = settings
         self._key = (seed, "imu", spec.name, name)
-        self._push = _Wandering((*self._key, "push"), 3, settings.accelerometer_bias, settings.accelerometer_walk)
-        self._turn = _Wandering((*self._key, "turn"), 3, settings.gyroscope_bias, settings.gyroscope_walk)
+        self._accelerometer_bias = _RandomWalkBias(
+            (*self._key, "push"), 3, settings.accelerometer_bias, settings.accelerometer_walk
+        )
+        self._gyroscope_bias = _RandomWalkBias(
+            (*self._key, "turn"), 3, settings.gyroscope_bias, settings.gyroscope_walk
+        )
         self._last: float | None = None
 
     def read(self, view: WorldView, row: int) -> ImuReading:
-        """What the unit on the actor in this row measures."""
+        """Return the reading of the unit on the actor in this row."""
         settings = self.settings
         body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
         acceleration = view.acceleration[row] @ body
@@ -76,13 +80,13 @@ class Imu:
         draws = generator(seed, *key, view.tick)
         white = draws.standard_normal((2, 3)) / math.sqrt(max(interval, 1e-6))
         return ImuReading(
-            acceleration + settings.accelerometer_noise * white[0] + self._push.at(view.time, draws),
-            rates + settings.gyroscope_noise * white[1] + self._turn.at(view.time, draws),
+            acceleration + settings.accelerometer_noise * white[0] + self._accelerometer_bias.at(view.time, draws),
+            rates + settings.gyroscope_noise * white[1] + self._gyroscope_bias.at(view.time, draws),
         )
 
 
-class _Wandering:
-    """A bias (N,) that begins with a deviation and then goes at random: its variance grows by walk² per second."""
+class _RandomWalkBias:
+    """Bias (N,) with a random initial value and random walk: its variance grows by walk² per second."""
 
     def __init__(self, key: tuple[int | str, ...], axes: int, start: float, walk: float) -> None:
         seed, *rest = key
@@ -91,8 +95,8 @@ class _Wandering:
         self._time: float | None = None
 
     def at(self, time: float, draws: np.random.Generator) -> Array:
-        passed = max(time - self._time, 0.0) if self._time is not None else 0.0
+        elapsed = max(time - self._time, 0.0) if self._time is not None else 0.0
         self._time = time
         if self._walk > 0.0:
-            self._value = self._value + self._walk * math.sqrt(passed) * draws.standard_normal(len(self._value))
+            self._value = self._value + self._walk * math.sqrt(elapsed) * draws.standard_normal(len(self._value))
         return self._value

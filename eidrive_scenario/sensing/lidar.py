@@ -1,4 +1,4 @@
-"""The spinning LiDAR."""
+"""Rotating lidar."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from eidrive_scenario.world.weather import Weather
 
 
 class Lidar:
-    """Rings of rays; each reading covers what the head has turned since the last one, at most one revolution.
+    """Lidar with rings of rays; a reading covers the rotation since the last one, at most one revolution.
 
-    All rays of a reading start from the pose at its time: the motion during a revolution does not bend the sweep. Rays
-    that meet the own body give no return; a mast is too thin to hide the ground around it from the head on its top.
-    What is random is drawn by seed, station, name and tick.
+    All rays of a reading start from the pose at its time: motion during a revolution does not distort the point cloud.
+    Rays that hit the ego body give no return. A mast is too thin to hide the ground around it from the head on its top.
+    Random values are drawn by seed, station, name and tick.
     """
 
     def __init__(self, settings: LidarSettings, spec: ActorSpec, name: str = "lidar", seed: int = 0) -> None:
@@ -38,35 +38,35 @@ class Lidar:
         self._columns_per_second = settings.points_per_second / settings.channels
         self._columns_per_turn = max(1, round(self._columns_per_second / settings.rotation))
         self._next: int | None = None
-        """The first column that no reading has covered."""
+        """First column that no reading has covered."""
         self._key = (seed, "lidar", spec.name, name)
 
     def directions(self, time: float) -> Array:
-        """(M, 3) unit vectors in the sensor frame of the rays since the last reading; moves the head on."""
+        """Return unit vectors (M, 3) in the sensor frame of the rays since the last reading, and advance the head."""
         return self._rays(self._columns(time))[0]
 
     def read(self, scene: Scene, view: WorldView, row: int) -> LidarReading:
-        """A sweep from the actor in this row."""
+        """Return a point cloud from the actor in this row."""
         settings = self.settings
         pose = self.mounting.pose(view, row)
         directions, ring, azimuth = self._rays(self._columns(view.time))
-        ways = directions @ pose[:3, :3].T
+        rays = directions @ pose[:3, :3].T
         origin = np.broadcast_to(pose[:3, 3], directions.shape)
-        targets = origin + settings.range * ways
+        targets = origin + settings.range * rays
         own = view.boxes[row][None]
         if self._on_mast:
             starts, clear = is_occluded_by(origin[None], targets[None], own)[0], np.arange(len(origin))
         else:
             enter, leave = crossing(origin[None], targets[None], own)
             starts, clear = origin, np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])
-        named = {"sensor": self.name} if view.unseen_by else {}
-        hits = scene.raycast(np.ascontiguousarray(starts[clear]), targets[clear], **named)
+        sensor_name = {"sensor": self.name} if view.unseen_by else {}
+        hits = scene.raycast(np.ascontiguousarray(starts[clear]), targets[clear], **sensor_name)
         rows = np.asarray(hits.rows)
-        met = rows != NOTHING
+        hit = rows != NOTHING
         begin = np.linalg.norm(starts[clear] - pose[:3, 3], axis=1) if self._on_mast else 0.0
-        distance = np.where(met, begin + np.asarray(hits.fraction) * (settings.range - begin), np.inf)
+        distance = np.where(hit, begin + np.asarray(hits.fraction) * (settings.range - begin), np.inf)
         weather = scene.weather
-        facing = np.abs(np.einsum("mi,mi->m", np.asarray(hits.normal), ways[clear]))
+        facing = np.abs(np.einsum("mi,mi->m", np.asarray(hits.normal), rays[clear]))
         seed, *key = self._key
         draws = generator(seed, *key, view.tick)
         back = returns(
@@ -81,20 +81,21 @@ class Lidar:
         length = back.distance[kept]
         if settings.range_noise > 0.0:
             length = np.maximum(length + settings.range_noise * draws.standard_normal(len(kept)), 0.0)
-        chosen = clear[kept]
+        selected = clear[kept]
         return LidarReading(
-            directions[chosen] * length[:, None], back.intensity[kept], pose, ring[chosen], azimuth[chosen]
+            directions[selected] * length[:, None], back.intensity[kept], pose, ring[selected], azimuth[selected]
         )
 
     def _columns(self, time: float) -> NDArray[np.int64]:
-        """The numbers of the columns since the last reading."""
+        """Return the numbers of the columns since the last reading."""
         end = round(time * self._columns_per_second) + 1
         first = end - self._columns_per_turn if self._next is None else max(self._next, end - self._columns_per_turn)
         self._next = end
         return np.arange(first, end)
 
     def _rays(self, columns: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32], Array]:
-        """Directions (M, 3) in the sensor frame, rings (M,) and azimuths (M,) in (-pi, pi] of the rays of columns."""
+        """Return directions (M, 3) in the sensor frame, rings (M,) and azimuths (M,) in (-pi, pi] of the rays of
+        columns."""
         turn = self._columns_per_turn
         behind = (columns * 2 + turn) % (2 * turn) - turn
         azimuths = np.where(behind == -turn, turn, behind) * (math.pi / turn)

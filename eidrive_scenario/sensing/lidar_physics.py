@@ -1,4 +1,4 @@
-"""How much of a LiDAR's light comes back: from surfaces, through weather, and from the weather itself."""
+"""Intensity of lidar returns: from surfaces, through weather, and from the weather itself."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.weather import Weather
 
 WAVELENGTH = 0.905
-"""[µm]"""
+"""Wavelength [µm]."""
 REFLECTIVITY: Mapping[str, float] = {
     "car": 0.45,
     "truck": 0.50,
@@ -25,29 +25,31 @@ REFLECTIVITY: Mapping[str, float] = {
     "pedestrian": 0.35,
     "misc": 0.40,
 }
-"""Share of light that a body sends back in all directions, by class: values for car paint, metal, clothes and plastic
-between those that Muckenhuber et al. measured (Automotive lidar modeling approach based on material properties and
-lidar capabilities, Sensors 20, 2020)."""
+"""Diffuse reflectivity of bodies by class: values for car paint, metal, clothes and plastic within the measurements of
+Muckenhuber et al. (Automotive lidar modeling approach based on material properties and lidar capabilities, Sensors 20,
+2020)."""
 GROUND, WET_GROUND = 0.17, 0.06
-"""Of asphalt, buildings and what else stands there, and of asphalt under water."""
+"""Reflectivity of asphalt, buildings and other static objects, and of asphalt under water."""
 PULSE_LENGTH = 0.75
-"""Half the way that light goes during a pulse of 5 ns [m]: from so deep a layer of air light comes back at once."""
+"""Half the distance that light travels during a pulse of 5 ns [m]: the depth of air whose light returns simultaneously.
+"""
 BACKSCATTER = 0.046
-"""Of fog: its coefficient is this over the visibility [1/(m sr)] (Rasshofer, Spies, Spies: Influences of weather
+"""Backscatter coefficient of fog times the visibility [1/(m sr) m] (Rasshofer, Spies, Spies: Influences of weather
 phenomena on automotive laser radar systems, Advances in Radio Science 9, 2011)."""
 CONTRAST = math.log(20.0)
-"""Optical thickness along the meteorological visibility, which that source uses: 5 % contrast."""
+"""Optical depth along the meteorological visibility in that source: 5 % contrast."""
 OVERLAP = (0.9, 10.0)
-"""Between these distances the beam comes into the view of a receiver beside it [m]. A sensor whose views coincide at
-once (Hahner et al., Fog simulation on real LiDAR point clouds, ICCV 2021, have 1 m) would see nothing but fog of 50 m;
-tested ones do measure bodies in it (Bijelic, Gruber, Ritter: A benchmark for lidar sensors in fog, IV 2018)."""
+"""Distances between which the beam enters the field of view of a receiver beside it [m]. A sensor with immediate
+overlap (Hahner et al., Fog simulation on real LiDAR point clouds, ICCV 2021, have 1 m) would measure only fog at 50 m
+visibility; tested sensors measure bodies in it (Bijelic, Gruber, Ritter: A benchmark for lidar sensors in fog, IV
+2018)."""
 UNEVEN = {"rain": 0.15, "snow": 0.15, "none": 4.0}
-"""Shape of the gamma distribution by which the air's return varies from ray to ray: about the number of drops in the
-volume of a pulse where these are few (0.2 litres with less than a thousand drops per m³)."""
+"""Shape of the gamma distribution by which the return of the air varies between rays: approximately the number of drops
+in the volume of a pulse if there are few (0.2 liters with less than a thousand drops per m³)."""
 
 
 class Returns(NamedTuple):
-    """What the receiver takes from each ray: whether anything (M,), how far [m], and its intensity in [0, 1]."""
+    """Return of each ray: whether there is one (M,), its distance [m], and its intensity in [0, 1]."""
 
     found: NDArray[np.bool_]
     distance: Array
@@ -55,7 +57,10 @@ class Returns(NamedTuple):
 
 
 def extinction(weather: Weather) -> float:
-    """Of light of 905 nm [1/m]: fog by Kruse's law (ITU-R P.1814), drops as for visible light."""
+    """Return the extinction coefficient at 905 nm [1/m].
+
+    Fog follows Kruse's law (ITU-R P.1814), drops attenuate as for visible light.
+    """
     kilometers = weather.visual_range / 1000.0
     if kilometers > 50.0:
         power = 1.6
@@ -67,7 +72,7 @@ def extinction(weather: Weather) -> float:
 
 
 def reflectivity(rows: NDArray[np.int64], categories: Sequence[str], wetness: float) -> Array:
-    """(M,) of what rays met: rows of actors, negative for the rest."""
+    """Return the reflectivity (M,) of hit objects: rows of actors, negative for others."""
     ground = GROUND + min(2.0 * wetness, 1.0) * (WET_GROUND - GROUND)
     table = np.array([*(REFLECTIVITY.get(category, REFLECTIVITY["misc"]) for category in categories), ground])
     return table[np.where(rows < 0, len(categories), rows)]
@@ -82,12 +87,12 @@ def returns(
     ten_percent_range: float,
     draws: np.random.Generator,
 ) -> Returns:
-    """What comes back of rays that meet something at `distance` (M,), inf where nothing, of `brightness` (M,):
-    reflectivity times cosine of the angle to the normal.
+    """Return the measured returns of rays with hits at `distance` (M,), inf without a hit, of `brightness` (M,).
 
-    The power from a surface falls with exp(-2 extinction · d) / d² (radar equation of an area larger than the beam);
-    the receiver needs as much as a tenth of the light gives at `ten_percent_range` in clear air. Air that scatters
-    more than the surface gives, and enough, is measured in its place.
+    The brightness is the reflectivity times the cosine of the angle to the normal. The power from a surface falls with
+    exp(-2 extinction · d) / d² (radar equation of an area larger than the beam). The receiver requires the power of a
+    reflectivity of 0.1 at `ten_percent_range` in clear air. Air is measured instead of the surface if it scatters more
+    than the surface, and enough.
     """
     fade = extinction(weather)
     reach = np.maximum(distance, 1e-3)
@@ -113,7 +118,7 @@ def returns(
 
 @lru_cache(maxsize=32)
 def _air(fade: float, backscatter: float) -> tuple[Array, Array]:
-    """Distances [m], and the light that air sends back from there: backscatter · PULSE_LENGTH · exp(-2 fade r) / r²."""
+    """Return distances [m] and backscattered power: backscatter · PULSE_LENGTH · exp(-2 fade r) / r²."""
     ranges = np.linspace(OVERLAP[0], 20.0, 800)
     entered = np.clip((ranges - OVERLAP[0]) / (OVERLAP[1] - OVERLAP[0]), 0.0, 1.0)
     soft: Array = backscatter * PULSE_LENGTH * entered * np.exp(-2.0 * fade * ranges) / ranges**2

@@ -1,4 +1,4 @@
-"""Where sensors sit on a body, and where that is in the world."""
+"""Mounting of sensors on a body, and their poses in the world."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
 ABOVE_ROOF = 0.41
-"""A roof sensor stands this far above the body: 1.90 m on a car of 1.49 m [m]."""
+"""Height of a roof sensor above the body: 1.90 m on a car of 1.49 m [m]."""
 AHEAD_OF_BUMPER = 0.054
-"""The front camera sits this far ahead of the body: 2.5 m ahead of the middle of a car of 4.892 m [m]."""
+"""Distance of the front camera ahead of the body: 2.5 m ahead of the center of a car of 4.892 m [m]."""
 
 _OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Camera axes (x right, y down, z forward) as columns in a frame of x forward, y left, z up."""
@@ -24,7 +24,7 @@ _OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 @dataclass(frozen=True)
 class Mounting:
-    """A sensor's place in the actor's frame: position [m], yaw to the left and pitch downwards [rad]."""
+    """Pose of a sensor in the frame of the actor: position [m], yaw to the left and pitch downwards [rad]."""
 
     x: float
     y: float
@@ -33,13 +33,13 @@ class Mounting:
     pitch: float = 0.0
 
     def position(self, view: WorldView, row: int) -> tuple[float, float, float]:
-        """In the world [m]; pitch and roll neglected, as in the view's boxes."""
+        """Return the position in the world [m]; pitch and roll are neglected, as in the boxes of the view."""
         x, y, z, yaw, *_ = view.states[row]
         cos, sin = math.cos(yaw), math.sin(yaw)
         return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, z + self.z
 
     def pose(self, view: WorldView, row: int) -> Array:
-        """(4, 4) sensor to world, sensor frame x forward, y left, z up."""
+        """Return the pose (4, 4) sensor to world, sensor frame x forward, y left, z up."""
         body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
         pose = np.eye(4)
         pose[:3, :3] = body @ rotation_matrix(self.yaw, self.pitch)
@@ -47,26 +47,26 @@ class Mounting:
         return pose
 
     def camera_pose(self, view: WorldView, row: int) -> Array:
-        """(4, 4) camera to world, camera frame x right, y down, z forward."""
+        """Return the pose (4, 4) camera to world, camera frame x right, y down, z forward."""
         pose = self.pose(view, row)
         pose[:3, :3] = pose[:3, :3] @ _OPTICAL
         return pose
 
 
 def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:
-    """The place that the settings ask for, on this body; `usual` names the one of the kind where they do not.
+    """Return the mounting that the settings select on this body; `usual` is the default of the kind of sensor.
 
-    The named places are those of EI-Drive on a Lincoln MKZ, carried over to other bodies: they are measured from the
-    middle of the body's outline, at ground level. On a body without wheels (a mast) all are at its top.
+    The named mounts are those of EI-Drive on a Lincoln MKZ, transferred to other bodies: they are relative to the
+    center of the outline of the body, at ground level. On a body without wheels (a mast) all are at its top.
     """
     mount = settings.mount if settings.mount is not None else usual
     if isinstance(mount, Mount):
         return Mounting(mount.x, mount.y, mount.z, math.radians(mount.yaw), math.radians(mount.pitch))
-    middle_x, middle_y, middle_z = spec.offset
-    top = middle_z + spec.size[2] / 2.0
+    center_x, center_y, center_z = spec.offset
+    top = center_z + spec.size[2] / 2.0
     yaw = math.radians({"left": 100.0, "right": -100.0, "back": 180.0}.get(mount, 0.0))
     if spec.wheelbase <= 0.0:
-        return Mounting(middle_x, middle_y, top, yaw)
+        return Mounting(center_x, center_y, top, yaw)
     x, y, z = {
         "front": (spec.size[0] / 2.0 + AHEAD_OF_BUMPER, 0.0, 1.0),
         "left": (0.0, 0.3, top + ABOVE_ROOF - 0.1),
@@ -74,4 +74,4 @@ def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:
         "back": (-2.0, 0.0, top + ABOVE_ROOF - 0.1),
         "roof": (-0.5, 0.0, top + ABOVE_ROOF),
     }[mount]
-    return Mounting(middle_x + x, middle_y + y, z, yaw)
+    return Mounting(center_x + x, center_y + y, z, yaw)

@@ -1,4 +1,4 @@
-"""Lenses: pinhole cameras with the distortion of Brown and Conrady, as OpenCV has it."""
+"""Lenses: pinhole cameras with the distortion of Brown and Conrady, as in OpenCV."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.camera import Pinhole, Radiance
 
 
-class _Bend(NamedTuple):
-    """The straight picture to take, and where each pixel of the bent one lies in it (pixel centers at integers)."""
+class _Distortion(NamedTuple):
+    """Pinhole camera of the undistorted image, and positions of the distorted pixels in it (centers at integers)."""
 
     straight: Pinhole
     x: Floats
@@ -24,32 +24,32 @@ class _Bend(NamedTuple):
 
 
 def lens_of(settings: CameraSettings) -> Pinhole:
-    """The camera without its distortion."""
+    """Return the camera without its distortion."""
     fov = math.radians(settings.fov)
     return Pinhole.of_fov(settings.width, settings.height, fov, settings.near, settings.far)
 
 
 class Optics:
-    """How the picture of a lens is made from one without distortion, taken wide enough."""
+    """Distortion of an undistorted image with a sufficiently large field of view."""
 
     def __init__(self, settings: CameraSettings) -> None:
-        self._bend = _bend(settings) if any(settings.distortion) else None
-        self._finer = settings.supersampling
-        straight = lens_of(settings) if self._bend is None else self._bend.straight
-        self.pinhole = straight.finer(self._finer)
-        """The camera whose picture `bent` expects."""
+        self._distortion = _distortion(settings) if any(settings.distortion) else None
+        self._supersampling = settings.supersampling
+        straight = lens_of(settings) if self._distortion is None else self._distortion.straight
+        self.pinhole = straight.finer(self._supersampling)
+        """Camera of the image that `distort` expects."""
 
-    def bent(self, seen: Radiance) -> Radiance:
-        """The picture through the lens; depth and segmentation are those of the nearest ray, not blended."""
+    def distort(self, radiance: Radiance) -> Radiance:
+        """Return the image of the lens; depth and segmentation are those of the nearest ray, not interpolated."""
         luminance: Any
-        luminance, depth, segmentation = seen
-        if self._finer > 1:
-            size = (self.pinhole.width // self._finer, self.pinhole.height // self._finer)
+        luminance, depth, segmentation = radiance
+        if self._supersampling > 1:
+            size = (self.pinhole.width // self._supersampling, self.pinhole.height // self._supersampling)
             luminance = cv2.resize(luminance, size, interpolation=cv2.INTER_AREA)
-            middle = slice(self._finer // 2, None, self._finer)
+            middle = slice(self._supersampling // 2, None, self._supersampling)
             depth, segmentation = depth[middle, middle], segmentation[middle, middle]
-        if self._bend is not None:
-            x, y = self._bend.x, self._bend.y
+        if self._distortion is not None:
+            x, y = self._distortion.x, self._distortion.y
             luminance = cv2.remap(luminance, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
             row, column = np.rint(y).astype(np.intp), np.rint(x).astype(np.intp)
             depth, segmentation = depth[row, column], segmentation[row, column]
@@ -57,8 +57,8 @@ class Optics:
 
 
 @lru_cache(maxsize=32)
-def _bend(settings: CameraSettings) -> _Bend:
-    """For each pixel center, the direction that the lens shows there, found by iteration to 1e-9.
+def _distortion(settings: CameraSettings) -> _Distortion:
+    """Return the direction of each pixel center, found by iteration to 1e-9.
 
     Raise SettingError if the iteration does not converge, as with strong coefficients that compensate each other.
     """
@@ -74,14 +74,14 @@ def _bend(settings: CameraSettings) -> _Bend:
     (left, top), (right, bottom) = np.floor(low), np.ceil(high)
     straight = Pinhole(int(right - left), int(bottom - top), lens.focal, -left, -top, lens.near, lens.far)
     places = (rays * lens.focal - (left, top) - 0.5).astype(np.float32).reshape(lens.height, lens.width, 2)
-    return _Bend(straight, np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1]))
+    return _Distortion(straight, np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1]))
 
 
 def _check_convergence(rays: Array, pixels: Array, lens: Pinhole, settings: CameraSettings) -> None:
-    """Raise SettingError unless the lens shows each direction (N, 2) within a tenth of a pixel of its place (N, 2)."""
+    """Raise SettingError unless each direction (N, 2) projects within a tenth of a pixel of its position (N, 2)."""
     along = np.column_stack([rays, np.ones(len(rays))])
     none = np.zeros(3)
-    shown = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0][:, 0]
-    if not np.abs(shown - pixels).max() < 0.1:
-        what = f"the distortion {list(settings.distortion)} of a camera cannot be inverted"
-        raise SettingError(Diagnostic(what, "give smaller coefficients or a smaller fov"))
+    projected = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0][:, 0]
+    if not np.abs(projected - pixels).max() < 0.1:
+        what = f"distortion: the coefficients cannot be inverted (got {list(settings.distortion)})"
+        raise SettingError(Diagnostic(what, "use smaller coefficients or a smaller fov"))

@@ -1,4 +1,4 @@
-"""What the sensors of one station gave at one instant."""
+"""Sensor readings of one station at one instant."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from eidrive_scenario.records import fast_frozen
 @fast_frozen
 @dataclass(frozen=True)
 class EgoState:
-    """The station's own motion as it knows it: reference point (3,) [m], angles [rad], speed along heading [m/s]."""
+    """Ego motion as measured by the station: reference point (3,) [m], angles [rad], speed along the heading [m/s]."""
 
     time: float
     position: Array
@@ -25,7 +25,7 @@ class EgoState:
     speed: float
     yaw_rate: float
     acceleration: float
-    """Along the heading [m/s²]."""
+    """Acceleration along the heading [m/s²]."""
 
 
 @fast_frozen
@@ -33,8 +33,8 @@ class EgoState:
 class TruthReading:
     """Objects in the line of sight of a truth sensor: the input of the oracle detector.
 
-    names (N,), categories (N,), boxes (N, 7) in the world frame [m, rad], velocity (N, 2) [m/s],
-    visibility (N,) share of the sampled points of each object that are in sight, in (0, 1]
+    names (N,), categories (N,), boxes (N, 7) in the world frame [m, rad], velocity (N, 2) [m/s], visibility (N,) share
+    of the sampled points of each object that are in sight, in (0, 1]
     """
 
     names: tuple[str, ...]
@@ -46,11 +46,11 @@ class TruthReading:
 
 @dataclass(frozen=True)
 class CameraReading:
-    """A picture and where it was taken.
+    """Image and camera pose.
 
-    rgb (H, W, 3) uint8, depth (H, W) float32 along the optical axis [m], segmentation (H, W) int32: row of the actor
-    in the world's view, -1 for everything else; intrinsics (3, 3) [px], where pixel (j, i) covers [j, j + 1) x
-    [i, i + 1); pose (4, 4) camera to world, camera frame x right, y down, z forward; distortion (5,) k1, k2, p1, p2, k3
+    rgb (H, W, 3) uint8, depth (H, W) float32 along the optical axis [m], segmentation (H, W) int32: row of the actor in
+    the view of the world, -1 for everything else; intrinsics (3, 3) [px], where pixel (j, i) covers [j, j + 1) x [i, i
+    + 1); pose (4, 4) camera to world, camera frame x right, y down, z forward; distortion (5,) k1, k2, p1, p2, k3
     """
 
     rgb: NDArray[np.uint8]
@@ -63,10 +63,11 @@ class CameraReading:
 
 @dataclass(frozen=True)
 class LidarReading:
-    """A LiDAR sweep.
+    """Lidar point cloud.
 
     points (N, 3) in the sensor frame [m], intensity (N,) in [0, 1]; pose (4, 4) sensor to world; ring (N,) number of
-    the channel, 0 the highest; azimuth (N,) of the head at the measurement, from the sensor's x axis to the left [rad]
+    the channel, 0 the highest; azimuth (N,) of the head at the measurement, from the x axis of the sensor to the left
+    [rad]
     """
 
     points: Array
@@ -78,7 +79,7 @@ class LidarReading:
 
 @dataclass(frozen=True)
 class GnssReading:
-    """Where a satellite receiver says the station's reference point is.
+    """Position of the reference point of the station, measured by GNSS.
 
     position (3,) in the world frame [m], covariance (3, 3) of its error [m²]
     """
@@ -89,9 +90,9 @@ class GnssReading:
 
 @dataclass(frozen=True)
 class ImuReading:
-    """What an inertial unit measured in the body's frame, x forward, y left, z up.
+    """Measurement of an IMU in the body frame, x forward, y left, z up.
 
-    acceleration (3,) of the reference point, gravity taken out [m/s²]; angular_rate (3,) about the axes [rad/s]
+    acceleration (3,) of the reference point without gravity [m/s²]; angular_rate (3,) about the axes [rad/s]
     """
 
     acceleration: Array
@@ -100,7 +101,7 @@ class ImuReading:
 
 @dataclass(frozen=True)
 class SignalReading:
-    """A traffic light in sight: its id in the road network, and the state that it shows."""
+    """Traffic light or stop sign in sight: its id in the road network, and its state."""
 
     id: str
     state: str
@@ -109,7 +110,7 @@ class SignalReading:
 @fast_frozen
 @dataclass(frozen=True)
 class Readings:
-    """All sensors of one station; a sensor that was not due this tick is missing."""
+    """Readings of all sensors of one station; sensors that were not due in this tick are missing."""
 
     time: float
     ego: EgoState
@@ -119,4 +120,4 @@ class Readings:
     gnss: GnssReading | None = None
     imu: ImuReading | None = None
     signals: tuple[SignalReading, ...] = ()
-    """The traffic lights in sight, where the station looks out for them."""
+    """Signals in sight, for stations with a signal sensor."""

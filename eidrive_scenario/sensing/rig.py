@@ -1,4 +1,4 @@
-"""The sensors of one station, and the reading of all stations' sensors at once."""
+"""Sensors of one station, and the reading of the sensors of all stations."""
 
 from __future__ import annotations
 
@@ -25,15 +25,14 @@ from eidrive_scenario.world.view import WorldView
 Sensor = TruthSensor | Camera | Lidar | Gnss | Imu
 
 _SINGLE = {TruthSensor: "truth sensor", Gnss: "GNSS receiver", Imu: "inertial unit"}
-"""Of these a station has at most one."""
+"""Kinds of sensors of which a station has at most one."""
 
 
 class Rig:
-    """The sensors that sit on one actor. A sensor with a rate is read when its next period has begun.
+    """Sensors of one actor. A sensor with a rate is read in the first tick of each period.
 
-    `seed` is that of the noise of all sensors.
-
-    Raises ValueError if there is more than one truth sensor, GNSS receiver or inertial unit.
+    `seed` is that of the noise of all sensors. Raise ValueError if there is more than one truth sensor, GNSS receiver
+    or IMU.
     """
 
     def __init__(self, spec: ActorSpec, sensors: Mapping[str, SensorSettings], *, seed: int = 0) -> None:
@@ -44,14 +43,14 @@ class Rig:
         self._periods: dict[str, int] = {}
         for kind, name in _SINGLE.items():
             if sum(isinstance(sensor, kind) for sensor in self._sensors.values()) > 1:
-                raise ValueError(f"station {spec.name!r} has more than one {name}")
+                raise ValueError(f"sensors: station {spec.name!r} has more than one {name}")
 
     def read(self, scene: Scene, view: WorldView) -> Readings:
-        """Own motion, and the sensors that are due. Raises KeyError if the actor is not in the world."""
+        """Return the ego motion and the readings of due sensors. Raise KeyError if the actor is not in the world."""
         return read_all([self], scene, view)[self.station]
 
     def due(self, time: float) -> dict[str, Sensor]:
-        """The sensors to read at `time` [s]; asking counts as reading."""
+        """Return the sensors to read at `time` [s]; they count as read afterwards."""
         found = {}
         for name, sensor in self._sensors.items():
             rate = sensor.settings.rate
@@ -65,17 +64,19 @@ class Rig:
 
 
 def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Readings]:
-    """The readings of several stations, by name; the rays of their truth sensors go out in one batch."""
+    """Return the readings of several stations, by name; the rays of their truth sensors are cast in one batch."""
     due = [rig.due(view.time) for rig in rigs]
     rows = [view.row(rig.station) for rig in rigs]
-    sighted = [
+    truth_sensors = [
         (index, sensor)
         for index, found in enumerate(due)
         for sensor in found.values()
         if isinstance(sensor, TruthSensor)
     ]
-    seen = read_truth([sensor for _, sensor in sighted], [rows[index] for index, _ in sighted], scene, view)
-    truths = {index: reading for (index, _), reading in zip(sighted, seen, strict=True)}
+    truth_readings = read_truth(
+        [sensor for _, sensor in truth_sensors], [rows[index] for index, _ in truth_sensors], scene, view
+    )
+    truths = {index: reading for (index, _), reading in zip(truth_sensors, truth_readings, strict=True)}
     return {
         rig.station: _read(found, scene, view, row, truths.get(index))
         for index, (rig, found, row) in enumerate(zip(rigs, due, rows, strict=True))
@@ -85,7 +86,7 @@ def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Re
 def _read(
     sensors: Mapping[str, Sensor], scene: Scene, view: WorldView, row: int, truth: TruthReading | None
 ) -> Readings:
-    """The readings of one station, whose truth sensor has been read."""
+    """Return the readings of one station, given that of its truth sensor."""
     cameras: dict[str, CameraReading] = {}
     lidars: dict[str, LidarReading] = {}
     gnss = imu = None
@@ -102,7 +103,7 @@ def _read(
 
 
 def ego_state(view: WorldView, row: int) -> EgoState:
-    """The actor's own motion, exact."""
+    """Return the exact motion of the actor."""
     state = view.states[row]
     yaw = state.yaw
     return EgoState(
@@ -129,4 +130,4 @@ def _sensor(settings: SensorSettings, spec: ActorSpec, name: str, seed: int) -> 
             return Gnss(settings, spec, name, seed)
         case ImuSettings():
             return Imu(settings, spec, name, seed)
-    raise TypeError(f"no sensor reads {type(settings).__name__}")
+    raise TypeError(f"sensors: unknown type of settings (got {type(settings).__name__})")

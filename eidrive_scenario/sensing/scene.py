@@ -1,4 +1,4 @@
-"""What sensors ask of the world: rays and pictures. `eidrive_scenario.world.World` answers."""
+"""Interface between sensors and the world: rays and images. `eidrive_scenario.world.World` implements it."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from eidrive_scenario.world.weather import Weather
 Point = tuple[float, float, float]
 
 NOTHING = -2
-"""In RayHits.rows: the ray met nothing. -1 is the ground, the road or a building."""
+"""Value of RayHits.rows for rays without a hit. -1 is the ground, the road or a building."""
 
 
 class RayHitsView(Protocol):
-    """Where each of M rays ended first."""
+    """First hit of each of M rays."""
 
     @property
     def rows(self) -> NDArray[Any]:
-        """(M,) row of the actor in the world's view, -1 for what is no actor, NOTHING."""
+        """Row (M,) of the actor in the view of the world, -1 for other objects, or NOTHING."""
 
     @property
     def fraction(self) -> Array:
-        """(M,) share of the way from origin to target, 1 where nothing was met."""
+        """Share (M,) of the distance from origin to target, 1 without a hit."""
 
     @property
     def normal(self) -> Array:
-        """(M, 3) of the surfaces met, zero where nothing was."""
+        """Normals (M, 3) of the surfaces, zero without a hit."""
 
 
 class Scene(Protocol):
-    """The part of the world that sensors see."""
+    """Part of the world that sensors measure."""
 
     @property
     def weather(self) -> Weather:
-        """The weather at present."""
+        """Current weather."""
 
     def raycast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHitsView:
-        """Rays from (M, 3) to (M, 3) [m], of the sensor of this name, which may not see some actors."""
+        """Cast rays from (M, 3) to (M, 3) [m] for the sensor of this name, from which some actors may be hidden."""
 
     def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> Sequence[int]:
-        """The same rows as of `raycast`, for a few rays in plain numbers."""
+        """Return the same rows as `raycast`, for a few rays in scalar arithmetic."""
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
-        """The light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""
+        """Return the light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""

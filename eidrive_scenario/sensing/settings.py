@@ -1,4 +1,4 @@
-"""Settings of sensors as a person types them: meters, degrees, hertz."""
+"""User settings of sensors, in meters, degrees and hertz."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from eidrive_scenario.settings import Settings
 Rate = Annotated[float, Field(ge=0.01, le=10_000.0)]
 """Readings per second [Hz]."""
 MAX_RANGE = 1e5
-"""Largest range of a sensor [m]."""
+"""Maximum range of a sensor [m]."""
 MAX_RAYS = 2_000_000
-"""Maximum number of rays of one reading: of a revolution of a LiDAR, or between two readings."""
+"""Maximum number of rays of one reading: of a lidar revolution, or between two readings."""
 MAX_PIXELS = 32_000_000
-"""Maximum number of pixels that are computed for one picture, those of supersampling counted."""
+"""Maximum number of computed pixels of one image, including supersampling."""
 
 MountName = Literal["front", "left", "right", "back", "roof"]
 
 
 class Mount(Settings):
-    """Where a sensor sits in the actor's frame [m] and where it looks [degrees]: yaw to the left, pitch downwards."""
+    """Sensor pose in the frame of the actor: position [m] and angles [degrees], yaw to the left, pitch downwards."""
 
     x: Annotated[float, Field(ge=-1000.0, le=1000.0)]
     y: Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -32,10 +32,10 @@ class Mount(Settings):
 
 
 def _mount(value: Any) -> Any:
-    """A mount may be written as a list: x, y, z, then yaw and pitch if they are not 0."""
+    """Return a mount given as a list as a mapping: x, y, z, then optional yaw and pitch."""
     if isinstance(value, (list, tuple)) and all(isinstance(part, (int, float)) for part in value):
         if not 3 <= len(value) <= 5:
-            raise ValueError("a mount has three to five numbers: x, y, z [m], yaw, pitch [degrees]")
+            raise ValueError("three to five numbers are expected: x, y, z [m], yaw, pitch [degrees]")
         return dict(zip(("x", "y", "z", "yaw", "pitch"), value, strict=False))
     return value
 
@@ -44,19 +44,19 @@ MountSetting = Annotated[Mount | MountName | None, BeforeValidator(_mount)]
 
 
 class SensorSettings(Settings):
-    """What all sensors have: a mount (None is the usual one of the kind) and a rate (None is each tick)."""
+    """Settings of all sensors: a mount (None: default of the kind) and a rate (None: each tick)."""
 
     mount: MountSetting = None
     rate: Rate | None = None
-    """[Hz]"""
+    """Rate [Hz]."""
 
 
 class TruthSettings(SensorSettings):
-    """The sensor behind the oracle: exact boxes of what is in its line of sight.
+    """Settings of the sensor of the oracle: exact boxes of objects in the line of sight.
 
-    range          to the center of an object from the center of the own body [m]
-    field_of_view  horizontal, about the mount's heading [degrees]
-    visibility     least share of an object's sampled points that must be in sight
+    range          maximum distance between the centers of the object and the ego body [m]
+    field_of_view  horizontal, about the heading of the mount [degrees]
+    visibility     minimum share of the sampled points of an object in sight
     """
 
     kind: Literal["truth"] = "truth"
@@ -66,34 +66,34 @@ class TruthSettings(SensorSettings):
 
 
 class NoiseSettings(Settings):
-    """Of a camera's sensor, in electrons: what a pixel holds when it is full, and the deviation of reading it."""
+    """Noise of an image sensor, in electrons: full-well capacity of a pixel, and standard deviation of the readout."""
 
     full_well: Annotated[float, Field(ge=1.0, le=1e9)] = 12_000.0
     read_noise: Annotated[float, Field(ge=0.0, le=1e6)] = 4.0
 
 
 def _distortion(value: Any) -> Any:
-    """Distortion as a list of up to five coefficients, in OpenCV's order."""
+    """Return distortion as five coefficients in OpenCV's order; missing ones are 0."""
     if isinstance(value, (list, tuple)):
         if len(value) > 5:
-            raise ValueError("distortion has up to five coefficients: k1, k2, p1, p2, k3")
+            raise ValueError("up to five coefficients are expected: k1, k2, p1, p2, k3")
         return tuple(value) + (0.0,) * (5 - len(value))
     return value
 
 
 def _noise(value: Any) -> Any:
-    """`none` and `off` are no noise; YAML reads the latter as false."""
+    """Return None for `none` and `off`, which YAML reads as false."""
     return None if value in ("none", "off", False) else value
 
 
 class CameraSettings(SensorSettings):
-    """A camera. Lengths in meters, `width` and `height` in pixels, times in seconds.
+    """Settings of a camera. Lengths in meters, `width` and `height` in pixels, times in seconds.
 
-    fov            horizontal, of the picture without distortion [degrees]
-    distortion     k1, k2, p1, p2, k3 of Brown and Conrady, as OpenCV has them
-    near, far      what is nearer or farther is not drawn
-    noise          of the sensor; None is a sensor without
-    exposure_time, gain   [s], [dB]; None is automatic, within max_exposure_time and max_gain
+    fov            horizontal, of the undistorted image [degrees]
+    distortion     k1, k2, p1, p2, k3 of Brown and Conrady, as in OpenCV
+    near, far      distances between which objects are drawn
+    noise          of the image sensor; None: no noise
+    exposure_time, gain   [s], [dB]; None: automatic, within max_exposure_time and max_gain
     lens_drops     whether rain reaches the lens
     supersampling  rays per pixel and axis: 2 smooths edges at four times the cost
     """
@@ -115,20 +115,23 @@ class CameraSettings(SensorSettings):
     supersampling: int = Field(default=1, ge=1, le=4)
 
     @model_validator(mode="after")
-    def _something_between(self) -> CameraSettings:
+    def _check_limits(self) -> CameraSettings:
         if self.near >= self.far:
-            raise ValueError(f"near {self.near:g} is not before far {self.far:g}")
-        if self.width * self.height * self.supersampling**2 > MAX_PIXELS:
-            raise ValueError(f"more than {MAX_PIXELS} pixels with supersampling: lower width, height or supersampling")
+            raise ValueError(f"near is not smaller than far (got {self.near:g} and {self.far:g})")
+        pixels = self.width * self.height * self.supersampling**2
+        if pixels > MAX_PIXELS:
+            raise ValueError(
+                f"the image has too many pixels with supersampling (got {pixels}; expected at most {MAX_PIXELS})"
+            )
         if any(abs(coefficient) > 1e3 for coefficient in self.distortion):
-            raise ValueError("a coefficient of the distortion is beyond 1000")
+            raise ValueError("a coefficient of the distortion is out of range (expected -1000 to 1000)")
         return self
 
     @model_validator(mode="after")
     def _lens_maps_one_to_one(self) -> CameraSettings:
-        """Every pixel must see one direction: the distorted radius grows with the true one as far as the corners.
+        """Check that each pixel has one direction: the distorted radius increases with the true one up to the corners.
 
-        At radius r, p1 and p2 move a point by at most 3 |p| r², so that much less of the growth is certain.
+        At radius r, p1 and p2 move a point by at most 3 |p| r², which reduces the guaranteed increase.
         """
         k1, k2, p1, p2, k3 = self.distortion
         if not any(self.distortion):
@@ -140,41 +143,40 @@ class CameraSettings(SensorSettings):
         for step in range(1, 401):
             radius = 4.0 * corner * step / 400
             square = radius * radius
-            further = radius * (1.0 + square * (k1 + square * (k2 + square * k3))) - decentering * square
-            if further <= distorted:
+            next_distorted = radius * (1.0 + square * (k1 + square * (k2 + square * k3))) - decentering * square
+            if next_distorted <= distorted:
                 break
-            distorted = further
+            distorted = next_distorted
             if distorted >= corner:
-                return self._with_straight_picture(radius / corner)
+                return self._check_undistorted_size(radius / corner)
         raise ValueError(
-            f"this distortion folds the picture {math.degrees(math.atan(radius)):.0f} degrees off its axis"
+            f"the distortion folds the image {math.degrees(math.atan(radius)):.0f} degrees off the optical axis"
         )
 
-    def _with_straight_picture(self, scale: float) -> CameraSettings:
-        """Bound the picture without distortion, which is `scale` times as wide and high, by as many pixels."""
+    def _check_undistorted_size(self, scale: float) -> CameraSettings:
+        """Limit the pixels of the undistorted image, which is `scale` times as wide and high."""
         if self.width * self.height * self.supersampling**2 * scale**2 > 1.1 * MAX_PIXELS:
             raise ValueError(
-                f"the picture without this distortion has more than {MAX_PIXELS} pixels: lower width, height, "
-                "supersampling or fov"
+                f"the undistorted image has more than {MAX_PIXELS} pixels (reduce width, height, supersampling or fov)"
             )
         return self
 
 
 class LidarSettings(SensorSettings):
-    """A spinning LiDAR: rings spread evenly over the vertical field of view [degrees], or as `elevations` say.
+    """Settings of a rotating lidar with rings at equal spacing over the vertical field of view, or at `elevations`.
 
-    range          beyond it nothing is measured [m]
-    points_per_second  rays, of all channels
+    range          maximum measured distance [m]
+    points_per_second  rays of all channels
     rotation       revolutions per second [Hz]
-    field_of_view  horizontal, about the mount's heading [degrees]
-    elevations     of the rings above the horizon, from the highest on [degrees]; None spreads them
-    attenuation    of the intensity with distance, besides that by the weather [1/m]
+    field_of_view  horizontal, about the heading of the mount [degrees]
+    elevations     of the rings above the horizon, from the highest on [degrees]; None: equal spacing
+    attenuation    of the intensity with distance, in addition to that of the weather [1/m]
     range_noise    standard deviation of a distance [m]
-    ten_percent_range  in clear air, as far a surface that returns a tenth of the light is measured [m]
+    ten_percent_range  maximum measured distance of a surface of reflectivity 0.1 in clear air [m]
     dropoff        share of returns that are lost at random
     dropoff_intensity, dropoff_dark   a return below this intensity is lost with a probability that rises to
-                   `dropoff_dark` where it is black
-    weather        whether fog, rain and snow weaken returns and give false ones
+                   `dropoff_dark` at intensity 0
+    weather        whether fog, rain and snow attenuate returns and cause false ones
     """
 
     kind: Literal["lidar"] = "lidar"
@@ -195,29 +197,31 @@ class LidarSettings(SensorSettings):
     weather: bool = True
 
     @model_validator(mode="after")
-    def _ordered(self) -> LidarSettings:
+    def _check_consistency(self) -> LidarSettings:
         if self.lower_fov > self.upper_fov:
-            raise ValueError(f"lower_fov {self.lower_fov:g} lies above upper_fov {self.upper_fov:g}")
+            raise ValueError(f"lower_fov exceeds upper_fov (got {self.lower_fov:g} and {self.upper_fov:g})")
         if self.elevations is not None and len(self.elevations) != self.channels:
-            raise ValueError(f"{self.channels} channels need as many elevations, found {len(self.elevations)}")
+            raise ValueError(f"elevations has the wrong length (got {len(self.elevations)}; expected {self.channels})")
         rays = max(self.points_per_second / self.rotation, self.points_per_second / (self.rate or math.inf))
         if rays > MAX_RAYS:
-            raise ValueError(f"{rays:.3g} rays in one reading are more than {MAX_RAYS}: lower points_per_second")
+            raise ValueError(
+                f"points_per_second gives too many rays in one reading (got {rays:.3g}; expected at most {MAX_RAYS})"
+            )
         columns = self.points_per_second / self.channels / self.rotation
         if columns < 1.0:
             raise ValueError(
-                f"{self.points_per_second} points per second are less than one column in each of "
-                f"{self.rotation:g} revolutions of {self.channels} channels"
+                f"points_per_second gives less than one column per revolution (got {self.points_per_second}; "
+                f"expected at least {self.channels} channels x {self.rotation:g} revolutions)"
             )
         return self
 
 
 class GnssSettings(SensorSettings):
-    """A satellite receiver that tells where the station's reference point is. Standard deviations.
+    """Settings of a GNSS receiver that measures the reference point of the station. Standard deviations.
 
-    position_noise, height_noise   white, per reading: each horizontal axis, and upwards [m]
-    bias           of each horizontal axis when the run begins [m]
-    bias_walk      how fast that wanders [m/√s]
+    position_noise, height_noise   white, per reading: each horizontal axis, and vertical [m]
+    bias           of each horizontal axis at the start of the run [m]
+    bias_walk      random walk of the bias [m/√s]
     oracle         exact readings
     """
 
@@ -231,11 +235,11 @@ class GnssSettings(SensorSettings):
 
 
 class ImuSettings(SensorSettings):
-    """An inertial unit at the station's reference point. Noise as densities, biases as standard deviations.
+    """Settings of an IMU at the reference point of the station. Noise as densities, biases as standard deviations.
 
     accelerometer_noise, gyroscope_noise   white [m/s²/√Hz], [rad/s/√Hz]
-    accelerometer_bias, gyroscope_bias     of each axis when the run begins [m/s²], [rad/s]
-    accelerometer_walk, gyroscope_walk     how fast these wander [m/s²/√s], [rad/s/√s]
+    accelerometer_bias, gyroscope_bias     of each axis at the start of the run [m/s²], [rad/s]
+    accelerometer_walk, gyroscope_walk     random walk of the biases [m/s²/√s], [rad/s/√s]
     oracle         exact readings
     """
 

@@ -1,4 +1,4 @@
-"""The lookout for traffic lights and stop signs: what the map knows and nothing hides."""
+"""Signal sensor: traffic lights and stop signs of the map in the line of sight."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from eidrive_scenario.world.view import WorldView
 SIGNAL_KINDS = frozenset({"light", "stop sign"})
 
 RANGE = 100.0
-"""How far lights and signs are made out [m]."""
+"""Maximum distance of readable lights and signs [m]."""
 ASIDE = math.radians(80.0)
-"""From farther beside its front a face does not show what is on it [rad]."""
+"""Maximum angle between the normal of a face and the direction to the sensor [rad]."""
 BEFORE = 0.4
-"""Rays end this much before the face, as it has a housing [m]."""
+"""Distance of the end of rays in front of the face, because of its housing [m]."""
 
 
 class SignalSensor:
-    """Reads signals of some kinds, out of SIGNAL_KINDS, that face the station, within range and in the line of sight.
+    """Sensor of signals of some kinds, out of SIGNAL_KINDS, that face the station, within range and line of sight.
 
-    It looks ahead and aside from the roof, so that a vehicle at its stop line still sees a light beside it. A stop sign
-    is a reading without a state, and so is a light that shows nothing.
+    Its field of view from the roof covers the front and the sides, so that a vehicle at its stop line has a light
+    beside it in view. A stop sign is a reading without a state, and so is a dark light.
     """
 
     def __init__(self, spec: ActorSpec, roads: RoadNetwork | None, kinds: Collection[str] = SIGNAL_KINDS) -> None:
@@ -42,33 +42,36 @@ class SignalSensor:
         self._facing: Array = np.array([(math.cos(head.pose.h), math.sin(head.pose.h), 0.0) for head in heads]).reshape(
             -1, 3
         )
-        middles = [(head.pose.x, head.pose.y, head.pose.z + head.height / 2.0) for head in heads]
-        self._faces: Array = np.array(middles).reshape(-1, 3) + BEFORE * self._facing
+        centers = [(head.pose.x, head.pose.y, head.pose.z + head.height / 2.0) for head in heads]
+        self._faces: Array = np.array(centers).reshape(-1, 3) + BEFORE * self._facing
 
     def read(self, scene: Scene, view: WorldView, row: int, states: Mapping[str, str]) -> tuple[SignalReading, ...]:
-        """What the actor in this row sees; `states` by the ids of the signals."""
+        """Return the signals in sight of the actor in this row; `states` by signal id."""
         if not self._ids:
             return ()
-        eye = np.array(self._mounting.position(view, row))
-        way = eye - self._faces
-        distance = np.linalg.norm(way, axis=1)
-        before = np.einsum("ni,ni->n", way, self._facing) >= math.cos(ASIDE) * distance
+        origin = np.array(self._mounting.position(view, row))
+        offset = origin - self._faces
+        distance = np.linalg.norm(offset, axis=1)
+        is_facing = np.einsum("ni,ni->n", offset, self._facing) >= math.cos(ASIDE) * distance
         heading = float(view.yaw[row])
-        ahead = way[:, 0] * math.cos(heading) + way[:, 1] * math.sin(heading) < 0.0
-        near = np.flatnonzero((distance <= RANGE) & before & ahead)
+        is_ahead = offset[:, 0] * math.cos(heading) + offset[:, 1] * math.sin(heading) < 0.0
+        near = np.flatnonzero((distance <= RANGE) & is_facing & is_ahead)
         if not near.size:
             return ()
-        hits = scene.raycast(np.broadcast_to(eye, (near.size, 3)).copy(), self._faces[near])
-        seen = near[np.asarray(hits.rows) == NOTHING]
-        return tuple(SignalReading(self._ids[index], states.get(self._ids[index], "")) for index in seen.tolist())
+        hits = scene.raycast(np.broadcast_to(origin, (near.size, 3)).copy(), self._faces[near])
+        visible = near[np.asarray(hits.rows) == NOTHING]
+        return tuple(SignalReading(self._ids[index], states.get(self._ids[index], "")) for index in visible.tolist())
 
 
 def signal_kind(signal: Signal) -> str | None:
-    """One of SIGNAL_KINDS, None for what is none of them."""
+    """Return one of SIGNAL_KINDS, or None for other signals."""
     return "light" if signal.dynamic else "stop sign" if is_stop_sign(signal) else None
 
 
 def is_stop_sign(signal: Signal) -> bool:
-    """Whether a sign tells to stop: 206 of the German catalog, which OpenDRIVE files use, or R1-1 of the American."""
+    """Return whether a sign requires a stop.
+
+    These are 206 of the German catalog, which OpenDRIVE files use, and R1-1 of the American one.
+    """
     kind = signal.type.upper()
     return not signal.dynamic and (kind in ("206", "R1-1") or (kind == "R1" and signal.subtype == "1"))

@@ -1,4 +1,4 @@
-"""The truth sensor: exact boxes of the objects in its line of sight, asked of the world by rays."""
+"""Truth sensor: exact boxes of the objects in its line of sight, determined by ray casting."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
 INSET = 0.9
-"""The sampled corners lie at this share of the way from center to corner, so that a ray to one meets the body."""
+"""Position of the sampled corners as a share of the distance from center to corner, so that a ray to one hits the body.
+"""
 
 SAMPLES = np.array(
     [[x * INSET, y * INSET, z * INSET] for x in (1, -1) for y in (1, -1) for z in (1, -1)]
     + [[0.0, 0.0, 0.0], [0.0, 0.0, INSET]]
 )
-"""(10, 3) points of a box, in half lengths from its center: eight corners, the center, the middle of the top."""
+"""Points (10, 3) of a box, in half lengths from its center: eight corners, the center, the middle of the top."""
 
 FEW_PAIRS, FEW_RAYS = 64, 80
-"""Up to so many pairs of a sensor and an actor, and so many rays, plain numbers are faster than arrays."""
+"""Maximum number of sensor-actor pairs, and of rays, for which scalar arithmetic is faster than arrays."""
 
 
 class TruthSensor:
-    """Reports an object if its center is within range and field of view and enough of its points are in sight.
+    """Sensor of objects whose center is within range and field of view, with enough of their points in sight.
 
-    Range is measured between the centers of the bodies; rays start at the mount and pass through the own body.
+    The range is measured between the centers of the bodies; rays start at the mount and pass through the ego body.
     """
 
     def __init__(self, settings: TruthSettings, spec: ActorSpec, name: str = "truth") -> None:
@@ -46,17 +47,17 @@ class TruthSensor:
 def read_truth(
     sensors: Sequence[TruthSensor], rows: Sequence[int], scene: Scene, view: WorldView
 ) -> list[TruthReading]:
-    """What each sensor sees from the actor in its row; all rays of all sensors go out in one batch.
+    """Return the reading of each sensor on the actor in its row; all rays of all sensors are cast in one batch.
 
-    Where the scenario hides actors from sensors by their names, each looks for itself.
+    If the scenario hides actors from named sensors, each sensor is read separately.
     """
     if not sensors:
         return []
     if view.unseen_by:
-        return [_read_alone(sensor, row, scene, view) for sensor, row in zip(sensors, rows, strict=True)]
+        return [_read_single(sensor, row, scene, view) for sensor, row in zip(sensors, rows, strict=True)]
     unseen = [view.rows[name] for name in view.unseen if name in view.rows]
-    look = few_candidates if len(sensors) * len(view.names) <= FEW_PAIRS else candidates
-    targets = look(sensors, rows, view, unseen)
+    select = few_candidates if len(sensors) * len(view.names) <= FEW_PAIRS else candidates
+    targets = select(sensors, rows, view, unseen)
     shares: Sequence[float] = ()
     if any(targets):
         few = sum(map(len, targets)) * len(SAMPLES) <= FEW_RAYS
@@ -70,7 +71,7 @@ def read_truth(
     return readings
 
 
-def _read_alone(sensor: TruthSensor, row: int, scene: Scene, view: WorldView) -> TruthReading:
+def _read_single(sensor: TruthSensor, row: int, scene: Scene, view: WorldView) -> TruthReading:
     unseen = [view.rows[name] for name in view.hidden_from(sensor.name) if name in view.rows]
     targets = candidates([sensor], [row], view, unseen)
     shares = visibilities([sensor], [row], targets, scene, view, sensor.name) if targets[0] else []
@@ -93,7 +94,8 @@ def _reading(view: WorldView, seen: Sequence[tuple[int, float]]) -> TruthReading
 def candidates(
     sensors: Sequence[TruthSensor], own: Sequence[int], view: WorldView, unseen: Sequence[int]
 ) -> list[list[int]]:
-    """For each sensor the rows of objects within range and field of view, but for the own body and unseen ones."""
+    """Return for each sensor the rows of objects within range and field of view, without the ego body and unseen
+    actors."""
     boxes = view.boxes
     stations = np.asarray(own, dtype=np.intp)
     offset = boxes[None, :, :3] - boxes[stations, None, :3]
@@ -113,7 +115,7 @@ def candidates(
 def few_candidates(
     sensors: Sequence[TruthSensor], own: Sequence[int], view: WorldView, unseen: Sequence[int]
 ) -> list[list[int]]:
-    """The same as `candidates` in plain numbers."""
+    """Return the same as `candidates` in scalar arithmetic."""
     boxes = view.plain_boxes
     found: list[list[int]] = []
     for sensor, station in zip(sensors, own, strict=True):
@@ -140,9 +142,9 @@ def visibilities(
     view: WorldView,
     name: str = "",
 ) -> list[float]:
-    """Shares of the objects' sampled points that are in sight, of the objects of each sensor in turn.
+    """Return the shares of sampled points in sight, of the objects of each sensor in turn.
 
-    With a name, past actors that the scenario hides from the sensor of that name.
+    With a name, actors that the scenario hides from the sensor of that name are transparent.
     """
     boxes = view.boxes
     sensor_of = np.repeat(np.arange(len(sensors)), [len(rows) for rows in targets])
@@ -162,7 +164,7 @@ def visibilities(
 def few_visibilities(
     sensors: Sequence[TruthSensor], own: Sequence[int], targets: Sequence[Sequence[int]], scene: Scene, view: WorldView
 ) -> list[float]:
-    """The same as `visibilities` in plain numbers."""
+    """Return the same as `visibilities` in scalar arithmetic."""
     boxes = view.plain_boxes
     starts: list[Point] = []
     points: list[Point] = []
@@ -186,7 +188,7 @@ def few_visibilities(
 
 
 def _above(origin: Point, own: Sequence[float], other: Sequence[float]) -> bool:
-    """Whether all rays from an origin above the own body to another box surely leave it behind while above its top."""
+    """Return whether all rays from an origin above the ego body to another box certainly pass above the ego body."""
     x, y, z = origin
     drop = z - own[2] - own[5] / 2.0
     if drop <= 0.0:
@@ -198,7 +200,7 @@ def _above(origin: Point, own: Sequence[float], other: Sequence[float]) -> bool:
 
 
 def _points(boxes: Array) -> Array:
-    """(P, 10, 3) sampled points of boxes (P, 7)."""
+    """Return sampled points (P, 10, 3) of boxes (P, 7)."""
     local = SAMPLES * (boxes[:, None, 3:6] / 2.0)
     cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
     points = np.empty_like(local)
@@ -209,7 +211,7 @@ def _points(boxes: Array) -> Array:
 
 
 def _few_points(box: Sequence[float]) -> list[Point]:
-    """The sampled points of one box, as in SAMPLES."""
+    """Return the sampled points of one box, in the order of SAMPLES."""
     x, y, z, length, width, height, yaw = box
     ahead, aside, up = INSET / 2.0 * length, INSET / 2.0 * width, z + INSET / 2.0 * height
     down = 2.0 * z - up

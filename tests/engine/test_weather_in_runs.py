@@ -76,9 +76,9 @@ def test_an_unknown_preset_is_told_before_the_run_with_everything_else(tmp_path:
     ("sensors", "complaint"),
     [
         ("{front: {kind: camera, width: 0}}", "width"),
-        ("{front: {kind: camera, fov: 100, distortion: [-0.9]}}", "folds the picture"),
+        ("{front: {kind: camera, fov: 100, distortion: [-0.9]}}", "folds the image"),
         ("{front: {kind: camera, widht: 800}}", "did you mean 'width'"),
-        ("{truth: {}, roof: {kind: lidar, channels: 16, elevations: [1, 2]}}", "as many elevations"),
+        ("{truth: {}, roof: {kind: lidar, channels: 16, elevations: [1, 2]}}", "elevations has the wrong length"),
         ("{truth: {}, sky: {kind: gps}}", "gnss"),
     ],
 )

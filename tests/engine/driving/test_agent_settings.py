@@ -115,7 +115,7 @@ WRONG = [
         [("sensors", "{truth: {rnge: 5}}")],
         "s.xosc:12: unknown setting 'sensors.truth.rnge'; did you mean 'range'?",
     ),
-    ([("mount", "[1, 2]")], "a mount has three to five numbers"),
+    ([("mount", "[1, 2]")], "three to five numbers are expected"),
 ]
 
 

@@ -73,7 +73,7 @@ def test_invalid_property_is_error_with_line(write: Write, name: str, value: str
         ("{camera: {rate: .inf}}", "finite number"),
         ("{camera: {fov: 200}}", "less than 180"),
         ("{camera: {mount: [1, 2]}}", "three to five numbers"),
-        ("{camera: {distortion: [-2]}}", "folds the picture"),
+        ("{camera: {distortion: [-2]}}", "folds the image"),
         ("{lidar: {channels: -3}}", "greater than or equal to 1"),
         ("{truth: {}, gnss: {position_noise: -2}}", "'sensors.gnss.position_noise' is -2"),
         ("{truth: {}, imu: {gyroscope_walk: -1}}", "'sensors.imu.gyroscope_walk' is -1"),

@@ -1,4 +1,4 @@
-"""A small world of upright boxes whose rays are worked out one by one."""
+"""Small world of upright boxes whose rays are computed individually."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class Hits:
 
 @dataclass
 class BoxScene:
-    """Actors are the boxes of a view; walls are boxes of no actor. `casts` counts the batches of rays."""
+    """Scene of the boxes of a view, and walls that are not actors. `casts` counts the batches of rays."""
 
     view: WorldView
     walls: list[tuple[float, ...]] = field(default_factory=list)
     ground: bool = False
     casts: list[int] = field(default_factory=list)
-    pictures: list[tuple[Array, Pinhole]] = field(default_factory=list)
+    images: list[tuple[Array, Pinhole]] = field(default_factory=list)
     weather: Weather = field(default_factory=Weather)
 
     def raycast(self, origins: Array, targets: Array) -> Hits:
@@ -44,7 +44,7 @@ class BoxScene:
         for origin, target in zip(origins.tolist(), targets.tolist(), strict=True):
             nearest, row, normal = 1.0, -2, (0.0, 0.0, 0.0)
             for name, box in bodies:
-                share = meeting(origin, target, box)
+                share = hit_share(origin, target, box)
                 if share is not None and share < nearest:
                     nearest, row, normal = share, name, face(origin, target, share, box)
             if self.ground and origin[2] > 0.0 > target[2] and origin[2] / (origin[2] - target[2]) < nearest:
@@ -58,24 +58,24 @@ class BoxScene:
         return self.raycast(np.array(origins), np.array(targets)).rows.tolist()
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
-        self.pictures.append((pose, pinhole))
+        self.images.append((pose, pinhole))
         shape = (pinhole.height, pinhole.width)
         return Radiance(
             np.full((*shape, 3), 1000.0, np.float32), np.full(shape, 50.0, np.float32), np.full(shape, -1, np.int32)
         )
 
 
-def meeting(origin: list[float], target: list[float], box: tuple[float, ...]) -> float | None:
-    """Where a ray from outside meets a box, as a share of the way; None where it does not, or begins inside."""
+def hit_share(origin: list[float], target: list[float], box: tuple[float, ...]) -> float | None:
+    """Return where a ray from outside hits a box, as a share of its length; None without a hit or from inside."""
     x, y, z, length, width, height, yaw = box
     cos, sin = math.cos(yaw), math.sin(yaw)
     start = [origin[0] - x, origin[1] - y, origin[2] - z]
-    way = [b - a for a, b in zip(origin, target, strict=True)]
+    ray = [b - a for a, b in zip(origin, target, strict=True)]
     start = [cos * start[0] + sin * start[1], cos * start[1] - sin * start[0], start[2]]
-    way = [cos * way[0] + sin * way[1], cos * way[1] - sin * way[0], way[2]]
+    ray = [cos * ray[0] + sin * ray[1], cos * ray[1] - sin * ray[0], ray[2]]
     enter, leave = 0.0, 1.0
     inside = True
-    for place, step, size in zip(start, way, (length, width, height), strict=True):
+    for place, step, size in zip(start, ray, (length, width, height), strict=True):
         half = size / 2
         inside &= abs(place) < half
         if abs(step) < 1e-15:
@@ -88,7 +88,7 @@ def meeting(origin: list[float], target: list[float], box: tuple[float, ...]) ->
 
 
 def face(origin: list[float], target: list[float], share: float, box: tuple[float, ...]) -> tuple[float, float, float]:
-    """The outward normal of the face of a box on which a ray ends."""
+    """Return the outward normal of the face of a box on which a ray ends."""
     x, y, z, length, width, height, yaw = box
     cos, sin = math.cos(yaw), math.sin(yaw)
     dx, dy, dz = (a + share * (b - a) - c for a, b, c in zip(origin, target, (x, y, z), strict=True))
@@ -110,7 +110,8 @@ def make_view(
     categories: dict[str, str] | None = None,
     velocity: dict[str, tuple[float, float]] | None = None,
 ) -> WorldView:
-    """Actors as name: x, y of the box center, yaw; the reference point is below the center, on the ground."""
+    """Return a view of actors as name: x, y of the box center, yaw; the reference point is below the center, on the
+    ground."""
     sizes, categories, velocity = sizes or {}, categories or {}, velocity or {}
     count = len(actors)
     size = np.array([sizes.get(name, CAR) for name in actors])
@@ -141,7 +142,7 @@ def make_spec(name: str, size: tuple[float, float, float] = CAR, wheelbase: floa
 
 @dataclass(frozen=True)
 class Boxes:
-    """The tools of this folder's tests."""
+    """Helpers for the tests of this folder."""
 
     view = staticmethod(make_view)
     spec = staticmethod(make_spec)

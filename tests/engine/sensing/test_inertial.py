@@ -1,4 +1,4 @@
-"""GNSS and IMU: exact where asked, else noise and wandering biases of the stated deviations."""
+"""GNSS and IMU: exact oracle readings, noise and biases with the stated standard deviations."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def imu_errors(boxes: Any, ticks: int, seed: int = 1, step: float = 0.01, **sett
     return np.array([(*r.acceleration, *r.angular_rate) for r in readings])
 
 
-def test_oracles_are_exact(boxes: Any) -> None:
+def test_oracle_readings_are_exact(boxes: Any) -> None:
     view = replace(
         boxes.view({"Ego": (5.0, -3.0, math.pi / 2)}),
         acceleration=np.array([[0.0, 2.0, 0.0]]),
@@ -41,8 +41,8 @@ def test_oracles_are_exact(boxes: Any) -> None:
     np.testing.assert_allclose(imu.angular_rate, [0.0, 0.0, 0.3], atol=1e-12)
 
 
-def test_on_a_slope_the_body_s_axes_count(boxes: Any) -> None:
-    """Nose up by 0.1 rad and pulling away along the slope: all of the acceleration lies along the body."""
+def test_imu_on_slope_measures_in_body_frame(boxes: Any) -> None:
+    """Nose up by 0.1 rad with acceleration along the slope: all of it is along the body."""
     view = replace(
         boxes.view({"Ego": (0.0, 0.0, 0.0)}),
         pitch=np.array([-0.1]),
@@ -52,34 +52,34 @@ def test_on_a_slope_the_body_s_axes_count(boxes: Any) -> None:
     np.testing.assert_allclose(imu.acceleration, [2.0, 0.0, 0.0], atol=1e-12)
 
 
-def test_position_noise(boxes: Any) -> None:
+def test_gnss_noise_has_stated_deviation(boxes: Any) -> None:
     errors = gnss_errors(boxes, 4000, position_noise=0.3, height_noise=0.6)
     assert np.all(np.abs(errors.mean(axis=0)) < 4 * np.array([0.3, 0.3, 0.6]) / math.sqrt(4000))
     np.testing.assert_allclose(errors.std(axis=0), [0.3, 0.3, 0.6], rtol=4 / math.sqrt(8000))
     assert abs(np.corrcoef(errors[1:, 0], errors[:-1, 0])[0, 1]) < 4 / math.sqrt(4000)
 
 
-def test_the_stated_covariance_is_that_of_noise_and_first_bias(boxes: Any) -> None:
+def test_gnss_covariance_contains_noise_and_initial_bias(boxes: Any) -> None:
     settings = GnssSettings(position_noise=0.3, height_noise=0.6, bias=0.4)
     reading = Gnss(settings, boxes.spec("Ego")).read(boxes.view({"Ego": (0.0, 0.0, 0.0)}), 0)
     np.testing.assert_allclose(reading.covariance, np.diag([0.25, 0.25, 0.36]))
 
 
-def test_a_bias_begins_and_wanders_as_stated(boxes: Any) -> None:
-    """Over runs the bias begins with a deviation of 2 m, and after 25 s has wandered by 0.2 m/√s · √25 s = 1 m."""
-    starts, ways = [], []
+def test_gnss_bias_has_stated_initial_value_and_random_walk(boxes: Any) -> None:
+    """Over runs the initial bias has a standard deviation of 2 m, and its change after 25 s 0.2 m/√s · √25 s = 1 m."""
+    starts, changes = [], []
     for seed in range(300):
         errors = gnss_errors(
             boxes, 6, seed=seed, step=5.0, position_noise=0.0, height_noise=0.0, bias=2.0, bias_walk=0.2
         )
         starts.append(errors[0, :2])
-        ways.append(errors[5, :2] - errors[0, :2])
+        changes.append(errors[5, :2] - errors[0, :2])
     margin = 4 / math.sqrt(2 * 600)
     assert np.std(starts) == pytest.approx(2.0, rel=margin)
-    assert np.std(ways) == pytest.approx(1.0, rel=margin)
+    assert np.std(changes) == pytest.approx(1.0, rel=margin)
 
 
-def test_noise_of_an_inertial_unit_is_a_density(boxes: Any) -> None:
+def test_imu_noise_scales_with_sampling_rate(boxes: Any) -> None:
     """0.02 m/s²/√Hz at 100 Hz is 0.2 m/s², at 25 Hz half of that."""
     flat = {"gyroscope_bias": 0.0, "gyroscope_walk": 0.0}
     fast = imu_errors(boxes, 4000, step=0.01, accelerometer_noise=0.02, gyroscope_noise=0.001, **flat)
@@ -89,9 +89,11 @@ def test_noise_of_an_inertial_unit_is_a_density(boxes: Any) -> None:
     np.testing.assert_allclose(slow[1:].std(axis=0), [0.1] * 3 + [0.005] * 3, rtol=margin)
 
 
-def test_biases_of_an_inertial_unit(boxes: Any) -> None:
-    quiet = {"accelerometer_noise": 0.0, "gyroscope_noise": 0.0, "gyroscope_walk": 0.0}
-    runs = [imu_errors(boxes, 2, seed=s, accelerometer_bias=0.1, gyroscope_bias=0.01, **quiet) for s in range(300)]
+def test_imu_bias_is_constant_with_stated_deviation(boxes: Any) -> None:
+    without_noise = {"accelerometer_noise": 0.0, "gyroscope_noise": 0.0, "gyroscope_walk": 0.0}
+    runs = [
+        imu_errors(boxes, 2, seed=s, accelerometer_bias=0.1, gyroscope_bias=0.01, **without_noise) for s in range(300)
+    ]
     assert all(np.array_equal(run[0], run[1]) for run in runs)
     first = np.array([run[0] for run in runs])
     margin = 4 / math.sqrt(2 * 900)
@@ -99,7 +101,7 @@ def test_biases_of_an_inertial_unit(boxes: Any) -> None:
     assert first[:, 3:].std() == pytest.approx(0.01, rel=margin)
 
 
-def test_draws_depend_on_seed_station_and_tick_alone(boxes: Any) -> None:
+def test_gnss_draws_depend_on_seed_station_and_tick_only(boxes: Any) -> None:
     first, again, other = (gnss_errors(boxes, 5, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
@@ -109,7 +111,7 @@ def test_draws_depend_on_seed_station_and_tick_alone(boxes: Any) -> None:
     np.testing.assert_array_equal(late, first[4])
 
 
-def test_a_rig_reads_both_at_their_rates(boxes: Any) -> None:
+def test_rig_reads_gnss_and_imu_at_their_rates(boxes: Any) -> None:
     rig = Rig(boxes.spec("Ego"), {"gnss": GnssSettings(rate=10.0), "imu": ImuSettings()}, seed=3)
     for tick in range(6):
         view = boxes.view({"Ego": (0.0, 0.0, 0.0)}, time=tick * 0.05)

@@ -1,4 +1,4 @@
-"""The truth sensor: range, field of view and a true line of sight."""
+"""Truth sensor: range, field of view and line of sight."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.settings import Mount, TruthSettings
 
 
-def seen(boxes: Any, actors: dict[str, Any], sizes: Any = None, walls: Any = (), **settings: Any) -> dict[str, float]:
-    """What the first actor sees, and how much of it."""
+def visible_shares(
+    boxes: Any, actors: dict[str, Any], sizes: Any = None, walls: Any = (), **settings: Any
+) -> dict[str, float]:
+    """Return the objects in sight of the first actor, and their visible shares."""
     view = boxes.view(actors, sizes)
     first = view.names[0]
     size = (sizes or {}).get(first, (4.892, 1.837, 1.49))
@@ -23,61 +25,61 @@ def seen(boxes: Any, actors: dict[str, Any], sizes: Any = None, walls: Any = (),
     return dict(zip(truth.names, truth.visibility.tolist(), strict=True))
 
 
-def test_a_car_behind_a_truck_is_not_seen_and_one_beside_it_is(boxes: Any) -> None:
+def test_truth_excludes_car_behind_truck(boxes: Any) -> None:
     actors = {"Ego": (0, 0, 0), "Truck": (15, 0, 0), "Hidden": (30, 0, 0), "Beside": (30, 12, 0)}
-    found = seen(boxes, actors, {"Truck": boxes.truck})
+    found = visible_shares(boxes, actors, {"Truck": boxes.truck})
     assert set(found) == {"Truck", "Beside"}
     assert found["Beside"] == 1.0
 
 
-def test_a_wall_hides_and_a_low_one_hides_half(boxes: Any) -> None:
+def test_truth_wall_hides_and_low_wall_hides_partly(boxes: Any) -> None:
     actors = {"Ego": (0, 0, 0), "Other": (30, 0, 0)}
-    assert seen(boxes, actors, walls=[(15, 0, 2, 0.5, 20, 4, 0)]) == {}
-    # from 1.9 m, the ray to the upper corners at 1.42 m passes x = 15 above 1.6 m, to the lower at 0.07 m below 1.1 m
-    assert 0.0 < seen(boxes, actors, walls=[(15, 0, 0.6, 0.5, 20, 1.2, 0)])["Other"] < 1.0
+    assert visible_shares(boxes, actors, walls=[(15, 0, 2, 0.5, 20, 4, 0)]) == {}
+    # from 1.9 m, rays to the upper corners at 1.42 m pass x = 15 above 1.6 m, those to the lower at 0.07 m below 1.1 m
+    assert 0.0 < visible_shares(boxes, actors, walls=[(15, 0, 0.6, 0.5, 20, 1.2, 0)])["Other"] < 1.0
 
 
-def test_a_gap_shows_only_the_corners_behind_it(boxes: Any) -> None:
-    """A wall with its edge on the line to the right end of a car across: only points left of it are in sight."""
+def test_truth_visibility_counts_points_in_sight(boxes: Any) -> None:
+    """A wall ends on the line to the right end of a car across: only points left of it are in sight."""
     actors = {"Ego": (0, 0, 0), "Across": (30, 0, math.pi / 2)}
     edge = [(15, -10, 2, 0.2, 20, 4, 0)]
-    found = seen(boxes, actors, walls=edge)["Across"]
+    found = visible_shares(boxes, actors, walls=edge)["Across"]
     assert found == pytest.approx(0.4), "four corners of ten points; those in the middle plane fall on the edge"
-    assert seen(boxes, actors, walls=edge, visibility=0.4) == {"Across": pytest.approx(0.4)}
-    assert seen(boxes, actors, walls=edge, visibility=0.5) == {}
+    assert visible_shares(boxes, actors, walls=edge, visibility=0.4) == {"Across": pytest.approx(0.4)}
+    assert visible_shares(boxes, actors, walls=edge, visibility=0.5) == {}
 
 
-def test_range_is_measured_from_center_to_center(boxes: Any) -> None:
-    assert "Other" in seen(boxes, {"Ego": (0, 0, 0), "Other": (49.9, 0, 0)})
-    assert "Other" not in seen(boxes, {"Ego": (0, 0, 0), "Other": (50.1, 0, 0)})
-    assert "Other" in seen(boxes, {"Ego": (0, 0, 0), "Other": (79.9, 0, 0)}, range=80.0)
+def test_truth_range_is_between_centers(boxes: Any) -> None:
+    assert "Other" in visible_shares(boxes, {"Ego": (0, 0, 0), "Other": (49.9, 0, 0)})
+    assert "Other" not in visible_shares(boxes, {"Ego": (0, 0, 0), "Other": (50.1, 0, 0)})
+    assert "Other" in visible_shares(boxes, {"Ego": (0, 0, 0), "Other": (79.9, 0, 0)}, range=80.0)
 
 
 @pytest.mark.parametrize("heading", [0.0, 1.0, 3.0, -2.0])
-def test_field_of_view_turns_with_the_body_and_the_mount(boxes: Any, heading: float) -> None:
+def test_truth_field_of_view_follows_body_and_mount(boxes: Any, heading: float) -> None:
     def at(angle: float) -> tuple[float, float, float]:
         return 20 * math.cos(heading + angle), 20 * math.sin(heading + angle), 0.0
 
     degree = math.radians(1.0)
     actors = {"Ego": (0, 0, heading), "In": at(49 * degree), "Out": at(51 * degree), "Behind": at(math.pi)}
-    assert set(seen(boxes, actors, field_of_view=100.0)) == {"In"}
+    assert set(visible_shares(boxes, actors, field_of_view=100.0)) == {"In"}
     back = Mount(x=0, y=0, z=1.9, yaw=180)
-    assert set(seen(boxes, actors, field_of_view=100.0, mount=back)) == {"Behind"}
+    assert set(visible_shares(boxes, actors, field_of_view=100.0, mount=back)) == {"Behind"}
 
 
-def test_the_own_body_does_not_hide(boxes: Any) -> None:
-    """A sensor low inside the body sees all around through it, and never itself."""
+def test_truth_ego_body_is_transparent(boxes: Any) -> None:
+    """A sensor low inside the body has a free view in all directions, without the ego body."""
     actors = {"Ego": (0, 0, 0.3), "Ahead": (9, 0, 0), "Left": (0, 5, 0), "Behind": (-9, -2, 0)}
     for mount in (Mount(x=0, y=0, z=0.6), Mount(x=-0.5, y=0, z=1.9)):
-        assert seen(boxes, actors, mount=mount) == {"Ahead": 1.0, "Left": 1.0, "Behind": 1.0}
+        assert visible_shares(boxes, actors, mount=mount) == {"Ahead": 1.0, "Left": 1.0, "Behind": 1.0}
 
 
-def test_a_body_that_touches_is_seen(boxes: Any) -> None:
-    assert "Other" in seen(boxes, {"Ego": (0, 0, 0), "Other": (3, 0.5, 0.2)})
+def test_truth_includes_touching_body(boxes: Any) -> None:
+    assert "Other" in visible_shares(boxes, {"Ego": (0, 0, 0), "Other": (3, 0.5, 0.2)})
 
 
-def test_a_mast_sees_over_cars(boxes: Any) -> None:
-    """From 7 m a car 8 m behind another is in sight; from 1 m it is not."""
+def test_truth_from_mast_includes_car_behind_car(boxes: Any) -> None:
+    """From 7 m, a car 8 m behind another is in sight; from 1 m it is not."""
     actors = {"RSU": (0, 0, 0), "Car": (20, 0, 0), "Hidden": (28, 0, 0)}
     sizes = {"RSU": (0.3, 0.3, 7.0)}
     view = boxes.view(actors, sizes)
@@ -88,7 +90,7 @@ def test_a_mast_sees_over_cars(boxes: Any) -> None:
         assert set(truth.names) == names
 
 
-def test_the_readings_are_the_view_s_numbers(boxes: Any) -> None:
+def test_truth_reading_equals_view(boxes: Any) -> None:
     actors = {"Ego": (0, 0, 0), "Truck": (15, 3, 0.7)}
     view = boxes.view(actors, {"Truck": boxes.truck}, categories={"Truck": "truck"}, velocity={"Truck": (3.0, -1.0)})
     reading = Rig(boxes.spec("Ego"), {"truth": TruthSettings()}).read(boxes.scene(view), view)
@@ -98,24 +100,24 @@ def test_the_readings_are_the_view_s_numbers(boxes: Any) -> None:
     np.testing.assert_array_equal(reading.truth.velocity, [[3.0, -1.0]])
 
 
-def test_all_stations_share_one_batch_of_rays_and_see_as_if_alone(boxes: Any) -> None:
+def test_read_all_casts_one_batch_with_individual_results(boxes: Any) -> None:
     rng = np.random.default_rng(5)
     actors = {f"Car{index}": (*rng.uniform(-40, 40, 2), rng.uniform(-3, 3)) for index in range(12)}
     view = boxes.view(actors)
     scene = boxes.scene(view, [(0, 0, 2, 1, 30, 4, 0.4)])
     rigs = [Rig(boxes.spec(name), {"truth": TruthSettings(field_of_view=200)}) for name in list(actors)[:4]]
-    together = read_all(rigs, scene, view)
+    batch = read_all(rigs, scene, view)
     assert len(scene.casts) == 1
     for rig in rigs:
-        alone, reading = rig.read(boxes.scene(view, scene.walls), view), together[rig.station]
+        alone, reading = rig.read(boxes.scene(view, scene.walls), view), batch[rig.station]
         assert alone.truth is not None
         assert reading.truth is not None
         assert alone.truth.names == reading.truth.names
         np.testing.assert_array_equal(alone.truth.visibility, reading.truth.visibility)
-    assert any(len(reading.truth.names) < 11 for reading in together.values() if reading.truth is not None)
+    assert any(len(reading.truth.names) < 11 for reading in batch.values() if reading.truth is not None)
 
 
-def test_nothing_around_gives_an_empty_reading(boxes: Any) -> None:
+def test_truth_without_objects_is_empty(boxes: Any) -> None:
     view = boxes.view({"Ego": (0, 0, 0)})
     scene = boxes.scene(view)
     truth = Rig(boxes.spec("Ego"), {"truth": TruthSettings()}).read(scene, view).truth

@@ -1,4 +1,4 @@
-"""The truth sensor in plain numbers and by arrays: both answer the same."""
+"""Truth sensor in scalar arithmetic and with arrays: equal results."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ box = st.tuples(coordinate, coordinate, coordinate, length, length, length, st.f
 
 @settings(max_examples=300, deadline=None)
 @given(origin=point, targets=st.lists(point, min_size=1, max_size=12), box=box)
-def test_rays_start_behind_the_same_box(origin: Any, targets: Any, box: Any) -> None:
+def test_is_occluded_by_small_equals_arrays(origin: Any, targets: Any, box: Any) -> None:
     few = is_occluded_by_small(origin, targets, box)
     many = is_occluded_by(np.broadcast_to(origin, (1, len(targets), 3)), np.array([targets]), np.array([box]))[0]
     np.testing.assert_allclose(np.array(few), many, rtol=0.0, atol=1e-9)
 
 
-def test_rays_along_and_from_a_face() -> None:
-    """A sensor on the roof and one on the bumper, as they usually sit."""
+def test_is_occluded_by_small_along_face_equals_arrays() -> None:
+    """A sensor on the roof and one on the bumper, as in usual mounts."""
     box = (2.0, 1.0, 1.0, 4.0, 2.0, 2.0, 0.0)
     for origin in [(2.0, 1.0, 2.0), (4.0, 1.0, 1.0)]:
         targets = [(9.0, 1.0, 2.0), (9.0, 1.0, 0.0), (-9.0, 1.0, 2.0), (4.0, 7.0, 1.0), (2.0, 1.0, -3.0)]
@@ -44,7 +44,7 @@ def test_rays_along_and_from_a_face() -> None:
 
 
 def stations(boxes: Any, view: WorldView) -> list[TruthSensor]:
-    """All that differs between sensors: place, field of view, range."""
+    """Return sensors with different positions, fields of view and ranges."""
     kinds = [
         {"field_of_view": 100.0, "mount": "front"},
         {"field_of_view": 360.0, "range": 30.0},
@@ -53,7 +53,7 @@ def stations(boxes: Any, view: WorldView) -> list[TruthSensor]:
     return [TruthSensor(TruthSettings(**kind), boxes.spec(name)) for kind, name in zip(kinds, view.names, strict=False)]
 
 
-def test_both_find_and_see_the_same_in_any_crowd(boxes: Any) -> None:
+def test_few_candidates_and_visibilities_equal_arrays(boxes: Any) -> None:
     draws = np.random.default_rng(11)
     shares: list[float] = []
     for count in (3, 4, 9, 25):
@@ -70,16 +70,16 @@ def test_both_find_and_see_the_same_in_any_crowd(boxes: Any) -> None:
             assert few == candidates(sensors, rows, view, unseen)
             if not any(few):
                 continue
-            seen = few_visibilities(sensors, rows, few, scene, view)
-            assert seen == visibilities(sensors, rows, few, scene, view)
-            assert len(seen) == sum(map(len, few))
-            shares += seen
+            shares_of_few = few_visibilities(sensors, rows, few, scene, view)
+            assert shares_of_few == visibilities(sensors, rows, few, scene, view)
+            assert len(shares_of_few) == sum(map(len, few))
+            shares += shares_of_few
     assert 0.0 in shares
     assert 1.0 in shares
     assert any(0.0 < share < 1.0 for share in shares)
 
 
-def test_boxes_of_a_view_with_few_and_many_actors(boxes: Any) -> None:
+def test_view_boxes_with_few_actors_equal_those_with_many(boxes: Any) -> None:
     draws = np.random.default_rng(2)
     places = {f"Car{index}": tuple(draws.uniform(-30.0, 30.0, 3)) for index in range(40)}
     view = boxes.view(places)
