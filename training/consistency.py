@@ -1,7 +1,8 @@
-"""Whether lifted boxes are as exact as their covariances say: `python -m training.consistency`.
+"""Consistency of lifted boxes with their covariances: `python -m training.consistency`.
 
-Boxes of the segmentation, off by a pixel, of vehicles in random scenes with the usual sensors of the learned detectors;
-NEES of the centers in plan view, two degrees of freedom: median 1.39, 90 % below 4.61, 1 % above 9.21 if consistent.
+Boxes of the segmentation with errors of a pixel, of vehicles in random scenes with the default sensors of the learned
+detectors. NEES of the centers in plan view has two degrees of freedom: median 1.39, 90 % below 4.61, 1 % above 9.21 if
+consistent.
 """
 
 from __future__ import annotations
@@ -19,50 +20,60 @@ from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, object_category
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings
+from eidrive_scenario.sensing.settings import AnySensorSettings, CameraSettings, LidarSettings
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label
-from training.scenes import Seen, random_scenes
+from training.scenes import StationScene, random_scenes
 
 Array = NDArray[np.float64]
 
-SENSORS = {"camera": CameraSettings(width=512, height=384), "lidar": LidarSettings(field_of_view=110.0)}
+SENSORS: dict[str, AnySensorSettings] = {
+    "camera": CameraSettings(width=512, height=384),
+    "lidar": LidarSettings(field_of_view=110.0),
+}
 VEHICLES = ("car", "van", "truck", "bus")
 BORDER = 2.0
-"""A box this near to the border of the image is cut off there [px]."""
-FARTHEST, LOWEST, LEAST_SHARE, WHOLE = 45.0, 8.0, 0.2, 0.85
-"""Vehicles counted: distance [m], height in the image [px], share in sight; from the last share on it is whole."""
+"""Distance from the border of the image within which a box is cut off [px]."""
+FARTHEST, LOWEST, LEAST_SHARE, COMPLETE = 45.0, 8.0, 0.2, 0.85
+"""Limits of evaluated vehicles: distance [m], height in the image [px], visible share; from the last share on, a
+vehicle is completely visible."""
 
 
-def errors(scenes: Iterable[Seen]) -> dict[tuple[str, str], Array]:
-    """Return (N, 2) errors [m] and NEES of centers, by sensors and by what is in view: whole, hidden, cut off."""
+def errors(scenes: Iterable[StationScene]) -> dict[tuple[str, str], Array]:
+    """Return errors [m] and NEES of centers (N, 2), by sensors and visibility: whole, hidden, cut off."""
     rng = generator(1, "consistency of lifting")
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for seen in scenes:
-        labels = [label for label in seen.labels if _counts(label)]
+    for scene in scenes:
+        labels = [label for label in scene.labels if _is_evaluated(label)]
         if not labels:
             continue
-        camera, lidar = seen.readings.cameras["camera"], seen.readings.lidars["lidar"]
+        camera, lidar = scene.readings.cameras["camera"], scene.readings.lidars["lidar"]
         height, width = camera.rgb.shape[:2]
         boxes = np.array([label.box for label in labels], dtype=float)
         cut = (boxes[:, :2] <= BORDER).any(axis=1) | (boxes[:, 2] >= width - BORDER)
         blurred = np.clip(boxes + rng.normal(0.0, 1.0, boxes.shape), 0.0, (width, height, width, height))
-        for sensors, sweep in (("camera and LiDAR", lidar), ("camera alone", None)):
+        for sensors, cloud in (("camera and lidar", lidar), ("camera alone", None)):
             lifted = lift(
                 blurred,
                 [_category(label) for label in labels],
                 np.ones(len(labels)),
                 camera,
-                sweep,
+                cloud,
                 time=0.0,
-                ground=float(seen.readings.ego.position[2]),
-                surroundings=MapContext(seen.installation.roads),
+                ground=float(scene.readings.ego.position[2]),
+                surroundings=MapContext(scene.context.roads),
                 pattern=pattern_from_settings(SENSORS["lidar"]),  # type: ignore[arg-type]
             )
             for row, label in enumerate(labels):
                 off = lifted.boxes[row, :2] - label.place[:2]
                 nees = float(off @ np.linalg.solve(lifted.covariance[row], off))
-                view = "cut off" if cut[row] else "whole" if label.seen >= WHOLE * label.whole else "hidden"
+                view = (
+                    "cut off"
+                    if cut[row]
+                    else "whole"
+                    if label.visible_pixels >= COMPLETE * label.silhouette_pixels
+                    else "hidden"
+                )
                 found.setdefault((sensors, view), []).append((math.hypot(*off.tolist()), nees))
     return {key: np.array(values) for key, values in found.items()}
 
@@ -71,12 +82,12 @@ def _category(label: Label) -> str:
     return object_category(IMAGE_CLASSES[label.number]) or ""
 
 
-def _counts(label: Label) -> bool:
+def _is_evaluated(label: Label) -> bool:
     return (
         _category(label) in VEHICLES
         and label.distance < FARTHEST
         and label.box[3] - label.box[1] >= LOWEST
-        and label.seen >= LEAST_SHARE * label.whole
+        and label.visible_pixels >= LEAST_SHARE * label.silhouette_pixels
     )
 
 

@@ -1,4 +1,4 @@
-"""What can be seen in a picture, and how much of it: boxes from the segmentation, shares from silhouettes."""
+"""Labels of an image: boxes from the segmentation, visible shares from silhouettes."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ from eidrive_scenario.world.weather import Weather
 Array = NDArray[np.float64]
 
 NEAREST = 0.3
-"""Bodies that come nearer to the camera than this are labeled without a silhouette [m]."""
+"""Distance to the camera below which bodies are labeled without a silhouette [m]."""
 LEAST_CONTRAST = 0.05
-"""Share of an object's contrast that must arrive through fog and rain."""
+"""Minimum share of the contrast of an object that fog and rain transmit."""
 DARK = 10
-"""Gray level, of 255, that something in or around an object must reach."""
+"""Minimum gray level, of 255, in or around an object."""
 LEAST_FACING = 0.25
-"""Cosine of the angle between where a signal looks and where the camera is, below which it cannot be read."""
+"""Minimum cosine of the angle between the direction of a readable signal and that to the camera."""
 
 
 class Label(NamedTuple):
-    """One object in a picture.
+    """Object in an image.
 
-    number   of its class in IMAGE_CLASSES;  box  x1 y1 x2 y2 of what is seen of it [px]
-    seen     its pixels in sight;  whole  those of its silhouette within the picture, were it alone
+    number   of its class in IMAGE_CLASSES;  box  x1 y1 x2 y2 of its visible part [px]
+    visible_pixels     in the image;  silhouette_pixels  those of its silhouette within the image without occlusion
     distance from the camera to its center [m];  place  x y z l w h yaw in the world [m, rad]
-    readable whether anything tells its class: not so for a traffic light from behind, nor in thick fog or the dark
+    readable whether its class is visible: False for traffic lights from behind, in dense fog and in the dark
     """
 
     number: int
     box: tuple[float, float, float, float]
-    seen: int
-    whole: int
+    visible_pixels: int
+    silhouette_pixels: int
     distance: float
     place: tuple[float, ...]
     readable: bool = True
@@ -55,7 +55,7 @@ class Label(NamedTuple):
 def actor_labels(
     reading: CameraReading, view: WorldView, specs: Mapping[str, ActorSpec], skip: Iterable[str] = ()
 ) -> list[Label]:
-    """The actors of the classes looked for that are in sight, those in `skip` aside."""
+    """Return the visible actors of the image classes, except those in `skip`."""
     skipped = set(skip)
     segmentation = reading.segmentation
     counts = np.bincount(segmentation[segmentation >= 0], minlength=len(view.names))
@@ -66,30 +66,37 @@ def actor_labels(
             continue
         lines, columns = np.nonzero(segmentation == row)
         box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
-        seen = int(counts[row])
-        whole = silhouette(reading, view, row, specs[view.names[row]])
+        visible_pixels = int(counts[row])
+        silhouette_pixels = silhouette(reading, view, row, specs[view.names[row]])
         place = view.boxes[row]
         distance = float(np.linalg.norm(place[:3] - reading.pose[:3, 3]))
         found.append(
-            Label(IMAGE_CLASSES.index(name), box, seen, max(whole or seen, seen), distance, tuple(place.tolist()))
+            Label(
+                IMAGE_CLASSES.index(name),
+                box,
+                visible_pixels,
+                max(silhouette_pixels or visible_pixels, visible_pixels),
+                distance,
+                tuple(place.tolist()),
+            )
         )
     return found
 
 
-def legible(labels: Iterable[Label], reading: CameraReading, weather: Weather) -> list[Label]:
-    """The labels; those objects not readable of which fog leaves nothing, and those that are black on black."""
+def mark_readable(labels: Iterable[Label], reading: CameraReading, weather: Weather) -> list[Label]:
+    """Return the labels; objects that fog hides or that are black on black are marked as not readable."""
     gray = cv2.blur(cv2.cvtColor(reading.rgb, cv2.COLOR_RGB2GRAY), (3, 3))
     found = []
     for label in labels:
         left, top, right, bottom = (int(side) for side in label.box)
         dark = int(gray[max(top - 3, 0) : bottom + 3, max(left - 3, 0) : right + 3].max()) < DARK
-        lost = math.exp(-weather.extinction * label.distance) < LEAST_CONTRAST
-        found.append(label._replace(readable=label.readable and not dark and not lost))
+        in_fog = math.exp(-weather.extinction * label.distance) < LEAST_CONTRAST
+        found.append(label._replace(readable=label.readable and not dark and not in_fog))
     return found
 
 
 def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpec) -> int | None:
-    """Pixels that the actor would fill were nothing before it; None where it reaches behind the camera."""
+    """Return the pixels of the actor without occlusion; None if it extends behind the camera."""
     triangles = np.concatenate(list(actor_mesh(spec).values()))
     body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
     foot = np.array(spec.offset) - (0.0, 0.0, spec.size[2] / 2.0)
@@ -106,14 +113,14 @@ def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpe
     if (high <= low).any():
         return 0
     canvas = np.zeros((high[1] - low[1], high[0] - low[0]), dtype=np.uint8)
-    shown = np.rint((pixels[towards] - low - 0.5) * 16.0).clip(-(2**26), 2**26).astype(np.int32)
-    for corners in shown:
+    corners_of_faces = np.rint((pixels[towards] - low - 0.5) * 16.0).clip(-(2**26), 2**26).astype(np.int32)
+    for corners in corners_of_faces:
         cv2.fillConvexPoly(canvas, corners, 1, shift=4)
     return int(canvas.sum())
 
 
 def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: Mapping[str, str]) -> list[Label]:
-    """The traffic lights and stop signs in sight; those that turn their back or side to the camera cannot be read."""
+    """Return the visible traffic lights and stop signs; those that do not face the camera are not readable."""
     found = []
     segmentation = reading.segmentation
     for number in np.unique(segmentation[segmentation <= FIRST_LABEL]).tolist():
@@ -124,17 +131,19 @@ def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: M
         lines, columns = np.nonzero(segmentation == number)
         box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
         pose = head.pose
-        corners, middle = head_box(head)
-        to_eye = reading.pose[:3, 3] - middle
-        facing = (math.cos(pose.h) * to_eye[0] + math.sin(pose.h) * to_eye[1]) / float(np.hypot(to_eye[0], to_eye[1]))
+        corners, center = head_box(head)
+        to_camera_center = reading.pose[:3, 3] - center
+        facing = (math.cos(pose.h) * to_camera_center[0] + math.sin(pose.h) * to_camera_center[1]) / float(
+            np.hypot(to_camera_center[0], to_camera_center[1])
+        )
         found.append(
             Label(
                 IMAGE_CLASSES.index(name),
                 box,
                 len(lines),
                 max(_outline(reading, corners), len(lines)),
-                float(np.linalg.norm(to_eye)),
-                (*middle.tolist(), 0.0, head.width, head.height, pose.h),
+                float(np.linalg.norm(to_camera_center)),
+                (*center.tolist(), 0.0, head.width, head.height, pose.h),
                 readable=facing > LEAST_FACING,
             )
         )
@@ -142,7 +151,7 @@ def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: M
 
 
 def signal_class(head: SignalHead, state: str) -> str | None:
-    """The class of a traffic light or stop sign; None for all other signs."""
+    """Return the class of a traffic light or stop sign; None for all other signs."""
     colors = lamp_colors(head.signal)
     if not colors:
         return STOP_SIGN if sign_face(head.signal).shape == "octagon" else None
@@ -151,14 +160,14 @@ def signal_class(head: SignalHead, state: str) -> str | None:
 
 
 def head_box(head: SignalHead) -> tuple[Array, Array]:
-    """(8, 3) corners and (3,) middle of the box of a signal's head [m]; a light is half as deep as wide."""
+    """Return corners (8, 3) and center (3,) of the box of a signal head [m]; the depth of a light is half its width."""
     pose = head.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)
-    deep = 0.5 * head.width if lamp_colors(head.signal) else 0.0
+    depth = 0.5 * head.width if lamp_colors(head.signal) else 0.0
     corners = np.array(
         [
             (pose.x + cos * x - sin * y, pose.y + sin * x + cos * y, pose.z + z)
-            for x in (-deep, 0.0)
+            for x in (-depth, 0.0)
             for y in (-head.width / 2, head.width / 2)
             for z in (0.0, head.height)
         ]
@@ -167,7 +176,7 @@ def head_box(head: SignalHead) -> tuple[Array, Array]:
 
 
 def _outline(reading: CameraReading, corners: Array) -> int:
-    """Pixels within the picture that the hull of these corners (8, 3) covers; 0 if it reaches behind the camera."""
+    """Return the pixels in the image that the hull of corners (8, 3) covers; 0 if it extends behind the camera."""
     points = to_camera(corners, reading.pose)
     if points[:, 2].min() < NEAREST:
         return 0
@@ -178,11 +187,11 @@ def _outline(reading: CameraReading, corners: Array) -> int:
 
 
 def to_camera(points: Array, pose: Array) -> Array:
-    """World points (N, 3) in the frame of a camera of this pose."""
+    """Return world points (N, 3) in the frame of a camera of this pose."""
     return np.asarray((points - pose[:3, 3]) @ pose[:3, :3])
 
 
 def project(points: Array, reading: CameraReading) -> Array:
-    """(N, 2) pixels of points (N, 3) in the camera's frame, in front of it; by the lens's distortion."""
+    """Return pixels (N, 2) of points (N, 3) in the camera frame, in front of it, with lens distortion."""
     pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), reading.intrinsics, reading.distortion)
     return np.asarray(pixels, dtype=float).reshape(-1, 2)

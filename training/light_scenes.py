@@ -1,4 +1,4 @@
-"""Traffic lights to read: what cameras of cars see on their way to lights, in all weathers."""
+"""Images of traffic lights from approaching cars, in all weathers."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.road_objects import SignalHead, signal_heads
 from training.dataset import shows_enough
-from training.labels import Label, head_box, legible, signal_labels
+from training.labels import Label, head_box, mark_readable, signal_labels
 from training.random_roads import Place, random_place
 from training.random_scene import (
-    Spots,
+    LanePositions,
     View,
     random_actor,
-    random_looks,
+    random_appearances,
     random_signals,
     random_traffic,
     random_weather,
@@ -41,23 +41,22 @@ Array = NDArray[np.float64]
 
 PER_WORLD = 6
 NEAREST, LEAST_PIXELS = 6.0, 8.0
-"""The camera is at least so far before a light [m], and so near that a head of usual size is so high in the picture."""
+"""Minimum distance of the camera before a light [m], and minimum height of a usual head in the image [px]."""
 USUAL_HEIGHT = 0.94
 ASIDE = 0.7
-"""At most so far beside the camera's way, as a share of the distance, the light is that it looks at."""
+"""Maximum lateral offset of the target light, as a share of the distance."""
 IN_RANGE = 100.0
 CAMERAS = (CameraSettings(width=800, height=600, fov=100.0), CameraSettings(width=800, height=600, fov=60.0))
-"""EI-Drive's camera, and one that looks farther, each in half of the pictures."""
+"""The camera of EI-Drive, and one with a smaller field of view, each in half of the images."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """A traffic light within the picture.
+    """Traffic light within the image.
 
-    state     what it shows: red, redYellow, yellow, green or off
-    box       x1 y1 x2 y2 of what is seen of it [px]; None where nothing is
-    to_read   whether it shows enough to be asked for: at least 8 pixels high, not hidden, from its front, not lost in
-              fog or in the dark
+    state     red, redYellow, yellow, green or off
+    box       x1 y1 x2 y2 of its visible part [px]; None if it is not visible
+    to_read   whether it is required: at least 8 pixels high, not hidden, from its front, not in dense fog or darkness
     """
 
     id: str
@@ -69,7 +68,7 @@ class Light:
 
 @dataclass(frozen=True)
 class LightScene:
-    """One picture, the map, and the traffic lights of the map within the picture."""
+    """One image, the map, and its traffic lights within the image."""
 
     reading: CameraReading
     roads: RoadNetwork
@@ -78,7 +77,7 @@ class LightScene:
 
 
 def light_scenes(seed: int, split: str, worlds: int, processes: int = 1, first: int = 0) -> Iterator[LightScene]:
-    """The pictures of world after world from number `first` on; the same for any number of processes."""
+    """Yield images of successive worlds from number `first` on; equal for any number of processes."""
     tasks = [(seed, split, number) for number in range(first, first + worlds)]
     if processes == 1:
         for task in tasks:
@@ -96,80 +95,80 @@ def _scenes(task: tuple[int, str, int]) -> list[LightScene]:
     while True:
         with tempfile.TemporaryDirectory() as folder:
             place = random_place(rng, Path(folder))
-        spots = Spots.of(place.roads)
+        positions = LanePositions.of(place.roads)
         heads = signal_heads(place.roads)
-        chosen = [head for head in heads if head.signal.dynamic and len(_before(spots, head, CAMERAS[0]))]
-        if chosen:
+        candidates = [head for head in heads if head.signal.dynamic and len(_before(positions, head, CAMERAS[0]))]
+        if candidates:
             break
     with World(place.roads) as world:
         place.build_houses(world)
-        return [_scene(world, place, spots, heads, chosen, rng) for _ in range(PER_WORLD)]
+        return [_scene(world, place, positions, heads, candidates, rng) for _ in range(PER_WORLD)]
 
 
 def _scene(
     world: World,
     place: Place,
-    spots: Spots,
+    positions: LanePositions,
     heads: list[SignalHead],
-    chosen: list[SignalHead],
+    candidates: list[SignalHead],
     rng: np.random.Generator,
 ) -> LightScene:
     for name in list(world.names):
         world.remove(name)
     camera = CAMERAS[int(rng.integers(len(CAMERAS)))]
-    rows = _before(spots, chosen[int(rng.integers(len(chosen)))], camera)
-    x, y, z, heading = spots.poses[int(rng.choice(rows))].tolist()
+    rows = _before(positions, candidates[int(rng.integers(len(candidates)))], camera)
+    x, y, z, heading = positions.poses[int(rng.choice(rows))].tolist()
     spec = random_actor(rng, "Carrier", "car")
     heading += float(rng.normal(0.0, 0.05))
     carrier = (spec, Placement(x, y, z, heading))
     world.add(*carrier)
     pose = mounting(camera, spec, "front").camera_pose(world.view(), 0)
-    cast = random_traffic(rng, spots, View(camera, pose, carrier))
-    for other, there in cast:
-        world.add(other, there)
+    actors = random_traffic(rng, positions, View(camera, pose, carrier))
+    for other, placement in actors:
+        world.add(other, placement)
     weather = random_weather(rng)
     world.set_weather(weather)
     states = random_signals(rng, place.roads)
-    world.set_display_state(states, random_looks(rng, [carrier, *cast], weather))
+    world.set_display_state(states, random_appearances(rng, [carrier, *actors], weather))
     reading = ImageSensor(camera).capture(world, pose, rng, ignore=(spec.name,))
-    labels = legible(signal_labels(reading, heads, states), reading, weather)
+    labels = mark_readable(signal_labels(reading, heads, states), reading, weather)
     return LightScene(reading, place.roads, tuple(_lights(reading, heads, labels, states)), weather.name)
 
 
-def _before(spots: Spots, head: SignalHead, camera: CameraSettings) -> NDArray[np.int64]:
-    """The places on lanes from which a driver looks at this signal, near enough for this camera."""
+def _before(positions: LanePositions, head: SignalHead, camera: CameraSettings) -> NDArray[np.int64]:
+    """Return the lane positions from which a driver approaches this signal, near enough for this camera."""
     focal = camera.width / 2.0 / math.tan(math.radians(camera.fov) / 2.0)
     farthest = focal * USUAL_HEIGHT / LEAST_PIXELS
-    rows = np.flatnonzero(spots.kinds == "driving")
-    x, y, heading = spots.poses[rows, 0], spots.poses[rows, 1], spots.poses[rows, 3]
+    rows = np.flatnonzero(positions.kinds == "driving")
+    x, y, heading = positions.poses[rows, 0], positions.poses[rows, 1], positions.poses[rows, 3]
     dx, dy = head.pose.x - x, head.pose.y - y
     ahead = np.cos(heading) * dx + np.sin(heading) * dy
-    aside = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
+    lateral = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
     against = np.cos(heading - head.pose.h) < -0.8
-    near = (ahead > NEAREST) & (ahead < farthest) & (aside < ASIDE * ahead)
+    near = (ahead > NEAREST) & (ahead < farthest) & (lateral < ASIDE * ahead)
     return np.asarray(rows[near & against], dtype=np.int64)
 
 
 def _lights(
     reading: CameraReading, heads: list[SignalHead], labels: list[Label], states: Mapping[str, str]
 ) -> Iterator[Light]:
-    """All traffic lights of the map within the picture, those that something hides or that look away included."""
+    """Yield all traffic lights of the map within the image, including hidden ones and those from behind."""
     by_place = {label.place[:3]: label for label in labels if IMAGE_CLASSES[label.number].startswith("traffic light")}
     height, width = reading.segmentation.shape
     for head in heads:
         if not head.signal.dynamic:
             continue
-        middle = head_box(head)[1]
-        distance = float(np.linalg.norm(middle - reading.pose[:3, 3]))
-        place, _ = pixels(middle[None], reading)
+        center = head_box(head)[1]
+        distance = float(np.linalg.norm(center - reading.pose[:3, 3]))
+        place, _ = pixels(center[None], reading)
         if np.isnan(place).any() or distance > IN_RANGE or not ((place[0] >= 0) & (place[0] < (width, height))).all():
             continue
-        label = by_place.get(tuple(middle.tolist()))
+        label = by_place.get(tuple(center.tolist()))
         box = None if label is None else label.box
-        to_read = label is not None and label.readable and _enough(label)
+        to_read = label is not None and label.readable and _shows_enough(label)
         yield Light(head.signal.id, states[head.signal.id], distance, box, to_read)
 
 
-def _enough(label: Label) -> bool:
+def _shows_enough(label: Label) -> bool:
     high = np.array([label.box[3] - label.box[1]])
-    return bool(shows_enough(high, np.array([label.seen]), np.array([label.whole]))[0])
+    return bool(shows_enough(high, np.array([label.visible_pixels]), np.array([label.silhouette_pixels]))[0])

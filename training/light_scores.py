@@ -1,4 +1,4 @@
-"""How well traffic lights are read: by the class that a network gives, and by their lamps where the map has them."""
+"""Accuracy of traffic light states: from the class of a network, and from lamps at the map position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DISTANCES = ((0.0, 15.0), (15.0, 25.0), (25.0, 40.0), (40.0, 100.0))
 
 
 class Reading(NamedTuple):
-    """A light, and what was read of it: by way of reading; "" where nothing was. Red with yellow counts as red."""
+    """Traffic light and its states as read, by method; "" if it was not read. Red with yellow counts as red."""
 
     state: str
     distance: float
@@ -27,43 +27,43 @@ class Reading(NamedTuple):
 
 
 def readings(networks: Mapping[str, ImageNetwork], scenes: Iterable[LightScene]) -> list[Reading]:
-    """Every light in the pictures: by the class that each network gives, by class and lamps, and by lamps alone."""
+    """Return every light in the images: read by class, by class and lamps, and by lamps alone."""
     found = []
     for scene in scenes:
         cameras = {"camera": scene.reading}
         lights = LightsOnMap(scene.roads)
         read = {"lamps alone": {one.id: one.state for one in lights.read({}, cameras)}}
         for name, network in networks.items():
-            pictures: dict[str, ImageDetections] = {"camera": network.find(scene.reading.rgb)}
-            read[f"{name} alone"] = {one.id: one.state for one in lights.by_class(pictures, cameras)}
-            read[f"{name} and lamps"] = {one.id: one.state for one in lights.read(pictures, cameras)}
+            images: dict[str, ImageDetections] = {"camera": network.find(scene.reading.rgb)}
+            read[f"{name} alone"] = {one.id: one.state for one in lights.by_class(images, cameras)}
+            read[f"{name} and lamps"] = {one.id: one.state for one in lights.read(images, cameras)}
         for light in scene.lights:
-            states = {way: _plain(of.get(light.id, "")) for way, of in sorted(read.items())}
+            states = {method: _merge_red(of.get(light.id, "")) for method, of in sorted(read.items())}
             hidden = light.box is None
-            found.append(Reading(_plain(light.state), light.distance, scene.weather, light.to_read, hidden, states))
+            found.append(Reading(_merge_red(light.state), light.distance, scene.weather, light.to_read, hidden, states))
     return found
 
 
-def _plain(state: str) -> str:
+def _merge_red(state: str) -> str:
     return "red" if state == "redYellow" else state
 
 
 def light_table(found: Sequence[Reading]) -> Table:
-    """Shares of lights that are read rightly and wrongly; the others are not read."""
-    asked = [one for one in found if one.to_read]
-    parts: list[tuple[str, list[Reading]]] = [("all", asked)]
-    parts += [(state, [one for one in asked if one.state == state]) for state in LIGHT_STATES]
-    parts += [(weather, [one for one in asked if one.weather == weather]) for weather in WEATHERS]
-    parts += [(f"{a:.0f} to {b:.0f} m", [one for one in asked if a <= one.distance < b]) for a, b in DISTANCES]
-    parts.append(("hidden by something", [one for one in found if one.hidden]))
-    ways = list(found[0].read) if found else []
+    """Return shares of lights that are read correctly and incorrectly; the others are not read."""
+    required = [one for one in found if one.to_read]
+    parts: list[tuple[str, list[Reading]]] = [("all", required)]
+    parts += [(state, [one for one in required if one.state == state]) for state in LIGHT_STATES]
+    parts += [(weather, [one for one in required if one.weather == weather]) for weather in WEATHERS]
+    parts += [(f"{a:.0f} to {b:.0f} m", [one for one in required if a <= one.distance < b]) for a, b in DISTANCES]
+    parts.append(("occluded", [one for one in found if one.hidden]))
+    methods = list(found[0].read) if found else []
     rows = []
     for name, part in parts:
         rows.append([name])
-        for way in ways:
-            right = sum(one.read[way] == one.state for one in part) / max(len(part), 1)
-            wrong = sum(one.read[way] not in ("", one.state) for one in part) / max(len(part), 1)
-            rows[-1] += [f"{right:.2f}", f"{wrong:.2f}"]
+        for method in methods:
+            correct = sum(one.read[method] == one.state for one in part) / max(len(part), 1)
+            incorrect = sum(one.read[method] not in ("", one.state) for one in part) / max(len(part), 1)
+            rows[-1] += [f"{correct:.2f}", f"{incorrect:.2f}"]
         rows[-1].append(str(len(part)))
-    head = ["lights", *(f"{way}: {what}" for way in ways for what in ("right", "wrong")), "n"]
-    return "Traffic lights in held-out pictures: shares that are read rightly and wrongly", head, rows
+    head = ["lights", *(f"{method}: {result}" for method in methods for result in ("correct", "incorrect")), "n"]
+    return "Traffic lights in held-out images: shares that are read correctly and incorrectly", head, rows

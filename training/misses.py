@@ -1,4 +1,4 @@
-"""Why vehicles are not found: what is the matter with those that are missed, beside those that are found."""
+"""Causes of missed vehicles, compared with detected ones."""
 
 from __future__ import annotations
 
@@ -11,56 +11,56 @@ from eidrive_scenario.perception.learned.average_precision import match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
 from eidrive_scenario.perception.learned.networks.suppression import overlap
 from training.dataset import Dataset
-from training.scoring import VEHICLES, Judged
+from training.scoring import VEHICLES, EvaluatedImage
 from training.tables import Table, number
 
 Bools = NDArray[np.bool_]
 
 SMALL = 15.0
-"""Lower in the picture than this [px]."""
+"""Height in the image below which a vehicle is small [px]."""
 SHARE_HIDDEN = 0.5
-"""Less than this share of its silhouette is in sight."""
+"""Visible share of the silhouette below which a vehicle is hidden."""
 FAINT = 0.2
-"""Less of its contrast than this arrives through fog, rain or snow."""
+"""Share of contrast through fog, rain or snow below which a vehicle is faint."""
 KOSCHMIEDER = 3.912
 DARK = -6.0
-"""The sun is lower: civil twilight is over [degrees]."""
+"""Sun elevation below which it is night: the end of civil twilight [degrees]."""
 AT_BORDER = 1.5
-"""Of the picture, how near a box reaches [px]."""
+"""Maximum distance of a box from the border of the image [px]."""
 CROWDED = 0.3
-"""Its box overlaps that of another vehicle by more (intersection over union)."""
+"""Overlap with the box of another vehicle above which vehicles are crowded (intersection over union)."""
 CAUSES = (
     "faint in fog, rain or snow",
     "at night",
     "lower than 15 px",
     "more than half hidden",
-    "cut off by the picture's border",
+    "cut off by the border of the image",
     "overlaps another vehicle",
 )
 
 
-def misses(judged: Mapping[str, list[Judged]], dataset: Dataset) -> Table:
-    """Vehicles that show enough, by the first cause that applies: how many are missed, and recall among them."""
-    cause, asked = causes(dataset), _asked(dataset)
-    found = {name: _found(entries, dataset) for name, entries in judged.items()}
+def misses(evaluated: Mapping[str, list[EvaluatedImage]], dataset: Dataset) -> Table:
+    """Return required vehicles by the first cause that applies: number of misses, and recall."""
+    cause, required = causes(dataset), _required(dataset)
+    found = {name: _found(entries, dataset) for name, entries in evaluated.items()}
     rows = []
     names = (*CAUSES, "none of these")
-    for which, name in enumerate(names):
-        part = asked & (cause == which)
+    for index, name in enumerate(names):
+        part = required & (cause == index)
         rows.append([name, str(int(part.sum()))])
-        for seen in found.values():
-            missed = int((part & ~seen).sum())
-            share = missed / max(int((asked & ~seen).sum()), 1)
-            recall = float(seen[part].mean()) if part.any() else float("nan")
+        for detected in found.values():
+            missed = int((part & ~detected).sum())
+            share = missed / max(int((required & ~detected).sum()), 1)
+            recall = float(detected[part].mean()) if part.any() else float("nan")
             rows[-1] += [str(missed), f"{share:.0%}", number(recall)]
-    head = ["what is the matter", "vehicles"]
+    head = ["cause", "vehicles"]
     for name in found:
         head += [f"{name} missed", "of all misses", "recall"]
-    return "Held-out pictures, all weathers: what is the matter with vehicles that are missed", head, rows
+    return "Held-out images, all weathers: causes of missed vehicles", head, rows
 
 
 def causes(dataset: Dataset) -> NDArray[np.int64]:
-    """(N,) index of the first of CAUSES that applies to each object, len(CAUSES) where none does."""
+    """Return the index (N,) of the first of CAUSES for each object, len(CAUSES) if none applies."""
     contrast = np.exp(-KOSCHMIEDER * dataset.distance / dataset.visual_range[dataset.picture])
     share = dataset.seen / np.maximum(dataset.whole, 1)
     box, size = dataset.box, dataset.size[dataset.picture]
@@ -72,40 +72,40 @@ def causes(dataset: Dataset) -> NDArray[np.int64]:
     return np.where(applies.any(axis=0), applies.argmax(axis=0), len(CAUSES))
 
 
-def _asked(dataset: Dataset) -> Bools:
+def _required(dataset: Dataset) -> Bools:
     vehicle = np.isin(dataset.number, [IMAGE_CLASSES.index(name) for name in VEHICLES])
     return np.asarray(vehicle & dataset.to_find())
 
 
 def _crowding(dataset: Dataset) -> NDArray[np.float64]:
-    """(N,) how much the box of another vehicle overlaps that of each object."""
+    """Return the maximum overlap (N,) of each object with the box of another vehicle."""
     shares = np.zeros(len(dataset.number))
-    vehicles = _asked(dataset)
+    vehicles = _required(dataset)
     for index in range(len(dataset)):
         rows = dataset.objects(index)
-        own = rows[vehicles[rows]]
-        if len(own) > 1:
-            shared = overlap(dataset.box[own].astype(float), dataset.box[own].astype(float))
+        vehicle_rows = rows[vehicles[rows]]
+        if len(vehicle_rows) > 1:
+            shared = overlap(dataset.box[vehicle_rows].astype(float), dataset.box[vehicle_rows].astype(float))
             np.fill_diagonal(shared, 0.0)
-            shares[own] = shared.max(axis=1)
+            shares[vehicle_rows] = shared.max(axis=1)
     return shares
 
 
-def _found(entries: list[Judged], dataset: Dataset) -> Bools:
-    """(N,) the vehicles that a detector finds at its confidence, whatever kind of vehicle it takes them for."""
+def _found(entries: list[EvaluatedImage], dataset: Dataset) -> Bools:
+    """Return the vehicles (N,) that a detector detects at its confidence, as any class of vehicle."""
     found = np.zeros(len(dataset.number), dtype=bool)
-    asked = _asked(dataset)
+    required = _required(dataset)
     for index, entry in enumerate(entries):
         rows = dataset.objects(index)
-        own = rows[asked[rows]]
-        sure = np.array(
+        vehicle_rows = rows[required[rows]]
+        confident = np.array(
             [
                 name in VEHICLES and score >= entry.confidence
                 for name, score in zip(entry.found.classes, entry.found.scores.tolist(), strict=True)
             ],
             dtype=bool,
         )
-        boxes, scores = entry.found.boxes[sure], entry.found.scores[sure]
-        free = np.zeros(len(own), dtype=bool)
-        found[own] = match(boxes, scores, dataset.box[own].astype(float), free).found
+        boxes, scores = entry.found.boxes[confident], entry.found.scores[confident]
+        ignored = np.zeros(len(vehicle_rows), dtype=bool)
+        found[vehicle_rows] = match(boxes, scores, dataset.box[vehicle_rows].astype(float), ignored).found
     return found

@@ -1,6 +1,6 @@
-"""Random road networks to train on: crossings like those of the library, and winding roads on hills.
+"""Random road networks for training: intersections like those of the library, and winding roads on hills.
 
-None of them is a place of the library: widths, lanes, corners, signals and houses are drawn anew for each.
+None of them is in the library: widths, lanes, corners, signals and houses are drawn for each.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ Element = etree._Element
 LIGHT = ("1000001", "-1", 0.3, 0.86)
 STOP = ("206", "-1", 0.75, 0.75)
 OTHERS = (("274", "50", 0.6, 0.6), ("205", "-1", 0.9, 0.9), ("306", "-1", 0.6, 0.6), ("283", "-1", 0.6, 0.6))
-_FURNITURE = {
+_ROAD_OBJECTS = {
     "tree": ((4.0, 4.0, 7.0), 9.0),
     "vegetation": ((1.5, 1.5, 1.2), 3.0),
     "streetLamp": ((0.16, 0.16, 8.0), 28.0),
     "pole": ((0.12, 0.12, 4.0), 12.0),
     "barrier": ((2.0, 0.3, 0.9), 3.0),
 }
-"""Length, width and height of furniture, and from one piece to the next [m]."""
+"""Length, width and height of road objects, and their spacing [m]."""
 
 
 @dataclass(frozen=True)
 class House:
-    """A box beside the road: center [m], length, width, height [m], heading [rad], color."""
+    """Box beside the road: center [m], length, width, height [m], heading [rad], color."""
 
     center: tuple[float, float, float]
     size: tuple[float, float, float]
@@ -45,19 +45,19 @@ class House:
 
 @dataclass(frozen=True)
 class Place:
-    """A road network, and the houses that stand along it."""
+    """Road network and the houses along it."""
 
     roads: RoadNetwork
     houses: tuple[House, ...]
 
     def build_houses(self, world: World) -> None:
-        """Put the houses into a world with these roads."""
+        """Add the houses to a world with these roads."""
         for number, house in enumerate(self.houses):
             world.add_building(f"house {number}", house.center, house.size, house.yaw, house.color)
 
 
 def random_place(rng: np.random.Generator, folder: Path) -> Place:
-    """A place for this state of the generator; its OpenDRIVE file is written into the folder and read again."""
+    """Return a place for this generator state; its OpenDRIVE file is written into the folder and read."""
     path = folder / "place.xodr"
     if rng.random() < 0.65:
         make_roads.write(random_crossing(rng), path)
@@ -69,19 +69,19 @@ def random_place(rng: np.random.Generator, folder: Path) -> Place:
         vary_signals(root, rng)
     else:
         root = winding_road(rng)
-    add_furniture(root, rng)
+    add_road_objects(root, rng)
     etree.ElementTree(root).write(str(path), xml_declaration=True, encoding="UTF-8")
     roads = RoadNetwork.load(path)
     return Place(roads, tuple(random_houses(roads, rng)))
 
 
 def random_crossing(rng: np.random.Generator) -> Crossing:
-    """Two streets of random lanes that cross at right angles."""
+    """Return two streets of random lanes that cross at right angles."""
     first, second = random_street(rng), random_street(rng)
     x, y = rng.uniform(20.0, 60.0), rng.uniform(-6.0, 6.0)
-    room = rng.uniform(3.0, 9.0, 4)
-    near, far = x - _half_width(second, -1) - room[0], x + _half_width(second, 1) + room[1]
-    right, left = y - _half_width(first, -1) - room[2], y + _half_width(first, 1) + room[3]
+    clearance = rng.uniform(3.0, 9.0, 4)
+    near, far = x - _half_width(second, -1) - clearance[0], x + _half_width(second, 1) + clearance[1]
+    right, left = y - _half_width(first, -1) - clearance[2], y + _half_width(first, 1) + clearance[3]
     ends = rng.uniform(70.0, 110.0, 4)
     return Crossing(
         name="training",
@@ -96,7 +96,7 @@ def random_crossing(rng: np.random.Generator) -> Crossing:
 
 
 def random_street(rng: np.random.Generator) -> Street:
-    """One to three lanes each way, with or without a middle lane, parking, shoulder and sidewalk."""
+    """Return one to three lanes per direction, with optional center lane, parking, shoulder and sidewalk."""
     inner, outer = (LaneSpec("driving", make_roads.LANE, (kind, "white")) for kind in ("broken", "solid"))
     count = int(rng.choice([1, 2, 3], p=[0.5, 0.35, 0.15]))
     side = [inner] * (count - 1) + [outer]
@@ -118,7 +118,7 @@ def _half_width(street: Street, sign: int) -> float:
 
 
 def vary_signals(root: Element, rng: np.random.Generator) -> None:
-    """Heights and places of lights and signs as no library road has them."""
+    """Vary heights and sizes of lights and signs beyond those of the library."""
     for signal in root.iterfind(".//signal"):
         signal.set("zOffset", f"{rng.uniform(1.9, 4.5):.3f}")
         scale = rng.uniform(0.85, 1.3)
@@ -127,8 +127,8 @@ def vary_signals(root: Element, rng: np.random.Generator) -> None:
         signal.set("hOffset", f"{rng.normal(0.0, 0.12):.4f}")
 
 
-def add_furniture(root: Element, rng: np.random.Generator) -> None:
-    """Trees, lamps, poles, hedges and barriers along all roads that are not part of a junction; or none."""
+def add_road_objects(root: Element, rng: np.random.Generator) -> None:
+    """Add trees, lamps, poles, hedges and barriers along all roads outside junctions, or none."""
     if rng.random() < 0.15:
         return
     number = 1000
@@ -141,13 +141,13 @@ def add_furniture(root: Element, rng: np.random.Generator) -> None:
             road.insert(len(road) if signals is None else road.index(signals), objects)
         for side in (-1, 1):
             edge = _edge(road, side)
-            for kind in rng.permutation(list(_FURNITURE))[: int(rng.integers(0, 3))].tolist():
-                size, gap = _FURNITURE[kind]
+            for kind in rng.permutation(list(_ROAD_OBJECTS))[: int(rng.integers(0, 3))].tolist():
+                size, gap = _ROAD_OBJECTS[kind]
                 scale = float(rng.uniform(0.7, 1.4))
                 away = float(rng.uniform(0.3, 3.0))
                 for s in np.arange(rng.uniform(2.0, 20.0), length - 2.0, gap * rng.uniform(0.8, 2.0)).tolist():
                     number += 1
-                    grow = scale * float(rng.uniform(0.85, 1.15))
+                    object_scale = scale * float(rng.uniform(0.85, 1.15))
                     add(
                         objects,
                         "object",
@@ -155,12 +155,12 @@ def add_furniture(root: Element, rng: np.random.Generator) -> None:
                         name=str(rng.choice(["fir", "tree"])) if kind == "tree" else kind,
                         type=kind,
                         s=s,
-                        t=side * (edge + away + (size[0] * grow / 2 if kind == "tree" else 0.0)),
+                        t=side * (edge + away + (size[0] * object_scale / 2 if kind == "tree" else 0.0)),
                         zOffset=0.0,
                         orientation="none",
-                        length=size[0] * grow,
-                        width=size[1] * grow,
-                        height=size[2] * grow,
+                        length=size[0] * object_scale,
+                        width=size[1] * object_scale,
+                        height=size[2] * object_scale,
                         hdg=0.0,
                         pitch=0.0,
                         roll=0.0,
@@ -168,13 +168,13 @@ def add_furniture(root: Element, rng: np.random.Generator) -> None:
 
 
 def _edge(road: Element, side: int) -> float:
-    """Width of all lanes on one side."""
+    """Return the width of all lanes on one side."""
     lanes = road.iterfind(f"lanes/laneSection/{'left' if side > 0 else 'right'}/lane")
     return sum(float(width.get("a", "0")) for lane in lanes for width in lane.iterfind("width"))
 
 
 def winding_road(rng: np.random.Generator) -> Element:
-    """A road of lines, clothoids and arcs that climbs and falls, with lights and stop signs along it."""
+    """Return a road of lines, clothoids and arcs with slopes, lights and stop signs."""
     street = random_street(rng)
     line = winding_course(rng)
     length = sum(curve.length for curve in line)
@@ -228,19 +228,19 @@ def winding_road(rng: np.random.Generator) -> Element:
 
 
 def winding_course(rng: np.random.Generator) -> list[curves.Curve]:
-    """Lines and bends, each bend a clothoid, an arc and a clothoid."""
+    """Return lines and bends, each bend a clothoid, an arc and a clothoid."""
     found: list[curves.Curve] = []
     x, y, heading, s = 0.0, 0.0, float(rng.uniform(-math.pi, math.pi)), 0.0
     for _ in range(int(rng.integers(1, 4))):
         bend = float(rng.choice([-1, 1])) / rng.uniform(35.0, 250.0)
         clothoid, arc = float(rng.uniform(12.0, 30.0)), float(rng.uniform(8.0, 50.0))
-        pieces = (
+        segments = (
             (float(rng.uniform(20.0, 70.0)), 0.0, 0.0),
             (clothoid, 0.0, bend),
             (arc, bend, bend),
             (clothoid, bend, 0.0),
         )
-        for length, start, end in pieces:
+        for length, start, end in segments:
             curve = (
                 curves.Arc(s, x, y, heading, length, start)
                 if start == end
@@ -253,7 +253,7 @@ def winding_course(rng: np.random.Generator) -> list[curves.Curve]:
 
 
 def write_hills(road: Element, length: float, rng: np.random.Generator) -> None:
-    """A smooth elevation: pieces of cubics that meet in height and slope."""
+    """Write a smooth elevation profile of cubic segments with continuous height and slope."""
     profile = road.find("elevationProfile")
     assert profile is not None
     for old in list(profile):
@@ -263,7 +263,7 @@ def write_hills(road: Element, length: float, rng: np.random.Generator) -> None:
     steep = float(rng.choice([0.0, 0.02, 0.06]))
     while s < length:
         target = float(rng.uniform(-steep, steep))
-        # c and d so that the slope goes from `slope` to `target` without a kink in the curvature at the far end
+        # c and d change the slope from `slope` to `target` with zero curvature at the end
         c = (target - slope) / step
         d = -(target - slope) / (3.0 * step**2)
         add(profile, "elevation", s=s, a=height, b=slope, c=c, d=d)
@@ -273,7 +273,7 @@ def write_hills(road: Element, length: float, rng: np.random.Generator) -> None:
 
 
 def random_houses(roads: RoadNetwork, rng: np.random.Generator) -> list[House]:
-    """Rows of houses along the roads outside junctions, some places without any."""
+    """Return rows of houses along the roads outside junctions; none for some places."""
     found: list[House] = []
     if rng.random() < 0.2:
         return found
@@ -299,7 +299,7 @@ def random_houses(roads: RoadNetwork, rng: np.random.Generator) -> list[House]:
 
 
 def _clear_of_roads(roads: RoadNetwork, x: float, y: float, heading: float, length: float, depth: float) -> bool:
-    """Whether no road runs through a house."""
+    """Return whether a house overlaps no road."""
     along, across = np.meshgrid(np.linspace(-0.5, 0.5, 9) * length, np.linspace(-0.5, 0.5, 5) * depth)
     cos, sin = math.cos(heading), math.sin(heading)
     lanes, _, _ = roads.touched((x + cos * along - sin * across).ravel(), (y + sin * along + cos * across).ravel())

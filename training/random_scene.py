@@ -1,4 +1,4 @@
-"""Random traffic, cameras and weather on a place."""
+"""Random traffic, cameras and weather at a place."""
 
 from __future__ import annotations
 
@@ -52,22 +52,22 @@ _LIGHTS: Mapping[str, float] = {
     "brakeLights": 0.25, "indicatorLeft": 0.08, "indicatorRight": 0.08, "daytimeRunningLights": 0.15, "lowBeam": 0.08,
     "highBeam": 0.02, "fogLightsRear": 0.04, "reversingLights": 0.03, "warningLights": 0.03,
 }  # fmt: skip
-"""How often vehicles have a light switched on."""
+"""Probability that a vehicle has a light switched on."""
 _MOTIONS = ("walking", "walking", "standing", "running", "reeling")
-_PICTURE_SIZES = ((640, 480), (800, 600), (640, 384), (960, 540))
+_IMAGE_SIZES = ((640, 480), (800, 600), (640, 384), (960, 540))
 
 
 @dataclass(frozen=True)
-class Spots:
-    """Places on lanes: x y z [m] and heading of traffic [rad] (N, 4), type of the lane, its width [m]."""
+class LanePositions:
+    """Lane positions: x y z [m] and driving direction [rad] (N, 4), type of the lane, its width [m]."""
 
     poses: Array
     kinds: NDArray[np.str_]
     widths: Array
 
     @classmethod
-    def of(cls, roads: RoadNetwork, step: float = 1.5) -> Spots:
-        """All places, every `step` meters of each lane."""
+    def of(cls, roads: RoadNetwork, step: float = 1.5) -> LanePositions:
+        """Return all positions, every `step` [m] of each lane."""
         poses, kinds, widths = [], [], []
         for road in roads.roads.values():
             for s in np.arange(step / 2, road.length, step).tolist():
@@ -85,33 +85,34 @@ class Spots:
 
 @dataclass(frozen=True)
 class View:
-    """A camera in the place: settings, pose (4, 4) camera to world, and the body that carries it, if it is seen."""
+    """Camera at a place: settings, pose (4, 4) camera to world, and the body that carries it, None for a roadside
+    camera."""
 
     settings: CameraSettings
     pose: Array
     carrier: tuple[ActorSpec, Placement] | None
 
 
-def random_view(rng: np.random.Generator, spots: Spots, heads: Sequence[SignalHead] = ()) -> View:
-    """On a vehicle, ahead or aside, or at the roadside up to 8 m high; a third of the vehicles before a signal."""
-    width, height = _PICTURE_SIZES[int(rng.choice(4, p=[0.5, 0.2, 0.15, 0.15]))]
+def random_view(rng: np.random.Generator, positions: LanePositions, heads: Sequence[SignalHead] = ()) -> View:
+    """Return a camera on a vehicle, or at the roadside up to 8 m high; a third of the vehicles are before a signal."""
+    width, height = _IMAGE_SIZES[int(rng.choice(4, p=[0.5, 0.2, 0.15, 0.15]))]
     fov = 100.0 if rng.random() < 0.4 else float(rng.uniform(55.0, 115.0))
     corner = math.tan(math.radians(fov) / 2) * math.hypot(1.0, height / width)
     bend = float(rng.uniform(-0.11, 0.04)) / corner**2 if rng.random() < 0.15 else 0.0
     settings = CameraSettings(width=width, height=height, fov=fov, distortion=(bend, 0.0, 0.0, 0.0, 0.0))
     if rng.random() < 0.35:
-        return View(settings, _roadside(rng, spots), None)
-    rows = np.flatnonzero(spots.kinds == "driving")
-    before = _before_signal(spots, rows, heads[int(rng.integers(len(heads)))]) if heads else rows[:0]
+        return View(settings, _roadside(rng, positions), None)
+    rows = np.flatnonzero(positions.kinds == "driving")
+    before = _before_signal(positions, rows, heads[int(rng.integers(len(heads)))]) if heads else rows[:0]
     to_signal = len(before) > 0 and rng.random() < 0.6
     row = int(rng.choice(before if to_signal else rows))
-    x, y, z, heading = spots.poses[row].tolist()
+    x, y, z, heading = positions.poses[row].tolist()
     heading += float(rng.normal(0.0, 0.08))
     spec = random_actor(rng, "Carrier", "car")
     on_roof = rng.random() < 0.25
     turned = not to_signal and rng.random() < 0.3
-    aside = float(rng.choice([math.radians(100.0), -math.radians(100.0), math.pi])) if turned else 0.0
-    if on_roof or aside:
+    lateral = float(rng.choice([math.radians(100.0), -math.radians(100.0), math.pi])) if turned else 0.0
+    if on_roof or lateral:
         mount = (
             -0.5 + float(rng.uniform(-1.2, 0.8)),
             float(rng.uniform(-0.3, 0.3)),
@@ -121,25 +122,25 @@ def random_view(rng: np.random.Generator, spots: Spots, heads: Sequence[SignalHe
         mount = (spec.size[0] / 2 + 0.06, float(rng.uniform(-0.3, 0.3)), float(rng.uniform(0.7, 1.5)))
     cos, sin = math.cos(heading), math.sin(heading)
     place = (x + cos * mount[0] - sin * mount[1], y + sin * mount[0] + cos * mount[1], z + mount[2])
-    pose = _camera_pose(place, heading + aside, float(rng.normal(0.0, 0.02)), float(rng.normal(0.0, 0.01)))
+    pose = _camera_pose(place, heading + lateral, float(rng.normal(0.0, 0.02)), float(rng.normal(0.0, 0.01)))
     ahead, _, _ = spec.offset
     return View(settings, pose, (spec, Placement(x - cos * ahead, y - sin * ahead, z, heading)))
 
 
-def _before_signal(spots: Spots, rows: NDArray[np.int64], head: SignalHead) -> NDArray[np.int64]:
-    """Those of the rows from which a driver looks at this signal, 4 to 30 m ahead."""
-    x, y, heading = spots.poses[rows, 0], spots.poses[rows, 1], spots.poses[rows, 3]
+def _before_signal(positions: LanePositions, rows: NDArray[np.int64], head: SignalHead) -> NDArray[np.int64]:
+    """Return the rows from which a driver approaches this signal, 4 to 30 m ahead."""
+    x, y, heading = positions.poses[rows, 0], positions.poses[rows, 1], positions.poses[rows, 3]
     dx, dy = head.pose.x - x, head.pose.y - y
     ahead = np.cos(heading) * dx + np.sin(heading) * dy
-    aside = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
+    lateral = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
     against = np.cos(heading - head.pose.h) < -0.8
-    return np.asarray(rows[(ahead > 4.0) & (ahead < 30.0) & (aside < 0.7 * ahead) & against], dtype=np.int64)
+    return np.asarray(rows[(ahead > 4.0) & (ahead < 30.0) & (lateral < 0.7 * ahead) & against], dtype=np.int64)
 
 
-def _roadside(rng: np.random.Generator, spots: Spots) -> Array:
-    edge = np.flatnonzero(spots.kinds != "driving")
-    row = int(rng.choice(edge if len(edge) else len(spots.kinds)))
-    x, y, z, heading = spots.poses[row].tolist()
+def _roadside(rng: np.random.Generator, positions: LanePositions) -> Array:
+    edge = np.flatnonzero(positions.kinds != "driving")
+    row = int(rng.choice(edge if len(edge) else len(positions.kinds)))
+    x, y, z, heading = positions.poses[row].tolist()
     height = float(rng.uniform(2.2, 8.0))
     yaw = heading + float(rng.choice([0.0, math.pi])) + float(rng.uniform(-0.9, 0.9))
     pitch = float(rng.uniform(0.0, 0.35)) if rng.random() < 0.6 else 0.0
@@ -154,11 +155,11 @@ def _camera_pose(place: tuple[float, float, float], yaw: float, pitch: float, ro
 
 
 def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
-    """A body of this shape in a random size and color."""
+    """Return a body of this shape with random size and color."""
     sizes = _SIZES[shape]
     length, width, height = sizes[int(rng.integers(len(sizes)))]
-    grow = rng.uniform(0.93, 1.07, 3) * rng.uniform(0.95, 1.05)
-    size = (length * float(grow[0]), width * float(grow[1]), height * float(grow[2]))
+    scale = rng.uniform(0.93, 1.07, 3) * rng.uniform(0.95, 1.05)
+    size = (length * float(scale[0]), width * float(scale[1]), height * float(scale[2]))
     wheels = shape in _WHEELED
     wheelbase = 0.58 * size[0] if wheels else 0.0
     radius = {"motorbike": 0.31, "bicycle": 0.34}.get(shape, 0.33 if size[2] < 2.2 else 0.45)
@@ -180,34 +181,34 @@ def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
 
 
 def random_traffic(
-    rng: np.random.Generator, spots: Spots, view: View, taken: Sequence[tuple[float, ...]] = ()
+    rng: np.random.Generator, positions: LanePositions, view: View, occupied: Sequence[tuple[float, ...]] = ()
 ) -> list[tuple[ActorSpec, Placement]]:
-    """Up to 30 actors that do not touch, most of them in front of the camera."""
+    """Return up to 30 actors that do not touch, most of them in front of the camera."""
     axis, origin = view.pose[:3, 2], view.pose[:3, 3]
-    away = spots.poses[:, :2] - origin[:2]
+    away = positions.poses[:, :2] - origin[:2]
     distance = np.hypot(away[:, 0], away[:, 1])
-    facing = (away @ axis[:2]) / np.maximum(distance * np.hypot(axis[0], axis[1]), 1e-6)
-    inside = (facing > math.cos(math.radians(view.settings.fov) / 2)) & (distance > 3.0) & (distance < 95.0)
+    cosine = (away @ axis[:2]) / np.maximum(distance * np.hypot(axis[0], axis[1]), 1e-6)
+    inside = (cosine > math.cos(math.radians(view.settings.fov) / 2)) & (distance > 3.0) & (distance < 95.0)
     weight = np.where(inside, np.exp(-distance / 30.0), 1e-4)
-    weight *= np.where(spots.kinds == "driving", 1.0, 0.6)
-    boxes = list(taken)
+    weight *= np.where(positions.kinds == "driving", 1.0, 0.6)
+    boxes = list(occupied)
     if view.carrier is not None:
         boxes.append(_box(*view.carrier))
     found = []
     for number in range(int(rng.integers(3, 31))):
         row = int(rng.choice(len(weight), p=weight / weight.sum()))
-        kinds = _ON_LANES[str(spots.kinds[row])]
+        kinds = _ON_LANES[str(positions.kinds[row])]
         shape = str(rng.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
         spec = random_actor(rng, f"{shape} {number} {int(rng.integers(1000))}", shape)
-        x, y, z, heading = spots.poses[row].tolist()
-        aside = float(rng.normal(0.0, 0.12)) * float(spots.widths[row])
-        x, y = x - math.sin(heading) * aside, y + math.cos(heading) * aside
+        x, y, z, heading = positions.poses[row].tolist()
+        lateral = float(rng.normal(0.0, 0.12)) * float(positions.widths[row])
+        x, y = x - math.sin(heading) * lateral, y + math.cos(heading) * lateral
         turned = rng.random() < (0.95 if shape == "pedestrian" else 0.12)
         heading += float(rng.uniform(-math.pi, math.pi)) if turned else float(rng.normal(0.0, 0.07))
         placement = Placement(x, y, z, heading, speed=float(rng.uniform(0.0, 12.0)))
         box = _box(spec, placement)
-        near = np.hypot(x - origin[0], y - origin[1]) < 0.6 + max(spec.size[0], spec.size[1]) / 2
-        if near or any(overlap(box, other) for other in boxes):
+        too_near = np.hypot(x - origin[0], y - origin[1]) < 0.6 + max(spec.size[0], spec.size[1]) / 2
+        if too_near or any(overlap(box, other) for other in boxes):
             continue
         boxes.append(box)
         found.append((spec, placement))
@@ -215,32 +216,32 @@ def random_traffic(
 
 
 def random_signals(rng: np.random.Generator, roads: RoadNetwork) -> dict[str, str]:
-    """A state for every traffic light."""
+    """Return a state for every traffic light."""
     states = ("red", "redYellow", "yellow", "green", "off")
     odds = [0.28, 0.06, 0.24, 0.28, 0.14]
     return {name: str(rng.choice(states, p=odds)) for name, signal in roads.signals.items() if signal.dynamic}
 
 
-def random_looks(
-    rng: np.random.Generator, cast: Sequence[tuple[ActorSpec, Placement]], weather: Weather
+def random_appearances(
+    rng: np.random.Generator, actors: Sequence[tuple[ActorSpec, Placement]], weather: Weather
 ) -> dict[str, Appearance]:
-    """Lights of vehicles that are switched, and how pedestrians hold themselves."""
-    looks = {}
-    for spec, _ in cast:
+    """Return switched lights of vehicles, and motions of pedestrians."""
+    appearances = {}
+    for spec, _ in actors:
         if spec.shape == "pedestrian":
             motion = str(rng.choice(_MOTIONS))
-            looks[spec.name] = Appearance(animations={"motion": AnimationState("motion", motion)})
+            appearances[spec.name] = Appearance(animations={"motion": AnimationState("motion", motion)})
         elif spec.wheelbase > 0.0 and spec.shape != "bicycle":
             odds = dict(_LIGHTS)
             if spec.shape in ("ambulance", "firetruck"):
                 odds["specialPurposeLights"] = 0.4
-            lit = [light for light, share in odds.items() if rng.random() < share]
-            lights = {light: LightState(light, "on") for light in lit}
+            switched_on = [light for light, share in odds.items() if rng.random() < share]
+            lights = {light: LightState(light, "on") for light in switched_on}
             if weather.lamps_on and rng.random() < 0.08:
                 lights["lowBeam"] = LightState("lowBeam", "off")
             if lights:
-                looks[spec.name] = Appearance(lights=lights)
-    return looks
+                appearances[spec.name] = Appearance(lights=lights)
+    return appearances
 
 
 def _box(spec: ActorSpec, placement: Placement) -> tuple[float, ...]:
@@ -254,7 +255,7 @@ def _box(spec: ActorSpec, placement: Placement) -> tuple[float, ...]:
 
 
 def random_weather(rng: np.random.Generator) -> Weather:
-    """Half of them clear days; the rest overcast, fog, rain, snow, dusk and night."""
+    """Return a weather: half of them clear days; otherwise overcast, fog, rain, snow, dusk and night."""
     kind = str(
         rng.choice(
             ["clear", "overcast", "fog", "rain", "snow", "dusk", "night"],

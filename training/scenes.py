@@ -1,4 +1,4 @@
-"""Places to test on, read by the sensors of stations: the library's scenes as they are played, and random ones."""
+"""Scenes for evaluation with sensor readings of stations: simulated scenarios of the library, and random scenes."""
 
 from __future__ import annotations
 
@@ -24,36 +24,41 @@ from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label, actor_labels
 from training.random_roads import random_place
-from training.random_scene import Spots, View, random_actor, random_traffic
+from training.random_scene import LanePositions, View, random_actor, random_traffic
 
 LIBRARY = ("coop/scenario_1", "coop/scenario_2")
 EVERY = 10
-"""Ticks from one picture of a scenario to the next: half a second."""
+"""Ticks between images of a scenario: half a second."""
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What one station's camera and LiDAR gave, and what was there: the labels are of the only camera."""
+class StationScene:
+    """Readings of one station with camera and lidar, and the labels of its camera image."""
 
     readings: Readings
     labels: list[Label]
     weather: str
-    installation: DetectorContext
+    context: DetectorContext
 
 
-def usual_sensors() -> dict[str, AnySensorSettings]:
-    """A camera of 800 x 600 pixels and a LiDAR, both as they are without any settings."""
+def default_sensors() -> dict[str, AnySensorSettings]:
+    """Return a camera of 800 x 600 pixels and a lidar, both with default settings."""
     return {"camera": CameraSettings(), "lidar": LidarSettings()}
 
 
-def library_scenes(weathers: Sequence[Weather], scenarios: Sequence[str] = LIBRARY) -> Iterator[Seen]:
-    """What every station of the library's scenarios sees, each half second, in each weather; driven by the oracle."""
+def library_scenes(weathers: Sequence[Weather], scenarios: Sequence[str] = LIBRARY) -> Iterator[StationScene]:
+    """Yield the readings of every station of the library scenarios, each half second, in each weather; driven by the
+    oracle."""
     for name in scenarios:
         for weather in weathers:
             scenario = load_for_seed(resolve_scenario(name), 1, {})
             with Simulation(scenario, seed=1, settings=RunSettings(channel="ideal")) as simulation:
                 world = simulation.world
-                stations = [name for name, own in scenario.controllers.items() if any(map(is_agent_controller, own))]
+                stations = [
+                    name
+                    for name, controllers in scenario.controllers.items()
+                    if any(map(is_agent_controller, controllers))
+                ]
                 end, tick = None, 0
                 rigs: dict[str, Rig] = {}
                 while end is None:
@@ -62,7 +67,7 @@ def library_scenes(weathers: Sequence[Weather], scenarios: Sequence[str] = LIBRA
                         specs = {actor: world.spec(actor) for actor in world.names}
                         for actor in stations:
                             if actor in specs and actor not in rigs:
-                                rigs[actor] = Rig(specs[actor], usual_sensors(), seed=1)
+                                rigs[actor] = Rig(specs[actor], default_sensors(), seed=1)
                         yield from _read(world, rigs, specs, simulation.roads, weather.name)
                     _, end = simulation.tick()
                     tick += 1
@@ -75,33 +80,35 @@ def random_scenes(
     weather: Weather,
     each: int = 2,
     sensors: Mapping[str, AnySensorSettings] | None = None,
-) -> Iterator[Seen]:
-    """What a car with the usual sensors, or other ones named `camera` and `lidar`, sees in random traffic."""
-    sensors = sensors or usual_sensors()
+) -> Iterator[StationScene]:
+    """Yield readings of a car with default sensors, or others named `camera` and `lidar`, in random traffic."""
+    sensors = sensors or default_sensors()
     for number in range(worlds):
         rng = generator(seed, "training data", split, number)
         with tempfile.TemporaryDirectory() as folder:
             place = random_place(rng, Path(folder))
-        spots = Spots.of(place.roads)
+        positions = LanePositions.of(place.roads)
         with World(place.roads) as world:
             place.build_houses(world)
             world.set_weather(weather)
             for _ in range(each):
                 for name in list(world.names):
                     world.remove(name)
-                spec, placement = _carrier(rng, spots)
+                spec, placement = _carrier(rng, positions)
                 world.add(spec, placement)
                 pose = mounting(CameraSettings(), spec, "front").camera_pose(world.view(), 0)
-                for other, there in random_traffic(rng, spots, View(CameraSettings(), pose, (spec, placement))):
-                    world.add(other, there)
+                for other, other_placement in random_traffic(
+                    rng, positions, View(CameraSettings(), pose, (spec, placement))
+                ):
+                    world.add(other, other_placement)
                 specs = {actor: world.spec(actor) for actor in world.names}
                 rig = Rig(spec, dict(sensors), seed=seed)
                 yield from _read(world, {spec.name: rig}, specs, place.roads, weather.name, sensors)
 
 
-def _carrier(rng: np.random.Generator, spots: Spots) -> tuple[ActorSpec, Placement]:
-    row = int(rng.choice(np.flatnonzero(spots.kinds == "driving")))
-    x, y, z, heading = spots.poses[row].tolist()
+def _carrier(rng: np.random.Generator, positions: LanePositions) -> tuple[ActorSpec, Placement]:
+    row = int(rng.choice(np.flatnonzero(positions.kinds == "driving")))
+    x, y, z, heading = positions.poses[row].tolist()
     return random_actor(rng, "Carrier", "car"), Placement(x, y, z, heading)
 
 
@@ -112,9 +119,9 @@ def _read(
     roads: RoadNetwork | None,
     weather: str,
     sensors: Mapping[str, AnySensorSettings] | None = None,
-) -> Iterator[Seen]:
+) -> Iterator[StationScene]:
     view = world.view()
     for name, readings in read_all(list(rigs.values()), world, view).items():
         labels = actor_labels(readings.cameras["camera"], view, specs, (name,))
-        installation = DetectorContext(specs[name], dict(sensors or usual_sensors()), roads, 1)
-        yield Seen(readings, labels, weather, installation)
+        context = DetectorContext(specs[name], dict(sensors or default_sensors()), roads, 1)
+        yield StationScene(readings, labels, weather, context)

@@ -1,4 +1,4 @@
-"""Scores of detections over whole sets of pictures, for parts of the objects: by class, distance, size and weather."""
+"""Scores of detections over whole sets of images, for subsets of the objects: by class, distance, size and weather."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ VEHICLES = ("car", "truck", "bus")
 
 @dataclass(frozen=True)
 class Objects:
-    """What is in one picture: boxes (M, 4) [px of the picture], class names, height [px of the camera], distance [m],
-    and whether it shows enough to be asked for."""
+    """Objects of one image: boxes (M, 4) [px], class names, height [px of the camera], distance [m], and whether they
+    are required."""
 
     boxes: Array
     names: tuple[str, ...]
@@ -31,19 +31,19 @@ class Objects:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """One picture: its objects, what was found, and the name of its weather."""
+class EvaluatedImage:
+    """Image with its objects, detections, and the name of its weather."""
 
     objects: Objects
     found: ImageDetections
     weather: str
     confidence: float
-    """From which on the detector itself believes its boxes; recall is told for that."""
+    """Default confidence of the detector, at which recall is evaluated."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """Some of the objects: of these classes, at these distances [m], at least so high [px], in this weather."""
+    """Subset of objects: classes, distances [m], minimum height [px], weather."""
 
     names: tuple[str, ...]
     nearest: float = 0.0
@@ -51,71 +51,76 @@ class Part:
     height: float = 0.0
     weather: str = ""
 
-    def asked(self, objects: Objects) -> Bools:
-        """(M,) the objects of this part."""
-        named = np.array([name in self.names for name in objects.names], dtype=bool)
+    def required(self, objects: Objects) -> Bools:
+        """Return the objects (M,) of this subset."""
+        of_classes = np.array([name in self.names for name in objects.names], dtype=bool)
         near = (objects.distance >= self.nearest) & (objects.distance < self.farthest)
-        return named & near & (objects.height >= self.height) & objects.to_find
+        return of_classes & near & (objects.height >= self.height) & objects.to_find
 
 
 @dataclass(frozen=True)
 class Score:
-    """Of one part: average precision at overlap 0.5, recall at the detectors' confidence, number of objects."""
+    """Scores of a subset: average precision at overlap 0.5, recall at the default confidence, number of objects."""
 
     precision: float
     recall: float
     objects: int
 
 
-def score(pictures: Sequence[Judged], part: Part) -> Score:
-    """All classes of the part taken as one: a truck found as a car is found.
+def score(images: Sequence[EvaluatedImage], part: Part) -> Score:
+    """Return the score of a subset with all its classes as one: a truck that is detected as a car is detected.
 
-    Objects of those classes beyond the part, and all that shows too little, neither count nor harm.
+    Objects of those classes outside the subset, and objects that are not required, are ignored.
     """
     matches: list[Matches] = []
     count = 0
-    for picture in pictures:
-        if part.weather and picture.weather != part.weather:
+    for image in images:
+        if part.weather and image.weather != part.weather:
             continue
-        objects = picture.objects
-        asked = part.asked(objects)
-        mine = np.array([name in part.names for name in objects.names], dtype=bool) | ~objects.to_find
-        detected = np.array([name in part.names for name in picture.found.classes], dtype=bool)
+        objects = image.objects
+        required = part.required(objects)
+        of_classes = np.array([name in part.names for name in objects.names], dtype=bool) | ~objects.to_find
+        detected = np.array([name in part.names for name in image.found.classes], dtype=bool)
         matches.append(
-            match(picture.found.boxes[detected], picture.found.scores[detected], objects.boxes[mine], ~asked[mine])
+            match(
+                image.found.boxes[detected],
+                image.found.scores[detected],
+                objects.boxes[of_classes],
+                ~required[of_classes],
+            )
         )
-        count += int(asked.sum())
-    confidence = pictures[0].confidence if pictures else 0.0
+        count += int(required.sum())
+    confidence = images[0].confidence if images else 0.0
     return Score(average_precision(matches, count), recall_at(matches, count, confidence), count)
 
 
-def mean_precision(pictures: Sequence[Judged], names: Sequence[str], weather: str) -> float:
-    """Mean of the average precision of each class that occurs; NaN where none does."""
-    values = [score(pictures, Part((name,), weather=weather)).precision for name in names]
+def mean_precision(images: Sequence[EvaluatedImage], names: Sequence[str], weather: str) -> float:
+    """Return the mean average precision of the classes that occur; NaN if there are none."""
+    values = [score(images, Part((name,), weather=weather)).precision for name in names]
     known = [value for value in values if not np.isnan(value)]
     return float(np.mean(known)) if known else float("nan")
 
 
-def as_one_light(pictures: Sequence[Judged]) -> list[Judged]:
-    """The same with the states of traffic lights forgotten, to tell finding a light from reading it."""
+def as_one_light(images: Sequence[EvaluatedImage]) -> list[EvaluatedImage]:
+    """Return the images with one class for all traffic lights, to evaluate detection without the state."""
 
-    def plain(names: tuple[str, ...]) -> tuple[str, ...]:
+    def merge_lights(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(LIGHT if light_state(name) else name for name in names)
 
     return [
-        Judged(
+        EvaluatedImage(
             Objects(
                 entry.objects.boxes,
-                plain(entry.objects.names),
+                merge_lights(entry.objects.names),
                 entry.objects.height,
                 entry.objects.distance,
                 entry.objects.to_find,
             ),
-            ImageDetections(entry.found.boxes, entry.found.scores, plain(entry.found.classes)),
+            ImageDetections(entry.found.boxes, entry.found.scores, merge_lights(entry.found.classes)),
             entry.weather,
             entry.confidence,
         )
-        for entry in pictures
+        for entry in images
     ]
 
 

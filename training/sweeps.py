@@ -1,4 +1,4 @@
-"""Recall against the thickness of fog and against darkness: the same scenes, seen in weather after weather."""
+"""Recall against the density of fog and against darkness: equal scenes in a sequence of weathers."""
 
 from __future__ import annotations
 
@@ -21,19 +21,21 @@ from eidrive_scenario.world.weather import Weather
 from training.dataset import shows_enough
 from training.labels import Label, actor_labels
 from training.random_roads import random_place
-from training.random_scene import Spots, random_traffic, random_view
+from training.random_scene import LanePositions, random_traffic, random_view
 from training.scoring import VEHICLES
 
 VISUAL_RANGES = (30_000.0, 1000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 35.0)
 ELEVATIONS = (40.0, 20.0, 10.0, 5.0, 2.0, 0.0, -3.0, -6.0, -9.0, -12.0, -18.0)
 FARTHEST, LOWEST = 40.0, 15.0
-"""Vehicles asked for: nearer than this [m], at least so high in the picture [px]."""
+"""Maximum distance [m] and minimum height in the image [px] of required vehicles."""
 LAMPS = {"headlights": "on", "no lamps": "off"}
 
 
 def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict[str, Any]:
-    """Recall of each network at its confidence: by visual range [m], and by the sun's elevation [degrees] with the
-    vehicles' lamps on and off."""
+    """Return the recall of each network at its confidence.
+
+    The curves are by visual range [m], and by sun elevation [degrees] with lamps on and off.
+    """
     weathers: dict[tuple[str, float], Weather] = {
         ("fog", value): Weather(visual_range=value, cloud_cover=0.5, sun_elevation=30.0) for value in VISUAL_RANGES
     }
@@ -42,41 +44,44 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
             setting: Any = lamps
             weathers[title, value] = Weather(sun_elevation=value, headlights=setting)
     found = {key: dict.fromkeys(networks, 0) for key in weathers}
-    asked = 0
+    required = 0
     for number in range(worlds):
         rng = generator(seed, "training data", "sweeps", number)
         with tempfile.TemporaryDirectory() as folder:
             place = random_place(rng, Path(folder))
-        spots = Spots.of(place.roads)
-        view = random_view(rng, spots)
+        positions = LanePositions.of(place.roads)
+        view = random_view(rng, positions)
         camera = ImageSensor(CameraSettings())
         with World(place.roads) as world:
             place.build_houses(world)
-            cast = random_traffic(rng, spots, view)
-            for spec, placement in cast:
+            actors = random_traffic(rng, positions, view)
+            for spec, placement in actors:
                 world.add(spec, placement)
-            specs = {spec.name: spec for spec, _ in cast}
+            specs = {spec.name: spec for spec, _ in actors}
             boxes = None
             for key, weather in weathers.items():
                 world.set_weather(weather)
                 reading = camera.capture(world, view.pose, generator(seed, "sweeps", number))
                 if boxes is None:
                     boxes = _vehicles(actor_labels(reading, world.view(), specs))
-                    asked += len(boxes)
+                    required += len(boxes)
                 if not len(boxes):
                     break
                 for name, network in networks.items():
-                    seen = network.find(reading.rgb)
-                    rows = [row for row, what in enumerate(seen.classes) if what in VEHICLES]
-                    matches = match(seen.boxes[rows], seen.scores[rows], boxes, np.zeros(len(boxes), dtype=bool))
+                    detections = network.find(reading.rgb)
+                    rows = [row for row, category in enumerate(detections.classes) if category in VEHICLES]
+                    matches = match(
+                        detections.boxes[rows], detections.scores[rows], boxes, np.zeros(len(boxes), dtype=bool)
+                    )
                     found[key][name] += int(matches.found.sum())
     return {
-        "vehicles": asked,
+        "vehicles": required,
         "curves": {
             title: {
                 "at": [value for kind, value in weathers if kind == title],
                 **{
-                    name: [found[key][name] / max(asked, 1) for key in weathers if key[0] == title] for name in networks
+                    name: [found[key][name] / max(required, 1) for key in weathers if key[0] == title]
+                    for name in networks
                 },
             }
             for title in ("fog", *LAMPS)
@@ -85,21 +90,25 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
 
 
 def _vehicles(labels: list[Label]) -> NDArray[np.float64]:
-    """(M, 4) boxes of the vehicles that are asked for."""
+    """Return boxes (M, 4) of the required vehicles."""
     boxes = np.array([label.box for label in labels], dtype=float).reshape(-1, 4)
     height = boxes[:, 3] - boxes[:, 1]
-    seen, whole, distance = (
-        np.array([getattr(label, key) for label in labels], dtype=float) for key in ("seen", "whole", "distance")
+    visible_pixels, silhouette_pixels, distance = (
+        np.array([getattr(label, key) for label in labels], dtype=float)
+        for key in ("visible_pixels", "silhouette_pixels", "distance")
     )
-    named = np.array([IMAGE_CLASSES[label.number] in VEHICLES for label in labels], dtype=bool)
-    asked: NDArray[np.float64] = boxes[
-        shows_enough(height, seen, whole) & named & (distance < FARTHEST) & (height >= LOWEST)
+    is_vehicle = np.array([IMAGE_CLASSES[label.number] in VEHICLES for label in labels], dtype=bool)
+    required: NDArray[np.float64] = boxes[
+        shows_enough(height, visible_pixels, silhouette_pixels)
+        & is_vehicle
+        & (distance < FARTHEST)
+        & (height >= LOWEST)
     ]
-    return asked
+    return required
 
 
 def plot_sweeps(curves: Mapping[str, Any], path: Path) -> None:
-    """The curves as a picture."""
+    """Write the curves as an image."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -1,4 +1,4 @@
-"""The tables of reports/detection.md."""
+"""Tables of reports/detection.md."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT
-from training.scoring import ROAD_USERS, VEHICLES, Judged, Part, as_one_light, mean_precision, score
+from training.scoring import ROAD_USERS, VEHICLES, EvaluatedImage, Part, as_one_light, mean_precision, score
 
 Array = NDArray[np.float64]
 Table = tuple[str, list[str], list[list[str]]]
@@ -19,37 +19,37 @@ WEATHERS = ("clear", "overcast", "fog", "rain", "snow", "dusk", "night")
 
 
 def number(value: float) -> str:
-    """A score in three digits, - where there is none."""
+    """Return a score with three digits, - for NaN."""
     return "-" if np.isnan(value) else f"{value:.3f}"
 
 
-def tables_of(judged: Mapping[str, list[Judged]], of: str) -> list[Table]:
-    """Average precision and recall by weather, class and distance."""
+def tables_of(evaluated: Mapping[str, list[EvaluatedImage]], of: str) -> list[Table]:
+    """Return average precision and recall by weather, class and distance."""
 
-    def row(name: str, part: Part, pictures: Callable[[str], list[Judged]]) -> list[str]:
+    def row(name: str, part: Part, images: Callable[[str], list[EvaluatedImage]]) -> list[str]:
         cells = [name]
-        for detector in judged:
-            result = score(pictures(detector), part)
+        for detector in evaluated:
+            result = score(images(detector), part)
             cells += [number(result.precision), number(result.recall)]
         return [*cells, str(result.objects)]
 
-    weathers = sorted({entry.weather for entry in next(iter(judged.values()))}, key=WEATHERS.index)
-    head = [f"{name} {what}" for name in judged for what in ("AP50", "recall")] + ["objects"]
-    everything = judged.__getitem__
+    weathers = sorted({entry.weather for entry in next(iter(evaluated.values()))}, key=WEATHERS.index)
+    head = [f"{name} {what}" for name in evaluated for what in ("AP50", "recall")] + ["objects"]
+    everything = evaluated.__getitem__
     by_weather = [
         row(weather, Part(VEHICLES, farthest=40.0, height=15.0, weather=weather), everything) for weather in weathers
     ]
     by_weather += [
-        row(f"clear, {name} alone", Part((name,), farthest=40.0, height=15.0, weather="clear"), everything)
+        row(f"clear, {name} only", Part((name,), farthest=40.0, height=15.0, weather="clear"), everything)
         for name in VEHICLES
     ]
     found: list[Table] = [(f"{of}: vehicles within 40 m and at least 15 px high", ["weather", *head], by_weather)]
     for weather in [name for name in ("clear", "fog") if name in weathers]:
         rows = [row(name, Part((name,), weather=weather), everything) for name in IMAGE_CLASSES]
-        lights = {name: as_one_light(entries) for name, entries in judged.items()}
+        lights = {name: as_one_light(entries) for name, entries in evaluated.items()}
         rows.append(row(f"{LIGHT}, any state", Part((LIGHT,), weather=weather), lights.__getitem__))
         mean = ["mean of classes"]
-        for entries in judged.values():
+        for entries in evaluated.values():
             mean += [number(mean_precision(entries, IMAGE_CLASSES, weather)), ""]
         rows.append([*mean, ""])
         found.append((f"{of}, {weather}: by class", ["class", *head], [r for r in rows if r[-1] != "0"]))
@@ -64,7 +64,7 @@ def tables_of(judged: Mapping[str, list[Judged]], of: str) -> list[Table]:
 
 
 def error_table(errors: Mapping[str, Array], of: str) -> Table:
-    """Medians of the errors of lifted centers."""
+    """Return medians of the errors of lifted centers."""
     bins = (
         ("all within 30 m", 0.0, 30.0),
         *((f"{a:.0f} to {b:.0f} m", a, b) for a, b in ((0, 10), (10, 20), (20, 30), (30, 50))),
@@ -84,7 +84,7 @@ def error_table(errors: Mapping[str, Array], of: str) -> Table:
 
 
 def as_markdown(tables: Sequence[Table], notes: Mapping[str, str] | None = None) -> str:
-    """Tables as text that is also easy to read unrendered; `notes` by title go above their table."""
+    """Return tables as aligned Markdown; `notes` by title are inserted above their table."""
     lines = []
     for title, head, rows in tables:
         widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]

@@ -1,7 +1,7 @@
-"""Trains a network on rendered pictures: `python -m training.train yolov5 --data training/data --out training/out`.
+"""Training of a network on rendered images: `python -m training.train yolov5 --data training/data --out training/out`.
 
-On a GPU in minutes, on a CPU overnight, with the same seeds. All pictures are held in the device's memory and changed
-there. What is kept is the moving average of the weights, as the best epoch on the validation pictures had it.
+Training takes minutes on a GPU and a night on a CPU, with the same seeds. All images are stored and augmented in device
+memory. The result is the moving average of the weights in the best epoch on the validation images.
 """
 
 from __future__ import annotations
@@ -32,49 +32,52 @@ from eidrive_scenario.perception.learned.networks.yolov5 import ANCHORS_PER_SCAL
 from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss
 from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates
 from eidrive_scenario.perception.learned.weights import Description, save
-from training.augment import moved, recolored
+from training.augment import change_colors, transform_images
 from training.dataset import Dataset
 
 INPUT_SIZE = (512, 384)
 MOST_OBJECTS = 48
-"""Rows of a picture's padded table of objects; the farthest are left out of a fuller one."""
-AVERAGE = 0.9995
-"""Share of the old weights that the moving average keeps with each step, once it is under way."""
+"""Maximum number of objects of an image; the farthest are omitted."""
+AVERAGE_DECAY = 0.9995
+"""Decay of the moving average per step, after the initial phase."""
 LEAST_CONFIDENCE = 0.02
-PLAIN_FROM = 0.92
-"""From this share of the training on pictures are no longer zoomed and shifted."""
+UNCHANGED_FROM = 0.92
+"""Share of the training from which images are no longer zoomed and shifted."""
 
 
 class Samples:
-    """A dataset on a device: pictures (P, 3, H, W) uint8, boxes (P, M, 4) x1 y1 x2 y2 [px], classes (P, M)."""
+    """Dataset on a device: images (P, 3, H, W) uint8, boxes (P, M, 4) x1 y1 x2 y2 [px], classes (P, M)."""
 
     def __init__(self, dataset: Dataset, device: torch.device) -> None:
         width, height = INPUT_SIZE
-        pictures = np.empty((len(dataset), height, width, 3), dtype=np.uint8)
-        for row, picture in enumerate(dataset.pictures()):
-            pictures[row] = picture
+        images = np.empty((len(dataset), height, width, 3), dtype=np.uint8)
+        for row, image in enumerate(dataset.images()):
+            images[row] = image
         boxes = np.zeros((len(dataset), MOST_OBJECTS, 4), dtype=np.float32)
         classes = np.full((len(dataset), MOST_OBJECTS), PADDING, dtype=np.int64)
         to_find = dataset.to_find()
         filled = np.zeros(len(dataset), dtype=np.int64)
         for row in np.argsort(dataset.distance, kind="stable").tolist():
-            picture_row = int(dataset.picture[row])
-            at = filled[picture_row]
+            image_row = int(dataset.picture[row])
+            at = filled[image_row]
             if at < MOST_OBJECTS:
-                boxes[picture_row, at] = dataset.box[row]
-                classes[picture_row, at] = dataset.number[row] if to_find[row] else IGNORED
-                filled[picture_row] += 1
-        self.pictures = torch.from_numpy(pictures).to(device).permute(0, 3, 1, 2)
+                boxes[image_row, at] = dataset.box[row]
+                classes[image_row, at] = dataset.number[row] if to_find[row] else IGNORED
+                filled[image_row] += 1
+        self.images = torch.from_numpy(images).to(device).permute(0, 3, 1, 2)
         self.boxes = torch.from_numpy(boxes).to(device)
         self.classes = torch.from_numpy(classes).to(device)
 
     def __len__(self) -> int:
-        return len(self.pictures)
+        return len(self.images)
 
 
 def fit_anchors(dataset: Dataset, seed: int, rounds: int = 60) -> Anchors:
-    """Nine anchors by k-means over the boxes' widths and heights, nearness being the overlap of boxes on one center
-    (Redmon and Farhadi, YOLO9000, 2017, section 2), sorted by area, three for each scale."""
+    """Return nine anchors, sorted by area, three for each scale.
+
+    They are the k-means clusters of box widths and heights, with the overlap of concentric boxes as similarity (Redmon
+    and Farhadi, YOLO9000, 2017, section 2).
+    """
     box = dataset.box[dataset.to_find()].astype(float)
     sides = np.maximum(box[:, 2:] - box[:, :2], 2.0)
     rng = np.random.default_rng(seed)
@@ -90,7 +93,7 @@ def fit_anchors(dataset: Dataset, seed: int, rounds: int = 60) -> Anchors:
 
 
 def learning_rate(step: int, steps: int, highest: float) -> float:
-    """A linear rise over the first twentieth, then half a cosine down to a hundredth (Loshchilov and Hutter 2017)."""
+    """Return the rate: linear warm-up, then a half cosine to 1 % (Loshchilov and Hutter 2017)."""
     rise = max(steps // 20, 1)
     if step < rise:
         return highest * (step + 1) / rise
@@ -99,36 +102,37 @@ def learning_rate(step: int, steps: int, highest: float) -> float:
 
 
 class Average:
-    """The moving average of a network's weights, quicker at first."""
+    """Moving average of the weights of a network, with a faster initial phase."""
 
     def __init__(self, network: nn.Module) -> None:
         self.network = copy.deepcopy(network).eval().requires_grad_(False)
-        self._own = _numbers(self.network)
+        self._values = _float_values(self.network)
         self._steps = 0
 
     @torch.no_grad()
     def update(self, network: nn.Module) -> None:
         self._steps += 1
-        keep = AVERAGE * (1.0 - math.exp(-self._steps / 300.0))
-        torch._foreach_lerp_(self._own, _numbers(network), 1.0 - keep)
+        decay = AVERAGE_DECAY * (1.0 - math.exp(-self._steps / 300.0))
+        torch._foreach_lerp_(self._values, _float_values(network), 1.0 - decay)
 
 
-def _numbers(network: nn.Module) -> list[torch.Tensor]:
-    """Weights and running statistics; what counts batches is left out."""
+def _float_values(network: nn.Module) -> list[torch.Tensor]:
+    """Return weights and running statistics without batch counters."""
     return [value for value in network.state_dict().values() if value.dtype.is_floating_point]
 
 
 @torch.no_grad()
 def scores(network: nn.Module, samples: Samples, autocast: bool) -> tuple[dict[str, float], float]:
-    """AP at overlap 0.5 of each class, their mean over the classes that occur, and the confidence of the best F1."""
+    """Return AP at overlap 0.5 of each class, their mean over the classes that occur, and the confidence of the best
+    F1."""
     width, height = INPUT_SIZE
-    device = samples.pictures.device
+    device = samples.images.device
     groups = suppression_groups(IMAGE_CLASSES)
     defaults = default_boxes(height, width)
     found: dict[int, list[Matches]] = {number: [] for number in range(len(IMAGE_CLASSES))}
     present = np.zeros(len(IMAGE_CLASSES), dtype=np.int64)
     for start in range(0, len(samples), 64):
-        pixels = samples.pictures[start : start + 64].float().div(255.0)
+        pixels = samples.images[start : start + 64].float().div(255.0)
         with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
             outputs = network(pixels.contiguous(memory_format=torch.channels_last))
         outputs = [output.float().cpu() for output in outputs]
@@ -145,20 +149,22 @@ def scores(network: nn.Module, samples: Samples, autocast: bool) -> tuple[dict[s
             b, s, n = b[kept], s[kept], n[kept]
             objects = samples.boxes[start + index].cpu().double().numpy()
             classes = samples.classes[start + index].cpu().numpy()
-            for which in range(len(IMAGE_CLASSES)):
-                mine = (classes == which) | (classes == IGNORED)
-                ignored: NDArray[np.bool_] = classes[mine] == IGNORED
-                present[which] += int((~ignored).sum())
-                found[which].append(match(b[n == which], s[n == which], objects[mine], ignored))
+            for class_number in range(len(IMAGE_CLASSES)):
+                of_class = (classes == class_number) | (classes == IGNORED)
+                ignored: NDArray[np.bool_] = classes[of_class] == IGNORED
+                present[class_number] += int((~ignored).sum())
+                found[class_number].append(
+                    match(b[n == class_number], s[n == class_number], objects[of_class], ignored)
+                )
     result = {
         name: average_precision(found[number], int(present[number]))
         for number, name in enumerate(IMAGE_CLASSES)
         if present[number]
     }
     everything = [entry for entries in found.values() for entry in entries]
-    sure = any(entry.correct.any() for entry in everything)
-    believed = best_confidence(everything, int(present.sum())) if sure else Description.confidence
-    return {"mean": float(np.mean(list(result.values()))), **result}, believed
+    any_correct = any(entry.correct.any() for entry in everything)
+    confidence_of_best_f1 = best_confidence(everything, int(present.sum())) if any_correct else Description.confidence
+    return {"mean": float(np.mean(list(result.values()))), **result}, confidence_of_best_f1
 
 
 def train(options: argparse.Namespace) -> None:
@@ -168,9 +174,7 @@ def train(options: argparse.Namespace) -> None:
     started = time.perf_counter()
     dataset = Dataset.load(options.data / "train")
     samples, checks = (Samples(Dataset.load(options.data / part), device) for part in ("train", "validation"))
-    print(
-        f"{len(samples)} + {len(checks)} pictures on {device} after {time.perf_counter() - started:.0f} s", flush=True
-    )
+    print(f"{len(samples)} + {len(checks)} images on {device} after {time.perf_counter() - started:.0f} s", flush=True)
     anchors = fit_anchors(dataset, options.seed) if options.network == "yolov5" else None
     description = Description(options.network, IMAGE_CLASSES, INPUT_SIZE, anchors)
     network = description.build().to(device)
@@ -187,7 +191,7 @@ def train(options: argparse.Namespace) -> None:
     per_epoch = len(samples) // options.batch
     steps = per_epoch * options.epochs
     best, step, epoch = -1.0, 0, 0
-    began = time.perf_counter()
+    start = time.perf_counter()
     limit = options.minutes * 60.0 if options.minutes else math.inf
     for epoch in range(options.epochs):
         network.train()
@@ -195,18 +199,18 @@ def train(options: argparse.Namespace) -> None:
         sums: dict[str, float] = {}
         for number in range(per_epoch):
             rows = order[number * options.batch : (number + 1) * options.batch]
-            pixels = samples.pictures[rows].float().div_(255.0)
-            # Time, not epochs, sets the schedule where there is a limit, so that it always ends in small steps.
-            progress = max(step / steps, (time.perf_counter() - began) / limit)
-            if progress > PLAIN_FROM:
-                pictures, targets = pixels, Targets(centered(samples.boxes[rows]), samples.classes[rows])
+            pixels = samples.images[rows].float().div_(255.0)
+            # With a time limit, the time determines the schedule, so that it always ends with small steps.
+            progress = max(step / steps, (time.perf_counter() - start) / limit)
+            if progress > UNCHANGED_FROM:
+                images, targets = pixels, Targets(centered(samples.boxes[rows]), samples.classes[rows])
             else:
-                pictures, targets = moved(pixels, samples.boxes[rows], samples.classes[rows], draws)
-            pictures = recolored(pictures, draws)
+                images, targets = transform_images(pixels, samples.boxes[rows], samples.classes[rows], draws)
+            images = change_colors(images, draws)
             for group in optimizer.param_groups:
                 group["lr"] = learning_rate(int(progress * steps), steps, options.rate)
             with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
-                outputs = network(pictures.contiguous(memory_format=torch.channels_last))
+                outputs = network(images.contiguous(memory_format=torch.channels_last))
             loss, parts = loss_of(outputs, targets)
             optimizer.zero_grad(set_to_none=True)
             loss.backward()
@@ -216,34 +220,36 @@ def train(options: argparse.Namespace) -> None:
             step += 1
             for name, value in parts.items():
                 sums[name] = sums.get(name, 0.0) + value / per_epoch
-        passed = time.perf_counter() - began
-        over = passed > limit
-        line = f"epoch {epoch + 1}/{options.epochs} {passed:.0f} s " + " ".join(f"{k} {v:.3f}" for k, v in sums.items())
-        if over or epoch + 1 == options.epochs or (epoch + 1) % options.check == 0:
-            reached, confidence = scores(average.network, checks, autocast)
+        elapsed = time.perf_counter() - start
+        is_over = elapsed > limit
+        line = f"epoch {epoch + 1}/{options.epochs} {elapsed:.0f} s " + " ".join(
+            f"{k} {v:.3f}" for k, v in sums.items()
+        )
+        if is_over or epoch + 1 == options.epochs or (epoch + 1) % options.check == 0:
+            results, confidence = scores(average.network, checks, autocast)
             description = replace(description, confidence=round(confidence, 3))
-            line += f" | AP50 {reached['mean']:.4f}"
-            if reached["mean"] > best:
-                best = reached["mean"]
-                card = card_text(options, description, reached, epoch + 1, passed, len(samples), len(checks))
+            line += f" | AP50 {results['mean']:.4f}"
+            if results["mean"] > best:
+                best = results["mean"]
+                metadata = metadata_of(options, description, results, epoch + 1, elapsed, len(samples), len(checks))
                 options.out.mkdir(parents=True, exist_ok=True)
-                save(options.out / f"{options.network}.npz", average.network, description, card)
+                save(options.out / f"{options.network}.npz", average.network, description, metadata)
         print(line, flush=True)
-        if over:
+        if is_over:
             break
-    print(json.dumps(reached, indent=1))
+    print(json.dumps(results, indent=1))
 
 
-def card_text(
+def metadata_of(
     options: argparse.Namespace,
     description: Description,
-    reached: dict[str, float],
+    results: dict[str, float],
     epochs: int,
     seconds: float,
-    pictures: int,
+    images: int,
     checks: int,
 ) -> dict[str, Any]:
-    """What travels with the weights: where they come from, and what they reach on the validation pictures."""
+    """Return the metadata of the weights: their origin, and their results on the validation images."""
     device = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
     return {
         "network": description.network,
@@ -256,7 +262,7 @@ def card_text(
         "data": {
             "script": "training/render_data.py",
             "seed": options.data_seed,
-            "train_pictures": pictures,
+            "train_pictures": images,
             "validation_pictures": checks,
         },
         "training": {
@@ -268,7 +274,7 @@ def card_text(
             "device": device,
             "seconds": round(seconds),
         },
-        "validation_ap50": {name: round(value, 4) for name, value in reached.items()},
+        "validation_ap50": {name: round(value, 4) for name, value in results.items()},
     }
 
 
@@ -276,13 +282,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("network", choices=("yolov5", "ssd"))
     parser.add_argument("--data", type=Path, default=Path("training/data"))
-    parser.add_argument("--data-seed", type=int, default=1, help="of render_data.py, for the card")
+    parser.add_argument("--data-seed", type=int, default=1, help="seed of render_data.py, for the metadata")
     parser.add_argument("--out", type=Path, default=Path("training/out"))
     parser.add_argument("--epochs", type=int, default=120)
-    parser.add_argument("--minutes", type=float, default=0.0, help="stop after so long; 0 is no limit")
+    parser.add_argument("--minutes", type=float, default=0.0, help="maximum duration; 0 for no limit")
     parser.add_argument("--batch", type=int, default=32)
     parser.add_argument("--rate", type=float, default=2e-3)
-    parser.add_argument("--check", type=int, default=15, help="epochs from one validation to the next")
+    parser.add_argument("--check", type=int, default=15, help="number of epochs between validations")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--device", default="")
     train(parser.parse_args())

@@ -1,7 +1,7 @@
-"""Trains what reads the lamps of traffic lights: `python -m training.train_lamps`; minutes on a CPU.
+"""Training of the network for lamp states of traffic lights: `python -m training.train_lamps`; minutes on a CPU.
 
-Pictures are rendered anew (some 10 minutes on two cores); no road of the library is among them, and none of the
-pictures in which `make eval` reads lights. Writes training/out/lamps.npz and its card lamps.json.
+Images are rendered first (about 10 minutes on two cores). No road of the library is among them, and none of the images
+in which `make eval` reads lights. Writes training/out/lamps.npz and its metadata lamps.json.
 """
 
 from __future__ import annotations
@@ -24,23 +24,24 @@ from eidrive_scenario.randomness import generator
 from training.light_scenes import LightScene, light_scenes
 
 VERSIONS = 12
-"""Of each light: moved, of another size, mirrored, coarser, dimmer."""
-EMPTY_PER_PICTURE = 2
+"""Number of versions of each light: shifted, scaled, mirrored, with noise and dimmed."""
+EMPTY_PER_IMAGE = 2
 LEAST_HEIGHT = 5.0
 SHIFT, STRETCH = 0.12, 0.15
-"""Standard deviations of where a light seems to be, as a share of its height, and of the logarithm of that height."""
+"""Standard deviations of the position error of a light, as a share of its height, and of the logarithm of the height.
+"""
 
 
 class Samples(NamedTuple):
-    """Parts of pictures (N, 3, 32, 16) and what they show (N,)."""
+    """Image regions (N, 3, 32, 16) and their states (N,)."""
 
-    parts: NDArray[np.float32]
-    shown: NDArray[np.int64]
+    regions: NDArray[np.float32]
+    states: NDArray[np.int64]
 
 
 def samples(scenes: Iterable[LightScene], seed: int) -> Samples:
-    """The lights that show enough, those that something hides, and places without any."""
-    parts, shown = [], []
+    """Return lights that show enough, occluded lights, and regions without lights."""
+    regions, states = [], []
     for number, scene in enumerate(scenes):
         rng = generator(seed, "lamps", number)
         truth = {light.id: light for light in scene.lights}
@@ -50,38 +51,38 @@ def samples(scenes: Iterable[LightScene], seed: int) -> Samples:
             if light is None or (light.box is not None and not light.to_read):
                 continue
             state = light.state if light.to_read else NONE
-            middles = np.array(view.center) + view.height * SHIFT * rng.standard_normal((VERSIONS, 2))
+            centers = np.array(view.center) + view.height * SHIFT * rng.standard_normal((VERSIONS, 2))
             heights = view.height * np.exp(STRETCH * rng.standard_normal(VERSIONS))
-            parts.append(crops(coarser(scene.reading.rgb, middles, heights, rng), middles, heights))
-            shown += [SHOWN.index(state)] * VERSIONS
+            regions.append(crops(with_noise(scene.reading.rgb, centers, heights, rng), centers, heights))
+            states += [SHOWN.index(state)] * VERSIONS
         height, width = scene.reading.rgb.shape[:2]
-        places = rng.uniform((0, 0), (width, height), (EMPTY_PER_PICTURE, 2))
-        sizes = np.exp(rng.uniform(np.log(LEAST_HEIGHT), np.log(80.0), EMPTY_PER_PICTURE))
+        places = rng.uniform((0, 0), (width, height), (EMPTY_PER_IMAGE, 2))
+        sizes = np.exp(rng.uniform(np.log(LEAST_HEIGHT), np.log(80.0), EMPTY_PER_IMAGE))
         near = [np.abs(places - view.center).max(axis=1) < view.height + sizes for view in views]
-        free = ~np.any(near, axis=0) if near else np.ones(EMPTY_PER_PICTURE, dtype=bool)
-        parts.append(crops(scene.reading.rgb, places[free], sizes[free]))
-        shown += [SHOWN.index(NONE)] * int(free.sum())
-    together = np.concatenate(parts)
+        without_light = ~np.any(near, axis=0) if near else np.ones(EMPTY_PER_IMAGE, dtype=bool)
+        regions.append(crops(scene.reading.rgb, places[without_light], sizes[without_light]))
+        states += [SHOWN.index(NONE)] * int(without_light.sum())
+    stacked = np.concatenate(regions)
     rng = generator(seed, "lamps", "mirrored")
-    mirrored = rng.random(len(together)) < 0.5
-    together[mirrored] = together[mirrored, :, :, ::-1]
-    return Samples(together, np.array(shown, dtype=np.int64))
+    mirrored = rng.random(len(stacked)) < 0.5
+    stacked[mirrored] = stacked[mirrored, :, :, ::-1]
+    return Samples(stacked, np.array(states, dtype=np.int64))
 
 
-def coarser(
-    picture: NDArray[np.uint8], middles: NDArray[np.float64], heights: NDArray[np.float64], rng: np.random.Generator
+def with_noise(
+    image: NDArray[np.uint8], centers: NDArray[np.float64], heights: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """The picture with a little noise, so that no part is seen twice alike."""
-    left, top = np.floor((middles - 2.0 * heights[:, None]).min(axis=0)).astype(int).clip(0)
-    right, bottom = np.ceil((middles + 2.0 * heights[:, None]).max(axis=0)).astype(int).clip(1)
-    part = picture[top:bottom, left:right].astype(float)
-    changed = picture.copy()
-    changed[top:bottom, left:right] = (part + rng.normal(0.0, 3.0, part.shape)).clip(0, 255).astype(np.uint8)
+    """Return the image with weak noise, so that no two regions are equal."""
+    left, top = np.floor((centers - 2.0 * heights[:, None]).min(axis=0)).astype(int).clip(0)
+    right, bottom = np.ceil((centers + 2.0 * heights[:, None]).max(axis=0)).astype(int).clip(1)
+    region = image[top:bottom, left:right].astype(float)
+    changed = image.copy()
+    changed[top:bottom, left:right] = (region + rng.normal(0.0, 3.0, region.shape)).clip(0, 255).astype(np.uint8)
     return changed
 
 
 class Network(nn.Module):
-    """The network of perception/learned/lamps.py, to be trained."""
+    """Trainable version of the network of perception/learned/lamps.py."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -89,35 +90,35 @@ class Network(nn.Module):
         self.third = nn.Conv2d(24, 32, 3, padding=1)
         self.last = nn.Linear(32 * (CROP[1] // 4) * (CROP[0] // 4), len(SHOWN))
 
-    def forward(self, parts: Tensor) -> Tensor:
-        seen = nn.functional.max_pool2d(self.first(parts).relu(), 2)
-        seen = nn.functional.max_pool2d(self.second(seen).relu(), 2)
-        seen = self.third(seen).relu().flatten(1)
-        logits: Tensor = self.last(nn.functional.dropout(seen, 0.3, self.training))
+    def forward(self, regions: Tensor) -> Tensor:
+        features = nn.functional.max_pool2d(self.first(regions).relu(), 2)
+        features = nn.functional.max_pool2d(self.second(features).relu(), 2)
+        features = self.third(features).relu().flatten(1)
+        logits: Tensor = self.last(nn.functional.dropout(features, 0.3, self.training))
         return logits
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
-        """As `LampNetwork` takes them."""
+        """Return the weights in the format of `LampNetwork`."""
         names = ("first", "second", "third", "last")
         values = {name: value.detach().numpy() for name, value in self.state_dict().items()}
         kernels = {f"w{number}": values[f"{name}.weight"] for number, name in enumerate(names)}
         return kernels | {f"b{number}": values[f"{name}.bias"] for number, name in enumerate(names)}
 
 
-def trained(data: Samples, seed: int, epochs: int, batch: int = 128, rate: float = 2e-3) -> Network:
-    """The network, trained with equal weight on each thing that can be shown."""
+def fit(data: Samples, seed: int, epochs: int, batch: int = 128, rate: float = 2e-3) -> Network:
+    """Return the network, trained with weights that balance the states."""
     torch.manual_seed(seed)
     network = Network()
-    parts, shown = torch.from_numpy(data.parts), torch.from_numpy(data.shown)
-    counts = torch.bincount(shown, minlength=len(SHOWN)).float().clamp(min=1.0)
+    regions, states = torch.from_numpy(data.regions), torch.from_numpy(data.states)
+    counts = torch.bincount(states, minlength=len(SHOWN)).float().clamp(min=1.0)
     loss = nn.CrossEntropyLoss(weight=(counts.sum() / counts / len(SHOWN)).sqrt(), label_smoothing=0.02)
-    steps = epochs * -(-len(parts) // batch)
+    steps = epochs * -(-len(regions) // batch)
     optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=1e-2)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps)
     for _ in range(epochs):
-        for rows in torch.split(torch.randperm(len(parts)), batch):
+        for rows in torch.split(torch.randperm(len(regions)), batch):
             gain = 0.7 + 0.6 * torch.rand(len(rows), 3, 1, 1).mean(dim=1, keepdim=True)
-            value = loss(network((parts[rows] * gain).clamp(max=1.0)), shown[rows])
+            value = loss(network((regions[rows] * gain).clamp(max=1.0)), states[rows])
             optimizer.zero_grad()
             value.backward()
             optimizer.step()
@@ -138,13 +139,13 @@ def main() -> None:
 
 
 def train(data: Samples, seed: int, epochs: int, worlds: int, out: Path) -> None:
-    """Train on these samples; write the weights and their card."""
+    """Train on these samples; write the weights and their metadata."""
     started = time.perf_counter()
     torch.set_num_threads(2)
-    network = trained(data, seed, epochs)
+    network = fit(data, seed, epochs)
     out.mkdir(parents=True, exist_ok=True)
-    counts = np.bincount(data.shown, minlength=len(SHOWN))
-    card = {
+    counts = np.bincount(data.states, minlength=len(SHOWN))
+    metadata = {
         "network": "lamps",
         "shown": list(SHOWN),
         "input_size": list(CROP),
@@ -158,8 +159,8 @@ def train(data: Samples, seed: int, epochs: int, worlds: int, out: Path) -> None
         },
         "training": {"epochs": epochs, "device": "cpu", "seconds": round(time.perf_counter() - started)},
     }
-    save(out / "lamps.npz", network.weights(), card)
-    print(f"{len(data.shown)} parts of pictures; written: {out / 'lamps.npz'}, .json")
+    save(out / "lamps.npz", network.weights(), metadata)
+    print(f"{len(data.states)} image regions; written: {out / 'lamps.npz'}, .json")
 
 
 if __name__ == "__main__":

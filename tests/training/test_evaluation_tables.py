@@ -1,4 +1,4 @@
-"""What `make eval` counts: lights read rightly and wrongly, and what is the matter with missed vehicles."""
+"""Tables of `make eval`: accuracy of traffic light states, and causes of missed vehicles."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
 from training.dataset import Dataset, encode, write
 from training.light_scores import Reading, light_table
 from training.misses import CAUSES, causes, misses
-from training.scoring import Judged, Objects
+from training.scoring import EvaluatedImage, Objects
 from training.tables import as_markdown
 
 CAR, WALKER = IMAGE_CLASSES.index("car"), IMAGE_CLASSES.index("pedestrian")
 
 
 def dataset(folder: Path) -> Dataset:
-    """Two pictures of 100 x 80: by day with cars of every kind, and at night with one; objects by
-    picture, class, box, height, seen, whole, distance."""
+    """Return two images of 100 x 80: by day with various cars, and at night with one; objects by image, class, box,
+    height, seen, whole, distance."""
     rows = [
-        (0, CAR, (30, 30, 50, 50), 20.0, 300, 300, 90.0),  # of its contrast exp(-3.912 · 90 / 200) = 0.17 arrives
+        (0, CAR, (30, 30, 50, 50), 20.0, 300, 300, 90.0),  # contrast exp(-3.912 · 90 / 200) = 0.17
         (0, CAR, (60, 30, 75, 40), 10.0, 100, 100, 40.0),
         (0, CAR, (10, 55, 30, 75), 20.0, 100, 300, 20.0),
         (0, CAR, (80, 30, 100, 50), 20.0, 300, 300, 20.0),
@@ -49,25 +49,25 @@ def dataset(folder: Path) -> Dataset:
     return Dataset.load(folder)
 
 
-def test_the_first_cause_that_applies_counts(tmp_path: Path) -> None:
+def test_causes_returns_first_that_applies(tmp_path: Path) -> None:
     names = (*CAUSES, "none of these")
-    found = [names[which] for which in causes(dataset(tmp_path))]
+    found = [names[index] for index in causes(dataset(tmp_path))]
     assert found[:4] == [
         "faint in fog, rain or snow",
         "lower than 15 px",
         "more than half hidden",
-        "cut off by the picture's border",
+        "cut off by the border of the image",
     ]
     assert found[4:7] == ["overlaps another vehicle", "overlaps another vehicle", "none of these"]
     assert found[8] == "at night"
 
 
-def test_vehicles_are_missed_or_found_whatever_they_are_taken_for(tmp_path: Path) -> None:
-    """Found are the car in fog, as a truck, and the one at night with too little trust; a pedestrian does not count."""
+def test_misses_count_vehicles_of_any_class(tmp_path: Path) -> None:
+    """Detected: the car in fog, as a truck, and the one at night, below the confidence. Pedestrians do not count."""
     data = dataset(tmp_path)
     everything = np.array([[30.0, 30.0, 50.0, 50.0]])
-    judged = [
-        Judged(
+    evaluated = [
+        EvaluatedImage(
             Objects(np.empty((0, 4)), (), np.empty(0), np.empty(0), np.empty(0, dtype=bool)),
             ImageDetections(everything, np.array([score]), (name,)),
             "clear",
@@ -75,8 +75,8 @@ def test_vehicles_are_missed_or_found_whatever_they_are_taken_for(tmp_path: Path
         )
         for score, name in ((0.9, "truck"), (0.3, "car"))
     ]
-    _, head, rows = misses({"net": judged}, data)
-    assert head == ["what is the matter", "vehicles", "net missed", "of all misses", "recall"]
+    _, head, rows = misses({"net": evaluated}, data)
+    assert head == ["cause", "vehicles", "net missed", "of all misses", "recall"]
     by_name = {row[0]: row[1:] for row in rows}
     assert by_name["faint in fog, rain or snow"] == ["1", "0", "0%", "1.000"]
     assert by_name["at night"] == ["1", "1", "14%", "0.000"]
@@ -84,17 +84,17 @@ def test_vehicles_are_missed_or_found_whatever_they_are_taken_for(tmp_path: Path
     assert sum(int(row[0]) for row in by_name.values()) == 8
 
 
-def test_lights_are_read_rightly_wrongly_or_not() -> None:
-    def one(state: str, read: str, *, to_read: bool = True, hidden: bool = False) -> Reading:
-        return Reading(state, 20.0, "clear", to_read, hidden, {"way": read})
+def test_light_table_counts_correct_and_incorrect_states() -> None:
+    def reading(state: str, read: str, *, to_read: bool = True, hidden: bool = False) -> Reading:
+        return Reading(state, 20.0, "clear", to_read, hidden, {"method": read})
 
-    found = [one("red", "red"), one("red", "green"), one("green", ""), one("off", "off")]
-    found += [one("red", "red", to_read=False, hidden=True), one("red", "", to_read=False, hidden=True)]
+    found = [reading("red", "red"), reading("red", "green"), reading("green", ""), reading("off", "off")]
+    found += [reading("red", "red", to_read=False, hidden=True), reading("red", "", to_read=False, hidden=True)]
     title, head, rows = light_table(found)
-    assert head == ["lights", "way: right", "way: wrong", "n"]
+    assert head == ["lights", "method: correct", "method: incorrect", "n"]
     by_name = {row[0]: row[1:] for row in rows}
     assert by_name["all"] == ["0.50", "0.25", "4"]
     assert by_name["red"] == ["0.50", "0.50", "2"]
     assert by_name["15 to 25 m"] == ["0.50", "0.25", "4"]
-    assert by_name["hidden by something"] == ["0.50", "0.00", "2"]
+    assert by_name["occluded"] == ["0.50", "0.00", "2"]
     assert f"## {title}" in as_markdown([(title, head, rows)])

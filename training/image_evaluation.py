@@ -1,0 +1,125 @@
+"""Detections in held-out images and in scenes, compared with the true objects."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.learned.detector import LearnedDetector, LearnedSettings
+from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from training.dataset import Dataset, shows_enough, write
+from training.labels import Label
+from training.render_data import PER_WORLD, Shot, render, table
+from training.scenes import StationScene
+from training.scoring import VEHICLES, EvaluatedImage, Objects
+
+Array = NDArray[np.float64]
+
+MATCHED_WITHIN = 4.0
+"""Maximum distance of a lifted box from the center of its object [m]."""
+
+
+def held_out(folder: Path, seed: int, images: int, processes: int) -> Dataset:
+    """Return the held-out images, rendered if they are missing."""
+    if not (folder / "labels.npz").is_file():
+        shots: list[Shot] = []
+        worlds = -(-images // PER_WORLD)
+        for number, found in enumerate(render(seed, "held_out", worlds, 0, processes)):
+            shots += found
+            print(f"\rrendering held-out images: {(number + 1) * PER_WORLD}/{worlds * PER_WORLD}", end="", flush=True)
+        print()
+        write(folder, [entry.data for entry in shots], table(shots))
+    return Dataset.load(folder)
+
+
+def evaluate_dataset(network: ImageNetwork, dataset: Dataset, confidence: float) -> list[EvaluatedImage]:
+    """Return the detections of a network in the images of a dataset."""
+    to_find = dataset.to_find()
+    evaluated = []
+    for number, image in enumerate(dataset.images()):
+        rows = dataset.objects(number)
+        objects = Objects(
+            boxes=dataset.box[rows].astype(float),
+            names=tuple(IMAGE_CLASSES[index] for index in dataset.number[rows]),
+            height=dataset.height[rows].astype(float),
+            distance=dataset.distance[rows].astype(float),
+            to_find=to_find[rows],
+        )
+        evaluated.append(EvaluatedImage(objects, network.find(image), str(dataset.weather[number]), confidence))
+    return evaluated
+
+
+def evaluate_scenes(network: ImageNetwork, scenes: Sequence[StationScene], confidence: float) -> list[EvaluatedImage]:
+    """Return the detections of a network in scenes."""
+    return [
+        EvaluatedImage(
+            objects_of(scene.labels), network.find(scene.readings.cameras["camera"].rgb), scene.weather, confidence
+        )
+        for scene in scenes
+    ]
+
+
+def objects_of(labels: Sequence[Label]) -> Objects:
+    """Return the objects of the labels of one image."""
+    boxes = np.array([label.box for label in labels], dtype=float).reshape(-1, 4)
+    height = boxes[:, 3] - boxes[:, 1]
+    visible_pixels, silhouette_pixels = (
+        np.array([getattr(label, key) for label in labels], dtype=float)
+        for key in ("visible_pixels", "silhouette_pixels")
+    )
+    return Objects(
+        boxes=boxes,
+        names=tuple(IMAGE_CLASSES[label.number] for label in labels),
+        height=height,
+        distance=np.array([label.distance for label in labels], dtype=float),
+        to_find=shows_enough(height, visible_pixels, silhouette_pixels),
+    )
+
+
+def center_errors(kind: type[LearnedDetector], scenes: Iterable[StationScene], use_lidar: bool) -> Array:
+    """Return distance [m] and plan-view error of the lifted center [m] of each detected vehicle (K, 2)."""
+    detector = kind(LearnedSettings())
+    found = []
+    for scene in scenes:
+        readings = scene.readings
+        if not use_lidar:
+            readings = type(readings)(readings.time, readings.ego, cameras=readings.cameras)
+        detector.setup(scene.context)
+        detections = detector.detect(readings)
+        objects = objects_of(scene.labels)
+        vehicles = [
+            label
+            for label, enough in zip(scene.labels, objects.to_find, strict=True)
+            if enough and IMAGE_CLASSES[label.number] in VEHICLES
+        ]
+        centers = np.array([label.place[:2] for label in vehicles], dtype=float).reshape(-1, 2)
+        free = np.ones(len(vehicles), dtype=bool)
+        for row in np.argsort(-detections.scores, kind="stable"):
+            distances = np.linalg.norm(centers - detections.boxes[row, :2], axis=1)
+            distances[~free] = np.inf
+            if len(distances) and distances.min() <= MATCHED_WITHIN:
+                nearest = int(np.argmin(distances))
+                free[nearest] = False
+                found.append((vehicles[nearest].distance, float(distances[nearest])))
+    return np.array(found).reshape(-1, 2)
+
+
+def milliseconds(network: ImageNetwork, image: NDArray[np.uint8], repeats: int = 40) -> float:
+    """Return the minimum processor time for one image [ms], which excludes the load of the machine."""
+    times = []
+    for _ in range(repeats):
+        started = time.process_time()
+        network.find(image)
+        times.append(time.process_time() - started)
+    return min(times) * 1e3
+
+
+def parameters(path: Path) -> int:
+    """Return the number of learned parameters in a weight file, without running statistics."""
+    with np.load(path) as stored:
+        return sum(int(stored[name].size) for name in stored.files if name.endswith((".weight", ".bias")))
