@@ -1,4 +1,4 @@
-"""How long late fusion takes: stations that each report the same objects at 20 Hz, told at once.
+"""Time of late fusion: stations that each report the same objects at 20 Hz, received immediately.
 
 python benchmarks/bench_fusion.py [--objects 10] [--stations 4] [--ticks 400]
 """
@@ -22,7 +22,7 @@ DT = 0.05
 
 
 def reports_of(tick: int, stations: int, objects: int, *, velocities: bool) -> list[Report]:
-    """One report of every station: cars in a field, 9 m apart, with errors of 0.2 m."""
+    """Return one report of every station: cars in a field, 9 m apart, with errors of 0.2 m."""
     rng = generator(tick, "bench_fusion")
     velocity = np.tile([10.0, 1.0], (objects, 1))
     boxes = np.zeros((objects, 7))
@@ -32,11 +32,11 @@ def reports_of(tick: int, stations: int, objects: int, *, velocities: bool) -> l
     boxes[:, 2:] = 0.75, 4.5, 1.8, 1.5, 0.1
     reports = []
     for station in range(stations):
-        seen = boxes.copy()
-        seen[:, :2] += 0.2 * rng.normal(size=(objects, 2))
+        measured = boxes.copy()
+        measured[:, :2] += 0.2 * rng.normal(size=(objects, 2))
         detections = Detections(
             DT * tick,
-            seen,
+            measured,
             np.full(objects, 0.9),
             ("car",) * objects,
             velocity if velocities else np.full((objects, 2), np.nan),
@@ -46,18 +46,18 @@ def reports_of(tick: int, stations: int, objects: int, *, velocities: bool) -> l
     return reports
 
 
-def measured(build: Callable[[], FusionMethod], ticks: list[list[Report]], objects: int) -> tuple[float, float, float]:
-    """Median and least time of a tick [ms] on this thread, and the share of ticks with the right count."""
+def measure(build: Callable[[], FusionMethod], ticks: list[list[Report]], objects: int) -> tuple[float, float, float]:
+    """Return median and minimum time of a tick [ms] on this thread, and the share of ticks with the correct count."""
     fusion = build()
-    times, right = [], 0
+    times, correct = [], 0
     for number, reports in enumerate(ticks):
         begin = time.thread_time()
         for report in reports:
             fusion.add_report(report)
         fused = fusion.fuse(reports, DT * number)
         times.append(time.thread_time() - begin)
-        right += len(fused) == objects
-    return 1e3 * median(times), 1e3 * min(times), right / len(ticks)
+        correct += len(fused) == objects
+    return 1e3 * median(times), 1e3 * min(times), correct / len(ticks)
 
 
 def main() -> None:
@@ -66,16 +66,21 @@ def main() -> None:
     parser.add_argument("--objects", type=int, default=10)
     parser.add_argument("--stations", type=int, default=4)
     parser.add_argument("--ticks", type=int, default=400)
-    given = parser.parse_args()
-    print(f"{given.objects} objects, {given.stations} stations, {given.ticks} ticks of {DT} s")
+    options = parser.parse_args()
+    print(f"{options.objects} objects, {options.stations} stations, {options.ticks} ticks of {DT} s")
     for name, build, velocities in (
         ("average", AverageFusion, True),
         ("covariance_intersection", CovarianceIntersectionFusion, True),
-        ("  of positions alone", CovarianceIntersectionFusion, False),
+        ("  positions only", CovarianceIntersectionFusion, False),
     ):
-        ticks = [reports_of(tick, given.stations, given.objects, velocities=velocities) for tick in range(given.ticks)]
-        middle, least, right = measured(build, ticks, given.objects)
-        print(f"  {name:26} median {middle:7.3f} ms   least {least:7.3f} ms   right count {100 * right:5.1f} %")
+        ticks = [
+            reports_of(tick, options.stations, options.objects, velocities=velocities) for tick in range(options.ticks)
+        ]
+        median_time, minimum, correct = measure(build, ticks, options.objects)
+        print(
+            f"  {name:26} median {median_time:7.3f} ms   minimum {minimum:7.3f} ms   "
+            f"correct count {100 * correct:5.1f} %"
+        )
 
 
 if __name__ == "__main__":

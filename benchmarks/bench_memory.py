@@ -1,8 +1,8 @@
 """Resident memory over successive runs in one process: a driven vehicle on a road with many objects.
 
-After the first runs, which fill caches, memory shall not grow: the aim is less than 20 MB after the tenth run. Without
+After the first runs, which fill caches, memory must not grow: the aim is less than 20 MB after the tenth run. Without
 `--road` the script writes a straight road with `--objects` posts. ASAM's `AB_RQ31_R2000.xodr` (OpenDRIVE examples) has
-objects that become 14,000 boxes; pass its path and a lane on which a car can drive.
+objects that become 14,000 boxes; pass its path and a drivable lane.
 
     python benchmarks/bench_memory.py [--runs 200] [--seconds 2] [--road FILE --lane -2] [--detector oracle]
 """
@@ -67,25 +67,25 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--seconds", type=float, default=2.0, help="simulated, of each run")
+    parser.add_argument("--seconds", type=float, default=2.0, help="simulated time of each run [s]")
     parser.add_argument("--road", type=Path)
     parser.add_argument("--lane", type=int, default=-1)
-    parser.add_argument("--objects", type=int, default=10_000, help="of the road that is written")
+    parser.add_argument("--objects", type=int, default=10_000, help="number of objects of the generated road")
     parser.add_argument("--detector", default="oracle")
-    given = parser.parse_args()
-    settings = RunSettings(time_limit=given.seconds, detector=given.detector)
+    options = parser.parse_args()
+    settings = RunSettings(time_limit=options.seconds, detector=options.detector)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        road = given.road if given.road is not None else write_road(folder, given.objects)
-        scenario = write_scenario(folder, road, given.lane)
-        started, tenth = time.perf_counter(), 0.0
-        for run in range(1, given.runs + 1):
+        road = options.road if options.road is not None else write_road(folder, options.objects)
+        scenario = write_scenario(folder, road, options.lane)
+        started, after_tenth_run = time.perf_counter(), 0.0
+        for run in range(1, options.runs + 1):
             run_file(scenario, seed=run, settings=settings)
             if run == 10:
-                tenth = resident()
-            if run in (1, 2, 5, 10, given.runs) or run % 20 == 0:
+                after_tenth_run = resident()
+            if run in (1, 2, 5, 10, options.runs) or run % 20 == 0:
                 print(f"run {run:4}: {resident():7.1f} MB, {time.perf_counter() - started:7.1f} s", flush=True)
-    print(f"growth after the tenth run: {resident() - tenth:.1f} MB (aim: less than 20 MB)")
+    print(f"growth after the tenth run: {resident() - after_tenth_run:.1f} MB (aim: less than 20 MB)")
 
 
 if __name__ == "__main__":

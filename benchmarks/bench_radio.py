@@ -1,12 +1,13 @@
-"""How fast the radio is: 200 stations at 10 Hz on one channel, sending, contending, receiving and being heard.
+"""Speed of the radio: 200 stations at 10 Hz on one channel, with generation, medium access and reception.
 
-Cars stand every 20 m on each of two lanes of a 2 km road and drive at 25 m/s; every tenth line of sight is blocked by a
-truck. All stations listen to all others, so each simulated second decides 398,000 fates. A tick does all that a run
-does for the radio: messages are given out, said and sent, and what became of them enters the hash of the trace. Times
-are those of the processor, summed over threads, and the least of some repetitions.
+Cars are spaced by 20 m on each of two lanes of a 2 km road and drive at 25 m/s; a truck blocks every tenth line of
+sight. All stations receive from all others, so each simulated second has 398,000 transmission outcomes. A tick contains
+all radio work of a run: messages are delivered, generated and sent, and their outcomes enter the trace hash. Times are
+processor times, summed over threads, and the minimum of several repetitions.
 
-Then whole runs: 200 scripted cars of a generated scenario send CAM, at 10 Hz or by the rules of ETSI, and one of them
-listens, or all do, each with fusion of its own. What stands between the antennas is drawn, or found by 19,900 rays.
+Then complete runs: 200 scripted cars of a generated scenario send CAM, at 10 Hz or by the ETSI generation rules. One of
+them receives, or all do, each with separate fusion. Obstruction between antennas is random, or determined by 19,900
+rays.
 
     python benchmarks/bench_radio.py [--stations 200] [--seconds 3] [--technology 80211p] [--repetitions 3]
 """
@@ -42,8 +43,8 @@ LENGTH = 2000.0
 NOTHING = Detections(0.0)
 
 
-def place(row: int, stations: int, now: float) -> tuple[float, float, float]:
-    """Antenna of a car that goes round and round the road."""
+def antenna_position(row: int, stations: int, now: float) -> tuple[float, float, float]:
+    """Return the antenna position of a car on an endless road."""
     half = stations // 2
     along = (row % half) * LENGTH / half + (SPEED * now if row < half else -SPEED * now)
     return along, 0.0 if row < half else 4.0, 1.6
@@ -51,15 +52,15 @@ def place(row: int, stations: int, now: float) -> tuple[float, float, float]:
 
 @cache
 def trucks(stations: int) -> LineOfSightStates:
-    """Every tenth pair has a truck in between; no rays are cast here."""
+    """Return line-of-sight states with a truck between every tenth pair; no rays are cast."""
     first, second = np.triu_indices(stations, 1)
     blocked = (first + second) % 10 == 0
-    behind: dict[int, tuple[str, ...]] = {int(pair): ("Truck",) for pair in np.flatnonzero(blocked)}
-    return LineOfSightStates(np.where(blocked, NLOSV, LOS), np.where(blocked, 3.0, -np.inf), behind)
+    obstructions: dict[int, tuple[str, ...]] = {int(pair): ("Truck",) for pair in np.flatnonzero(blocked)}
+    return LineOfSightStates(np.where(blocked, NLOSV, LOS), np.where(blocked, 3.0, -np.inf), obstructions)
 
 
 def view_of(places: dict[str, tuple[float, float, float]], tick: int) -> WorldView:
-    """What the hash takes in beside the fates."""
+    """Return the view that enters the hash in addition to the outcomes."""
     count = len(places)
     zeros, vectors = np.zeros(count), np.zeros((count, 3))
     position, size = np.array(list(places.values())), np.ones((count, 3))
@@ -69,9 +70,11 @@ def view_of(places: dict[str, tuple[float, float, float]], tick: int) -> WorldVi
     )  # fmt: skip
 
 
-def run(stations: int, seconds: float, technology: str, look: bool) -> tuple[float, RadioChannel]:
-    """Seconds of one core for `seconds` of traffic; with `look` every fate is made into an object, too, as a
-    recording of the run needs it."""
+def run(stations: int, seconds: float, technology: str, create_events: bool) -> tuple[float, RadioChannel]:
+    """Return the processor time for `seconds` of radio traffic on one core, and the channel.
+
+    With `create_events`, every outcome also becomes an object, as a recording requires it.
+    """
     path_loss = {"kind": "tr37885", "environment": "highway"}
     profile = {"technology": technology, "path_loss": path_loss, "jitter": TICK, "queue": {"discipline": "lcfs"}}
     channel = RadioChannel(RadioProfile.model_validate(profile), seed=1)
@@ -82,7 +85,7 @@ def run(stations: int, seconds: float, technology: str, look: bool) -> tuple[flo
     started = time.process_time()
     for tick in range(round(seconds / TICK)):
         now = tick * TICK
-        places = {name: place(row, stations, now) for row, name in enumerate(names)}
+        places = {name: antenna_position(row, stations, now) for row, name in enumerate(names)}
         channel.update_environment(RadioEnvironment(places, lambda pairs: trucks(stations)))
         for name in names:
             channel.deliver(name, now)
@@ -96,14 +99,14 @@ def run(stations: int, seconds: float, technology: str, look: bool) -> tuple[flo
         ]
         events = channel.transmit(outbox, now)
         trace.observe(Frame(view_of(places, tick), links=events))
-        if look:
+        if create_events:
             for _ in events:
                 pass
     return time.process_time() - started, channel
 
 
-def whole_run(stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str) -> float:
-    """Simulated seconds per second of the processor, loading and the books at the end aside."""
+def complete_run(stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str) -> float:
+    """Return the simulated time per processor time, without loading and the final statistics."""
     channel = (
         f"{{model: radio, jitter: {TICK}, line_of_sight: {sight}, path_loss: {{kind: tr37885, environment: highway}}}}"
     )
@@ -124,41 +127,45 @@ def main() -> None:
     parser.add_argument("--stations", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=3.0)
     parser.add_argument("--technology", choices=["80211p", "cv2x_mode4"], default=None)
-    parser.add_argument("--profile", action="store_true", help="say where the time goes")
+    parser.add_argument("--profile", action="store_true", help="print the functions that take the most time")
     parser.add_argument("--repetitions", type=int, default=3)
-    given = parser.parse_args()
-    print(f"{given.stations} stations at {RATE:g} Hz, {SIZE} bytes, {given.seconds:g} s, one core")
-    for technology in (given.technology,) if given.technology else ("80211p", "cv2x_mode4"):
-        for look in (False, True):
-            least = min(run(given.stations, given.seconds, technology, look)[0] for _ in range(given.repetitions))
-            what = "with an object for each fate" if look else "messages, books and hash"
-            aim = "" if look else "   (aim: above 1)"
-            print(f"  {technology:11} {what:28} {given.seconds / least:6.2f} times real time{aim}")
-        _, channel = run(given.stations, given.seconds, technology, False)
-        begin = time.process_time()
-        books = channel.statistics(given.seconds).values()
-        reading = time.process_time() - begin
-        sent, received = sum(book.sent for book in books), sum(book.received for book in books)
-        busy = np.mean([channel.channel_busy_ratio(f"{row:03d}") or 0.0 for row in range(given.stations)])
-        print(f"  {technology:11} {sent} fates, {100 * received / sent:.1f} % heard, busy ratio {busy:.3f}")
-        print(f"  {technology:11} to read the books of {len(books)} links at the end takes {reading:.2f} s, once")
-        if given.profile:
+    options = parser.parse_args()
+    print(f"{options.stations} stations at {RATE:g} Hz, {SIZE} bytes, {options.seconds:g} s, one core")
+    for technology in (options.technology,) if options.technology else ("80211p", "cv2x_mode4"):
+        for create_events in (False, True):
+            minimum = min(
+                run(options.stations, options.seconds, technology, create_events)[0] for _ in range(options.repetitions)
+            )
+            description = "with one object per outcome" if create_events else "messages, statistics and hash"
+            aim = "" if create_events else "   (aim: above 1)"
+            print(f"  {technology:11} {description:28} {options.seconds / minimum:6.2f} times real time{aim}")
+        _, channel = run(options.stations, options.seconds, technology, False)
+        start = time.process_time()
+        statistics = channel.statistics(options.seconds).values()
+        duration = time.process_time() - start
+        sent, received = sum(link.sent for link in statistics), sum(link.received for link in statistics)
+        busy = np.mean([channel.channel_busy_ratio(f"{row:03d}") or 0.0 for row in range(options.stations)])
+        print(
+            f"  {technology:11} {sent} outcomes, {100 * received / sent:.1f} % received, channel busy ratio {busy:.3f}"
+        )
+        print(f"  {technology:11} final statistics of {len(statistics)} links take {duration:.2f} s, once")
+        if options.profile:
             profile = cProfile.Profile()
-            profile.runcall(run, given.stations, given.seconds, technology, False)
+            profile.runcall(run, options.stations, options.seconds, technology, False)
             pstats.Stats(profile).sort_stats("tottime").print_stats(22)
-    if given.technology is not None:
+    if options.technology is not None:
         return
-    print(f"whole runs with {given.stations} stations that send CAM, IEEE 802.11p")
+    print(f"complete runs with {options.stations} stations that send CAM, IEEE 802.11p")
     for rate, all_listen, sight, seconds in (
         (RATE, False, "random", 1.0),
         (None, False, "random", 1.0),
         (RATE, False, "rays", 0.5),
         (RATE, True, "random", 0.3),
     ):
-        best = max(whole_run(given.stations, seconds, rate, all_listen, sight) for _ in range(given.repetitions))
-        said = f"{rate:g} Hz" if rate is not None else "by the rules of ETSI"
-        what = f"{said}, {'all listen' if all_listen else 'one listens'}, line of sight {sight}"
-        print(f"  {what:58} {best:6.2f} times real time")
+        best = max(complete_run(options.stations, seconds, rate, all_listen, sight) for _ in range(options.repetitions))
+        generation = f"{rate:g} Hz" if rate is not None else "by ETSI generation rules"
+        description = f"{generation}, {'all receive' if all_listen else 'one receives'}, line of sight {sight}"
+        print(f"  {description:58} {best:6.2f} times real time")
 
 
 if __name__ == "__main__":

@@ -1,16 +1,19 @@
-"""How fast scenario 1 runs with the oracle on one core, against bare pybullet, and where the time goes.
+"""Speed of scenario 1 with the oracle on one core, compared with bare pybullet, and time by package.
 
-The bare loop is what a program in pybullet alone would do with the same bodies, steps and rays. In each tick it puts
-those scripted bodies that move to where they were in the run; makes all physics steps, in each of which it reads pose
-and velocity of every driven body, sets the velocity (that of the run) and asks for its contacts; reads pose and
-velocity of every body; and casts the rays of the run. It has no vehicle model, no storyboard, no stations, no messages,
-no criteria. Its bodies are made by the same calls as in the run.
+The bare loop is a pybullet program with the same bodies, steps and rays. In each tick it does the following:
 
-The run itself asks less of pybullet, as a driven body that nothing can touch does not need it. How long those calls
-alone take is printed too.
+- place the scripted bodies that moved in the run at their positions; - make all physics steps: read pose and velocity
+of every driven body, set its velocity to that of the run, and query its contacts; - read pose and velocity of every
+body; - cast the rays of the run.
 
-All runs do the same, tick by tick, and whatever else goes on in the machine only adds to the time of a tick. So of
-each tick the least time counts that it took in any of the runs, which are made in turn; for all three alike.
+It has no vehicle model, storyboard, stations, messages or criteria. Its bodies are created by the same calls as in the
+run.
+
+The run itself makes fewer pybullet calls, because a driven body that cannot touch anything does not need pybullet. The
+time of these calls alone is printed too.
+
+All runs are equal, tick by tick, and other load of the machine only adds to the time of a tick. So the minimum time of
+each tick over all runs counts. The three variants are run in turn.
 
     python benchmarks/bench_scenario_1.py [--runs 15] [--seed 1] [--channel ideal]
 """
@@ -41,7 +44,7 @@ from eidrive_scenario.world.view import ActorState
 SCENARIO = "coop/scenario_1"
 PACKAGE = "eidrive_scenario"
 PHYSICS_RATE = 200.0
-"""That of the run [Hz]."""
+"""Physics rate of the run [Hz]."""
 
 Function = tuple[str, int, str]
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
@@ -54,9 +57,9 @@ LOOP = frozenset({"resetBasePositionAndOrientation", "resetBaseVelocity", "stepS
 
 @dataclass
 class Trace:
-    """What a run asked of pybullet, and where its actors were: an observer of the run.
+    """Observer that records the pybullet calls of a run and the states of its actors.
 
-    setup  calls that make bodies;  ticks  the other calls of each tick;  states  of the actors in each tick, by name
+    setup  calls that create bodies;  ticks  other calls of each tick;  states  of the actors in each tick, by name
     """
 
     setup: list[Call] = field(default_factory=list)
@@ -65,39 +68,39 @@ class Trace:
     handles: dict[str, int] = field(default_factory=dict)
     driven: frozenset[str] = frozenset()
 
-    def note(self, function: Callable[..., Any], given: tuple[Any, ...], options: dict[str, Any]) -> None:
-        """One call; arrays and lists are copied."""
+    def record(self, function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]) -> None:
+        """Record one call; arrays and lists are copied."""
         calls = self.setup if function.__name__ in SETUP else self.ticks[-1]
-        kept = tuple(value.copy() if isinstance(value, np.ndarray) else value for value in given)
+        kept = tuple(value.copy() if isinstance(value, np.ndarray) else value for value in arguments)
         calls.append((function, kept, {key: deepcopy(value) for key, value in options.items()}))
 
     def observe(self, frame: Frame) -> None:
-        """The observer's half: what follows belongs to the next tick."""
+        """Store the states; later calls belong to the next tick."""
         self.ticks.append([])
         self.states.append(dict(zip(frame.view.names, frame.view.states, strict=True)))
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing."""
 
     def calls(self, name: str) -> list[list[Call]]:
-        """The calls of one function, tick by tick."""
+        """Return the calls of one function, tick by tick."""
         return [[call for call in calls if call[0].__name__ == name] for calls in self.ticks]
 
 
 @contextmanager
-def listening(trace: Trace) -> Iterator[None]:
-    """Note each call to one of the functions of SETUP and LOOP while the run goes on."""
+def record_calls(trace: Trace) -> Iterator[None]:
+    """Record each call of the functions in SETUP and LOOP during the run."""
 
-    def noted(function: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*given: Any, **options: Any) -> Any:
-            trace.note(function, given, options)
-            return function(*given, **options)
+    def recorded(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            trace.record(function, arguments, options)
+            return function(*arguments, **options)
 
         return call
 
     originals = {name: getattr(bullet, name) for name in SETUP | LOOP}
     for name, function in originals.items():
-        setattr(bullet, name, noted(function))
+        setattr(bullet, name, recorded(function))
     try:
         yield
     finally:
@@ -106,7 +109,7 @@ def listening(trace: Trace) -> Iterator[None]:
 
 
 def timed_run(simulation: Simulation) -> list[float]:
-    """Seconds of each tick of a run."""
+    """Return the time of each tick of a run [s]."""
     times: list[float] = []
     end = None
     with simulation:
@@ -118,25 +121,26 @@ def timed_run(simulation: Simulation) -> list[float]:
 
 
 def repeated_calls(trace: Trace) -> list[float]:
-    """Seconds that the run's own calls to pybullet take, tick by tick."""
+    """Return the time of the pybullet calls of the run [s], tick by tick."""
     times: list[float] = []
     with fresh_client(trace):
         for calls in trace.ticks:
             started = time.perf_counter()
-            for function, given, options in calls:
-                function(*given, **options)
+            for function, arguments, options in calls:
+                function(*arguments, **options)
             times.append(time.perf_counter() - started)
     return times
 
 
 def bare_loop(trace: Trace, dt: float) -> list[float]:
-    """Seconds for the same bodies, steps and rays in pybullet alone, tick by tick."""
+    """Return the time of the same bodies, steps and rays in bare pybullet [s], tick by tick."""
     here = {"physicsClientId": CLIENT}
     steps = round(dt * PHYSICS_RATE)
-    rays = [[given for _, given, _ in calls] for calls in trace.calls("rayTestBatch")]
+    rays = [[arguments for _, arguments, _ in calls] for calls in trace.calls("rayTestBatch")]
     driven = [trace.handles[name] for name in trace.driven]
     plan = [
-        _tick_of_bare_loop(trace, before, after) for before, after in zip(trace.states, trace.states[1:], strict=False)
+        _tick_of_bare_loop(trace, previous, current)
+        for previous, current in zip(trace.states, trace.states[1:], strict=False)
     ]
     times: list[float] = []
     with fresh_client(trace):
@@ -164,43 +168,43 @@ def bare_loop(trace: Trace, dt: float) -> list[float]:
 
 
 def _tick_of_bare_loop(
-    trace: Trace, before: dict[str, ActorState], after: dict[str, ActorState]
+    trace: Trace, previous: dict[str, ActorState], current: dict[str, ActorState]
 ) -> tuple[list[tuple[Any, ...]], list[tuple[Any, ...]]]:
-    """Where scripted bodies go that move, and the velocities of driven ones."""
+    """Return the new states of moving scripted bodies, and the velocities of driven ones."""
     moved = [
         (trace.handles[name], now[:3], quaternion(*now[3:6]), now[6:9], (0.0, 0.0, now.yaw_rate))
-        for name, now in after.items()
-        if name not in trace.driven and now != before.get(name)
+        for name, now in current.items()
+        if name not in trace.driven and now != previous.get(name)
     ]
-    return moved, [(after[name][6:9], (0.0, 0.0, after[name].yaw_rate)) for name in trace.driven]
+    return moved, [(current[name][6:9], (0.0, 0.0, current[name].yaw_rate)) for name in trace.driven]
 
 
 @contextmanager
 def fresh_client(trace: Trace) -> Iterator[None]:
-    """A client with the bodies of the run, which has the number that the run's client had."""
+    """Create a client with the bodies of the run and the same client number."""
     if bullet.connect(bullet.DIRECT) != CLIENT:
-        raise RuntimeError("another client of pybullet is open")
+        raise RuntimeError("pybullet: another client is open")
     try:
-        for function, given, options in trace.setup:
-            function(*given, **options)
+        for function, arguments, options in trace.setup:
+            function(*arguments, **options)
         yield
     finally:
         bullet.disconnect(physicsClientId=CLIENT)
 
 
 CLIENT = 0
-"""The number that pybullet gives to its first client."""
+"""Number of the first pybullet client."""
 
 
-def shares_by_room(profile: cProfile.Profile) -> dict[str, float]:
-    """The share of the time in each room; libraries count for the room that calls them, pybullet for itself."""
+def shares_by_package(profile: cProfile.Profile) -> dict[str, float]:
+    """Return the share of time by package; libraries count for the package that calls them, pybullet separately."""
     stats: dict[Function, Any] = pstats.Stats(profile).stats  # type: ignore[attr-defined]
     owners: dict[Function, dict[str, float]] = {}
 
     def owners_of(function: Function, above: frozenset[Function]) -> dict[str, float]:
-        room = _room(function)
-        if room:
-            return {room: 1.0}
+        package = _package_of(function)
+        if package:
+            return {package: 1.0}
         if function in owners:
             return owners[function]
         callers = {caller: entry[2] for caller, entry in stats[function][4].items() if caller not in above}
@@ -216,13 +220,13 @@ def shares_by_room(profile: cProfile.Profile) -> dict[str, float]:
 
     seconds: dict[str, float] = defaultdict(float)
     for function, (_, _, own, _, _) in stats.items():
-        for room, share in owners_of(function, frozenset()).items():
-            seconds[room] += own * share
+        for package, share in owners_of(function, frozenset()).items():
+            seconds[package] += own * share
     total = sum(seconds.values())
-    return {room: own / total for room, own in sorted(seconds.items(), key=lambda entry: -entry[1])}
+    return {package: own / total for package, own in sorted(seconds.items(), key=lambda entry: -entry[1])}
 
 
-def _room(function: Function) -> str:
+def _package_of(function: Function) -> str:
     file, _, name = function
     if file == "~" and "pybullet" in name:
         return "pybullet itself"
@@ -246,59 +250,64 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=15)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--channel", default="ideal")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     path = resolve_scenario(SCENARIO)
-    settings = RunSettings(channel=given.channel, detector="oracle")
+    settings = RunSettings(channel=arguments.channel, detector="oracle")
 
     def build(*observers: Any) -> Simulation:
-        scenario = load_for_seed(path, given.seed, settings.parameters)
-        return Simulation(scenario, seed=given.seed, settings=settings, observers=observers)
+        scenario = load_for_seed(path, arguments.seed, settings.parameters)
+        return Simulation(scenario, seed=arguments.seed, settings=settings, observers=observers)
 
     trace = Trace()
-    with listening(trace):
+    with record_calls(trace):
         simulation = build(trace)
         bodies, trace.driven = simulation.world._bodies, simulation.stations.drivers
         trace.handles = {name: body.handle for name, body in bodies.items()}
         simulated = simulation.run().simulated_s
     bare_loop(trace, settings.dt)
-    whole, loading, bare, repeated = [], [], [], []
-    for _ in range(given.runs):
+    complete, loading, bare, repeated = [], [], [], []
+    for _ in range(arguments.runs):
         loading.append(timed(lambda: build().close()))
-        whole.append(timed_run(build()))
+        complete.append(timed_run(build()))
         bare.append(bare_loop(trace, settings.dt))
         repeated.append(repeated_calls(trace))
-    ticks, ours, alone, own_calls = len(trace.states), least(whole), least(bare), least(repeated)
+    ticks, run_time, bare_time, calls_time = (
+        len(trace.states),
+        sum_of_minima(complete),
+        sum_of_minima(bare),
+        sum_of_minima(repeated),
+    )
     steps = (ticks - 1) * round(settings.dt * PHYSICS_RATE)
     rays = sum(len(call[1][0]) for calls in trace.calls("rayTestBatch") for call in calls)
 
-    print(f"{SCENARIO}, oracle, channel {given.channel}, seed {given.seed}: {simulated:.2f} s in {ticks} ticks")
-    print(f"  {len(trace.handles)} actors, {steps} physics steps, {rays} rays; {given.runs} runs")
-    print(f"  simulated s per wall s     {simulated / ours:8.1f}   (aim: at least 30)")
-    print(f"  the same with loading      {simulated / (ours + min(loading)):8.1f}")
-    print(f"  per tick                   {1e3 * ours / ticks:8.3f} ms")
-    print(f"  bare pybullet loop         {1e3 * alone / ticks:8.3f} ms per tick")
-    print(f"  ratio to the bare loop     {ours / alone:8.2f}   (aim: below 3)")
-    print(f"  the run's own calls        {1e3 * own_calls / ticks:8.3f} ms per tick")
+    print(f"{SCENARIO}, oracle, channel {arguments.channel}, seed {arguments.seed}: {simulated:.2f} s in {ticks} ticks")
+    print(f"  {len(trace.handles)} actors, {steps} physics steps, {rays} rays; {arguments.runs} runs")
+    print(f"  simulated s per wall s     {simulated / run_time:8.1f}   (aim: at least 30)")
+    print(f"  including loading          {simulated / (run_time + min(loading)):8.1f}")
+    print(f"  per tick                   {1e3 * run_time / ticks:8.3f} ms")
+    print(f"  bare pybullet loop         {1e3 * bare_time / ticks:8.3f} ms per tick")
+    print(f"  ratio to the bare loop     {run_time / bare_time:8.2f}   (aim: below 3)")
+    print(f"  pybullet calls of the run  {1e3 * calls_time / ticks:8.3f} ms per tick")
     profile = cProfile.Profile()
     simulation = build()
     profile.enable()
     simulation.run()
     profile.disable()
-    print("where the time of a run goes (cProfile; libraries count for the room that calls them):")
-    for room, share in shares_by_room(profile).items():
+    print("time of a run by package (cProfile; libraries count for the package that calls them):")
+    for package, share in shares_by_package(profile).items():
         if share >= 0.005:
-            print(f"  {room:24} {100 * share:5.1f} %  {'#' * round(50 * share)}")
+            print(f"  {package:24} {100 * share:5.1f} %  {'#' * round(50 * share)}")
 
 
 def timed(task: Callable[[], object]) -> float:
-    """Seconds that a task takes."""
+    """Return the time of a task [s]."""
     started = time.perf_counter()
     task()
     return time.perf_counter() - started
 
 
-def least(runs: list[list[float]]) -> float:
-    """The sum of the least times of all ticks [s]."""
+def sum_of_minima(runs: list[list[float]]) -> float:
+    """Return the sum of the minimum times of all ticks [s]."""
     return sum(map(min, zip(*runs, strict=True)))
 
 

@@ -1,9 +1,9 @@
-"""How long a picture and a sweep take on one core: `python benchmarks/bench_sensors.py`.
+"""Processor time of an image and a lidar reading on one core: `python benchmarks/bench_sensors.py`.
 
-The street is that of the weather sheet: a crossing with 14 road users and eight houses. Once all is drawn anew, as for
-a moving camera, and once for one that stands still, which keeps its scenery. CPU time of the process, the best of many,
-so that other programs on the machine count little. OpenCV gets one thread, and so should numpy's matrix products:
-`OPENBLAS_NUM_THREADS=1`.
+The street is that of the weather sheet: an intersection with 14 road users and eight buildings. It is measured for a
+moving camera, which renders everything, and for a stationary one, which caches the scenery. The result is the minimum
+processor time of many repetitions, to exclude the load of the machine. OpenCV has one thread, and so should matrix
+products of numpy: `OPENBLAS_NUM_THREADS=1`.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ SIZES = ((320, 192), (512, 384), (640, 360), (800, 600))
 REPEATS = 15
 
 
-def best(task: Callable[[], object]) -> float:
-    """The least CPU time of a task [ms]."""
+def minimum_time(task: Callable[[], object]) -> float:
+    """Return the minimum processor time of a task [ms]."""
     task()
     times = []
     for _ in range(REPEATS):
@@ -40,14 +40,14 @@ def best(task: Callable[[], object]) -> float:
 
 
 @contextmanager
-def _nothing_kept() -> Iterator[None]:
-    """All scenery is drawn anew."""
-    usual = Renderer.MOST_KEPT
+def _without_cache() -> Iterator[None]:
+    """Disable the cache of the scenery."""
+    default = Renderer.MOST_KEPT
     Renderer.MOST_KEPT = 0
     try:
         yield
     finally:
-        Renderer.MOST_KEPT = usual
+        Renderer.MOST_KEPT = default
 
 
 def main() -> None:
@@ -56,7 +56,7 @@ def main() -> None:
     pose = look_at((1.9, -0.2, 1.35), (22.0, 0.1, 1.15))
     with street() as world:
         view = world.view()
-        print("camera, with noise: moving / standing [ms]")
+        print("camera, with noise: moving / stationary [ms]")
         print(f"{'':<18}" + "".join(f"{f'{width} x {height}':<16}" for width, height in SIZES))
         for weather in names("weather"):
             world.set_weather(load_weather(weather))
@@ -64,18 +64,18 @@ def main() -> None:
             for width, height in SIZES:
                 camera = ImageSensor(CameraSettings(width=width, height=height, fov=80.0))
 
-                def take(camera: ImageSensor = camera) -> object:
+                def capture(camera: ImageSensor = camera) -> object:
                     return camera.capture(world, pose, generator(1, "bench"), ignore=("Ego",))
 
-                standing = best(take)
-                with _nothing_kept():
-                    row.append(f"{best(take):.1f} / {standing:.1f}")
+                stationary = minimum_time(capture)
+                with _without_cache():
+                    row.append(f"{minimum_time(capture):.1f} / {stationary:.1f}")
             print(f"{weather:<18}" + "".join(f"{value:<16}" for value in row))
-        print("\nLiDAR, 32 channels, 5760 rays a sweep [ms]")
+        print("\nlidar, 32 channels, 5760 rays per reading [ms]")
         for weather in ("sunny", "foggy_morning"):
             world.set_weather(load_weather(weather))
             settings = LidarSettings(points_per_second=32 * 180 * 20)
-            value = best(lambda settings=settings: Lidar(settings, world.spec("Ego")).read(world, view, 0))
+            value = minimum_time(lambda settings=settings: Lidar(settings, world.spec("Ego")).read(world, view, 0))
             print(f"{weather:<26}{value:.1f}")
 
 

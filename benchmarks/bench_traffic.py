@@ -1,7 +1,7 @@
-"""How fast a town full of cars runs on one core: scripted cars of a scenario and a swarm around one of them.
+"""Speed of dense traffic in a town on one core: scripted cars of a scenario, and a swarm around one of them.
 
-The scenario is written by this script: scripted cars on random places of a CARLA town, a fifth of which change lane or
-speed on triggers, and a TrafficSwarmAction. `EIDRIVE_MAPS` names the folder with the towns.
+The script writes the scenario: scripted cars at random positions of a CARLA town, a fifth of which change lane or speed
+by triggers, and a TrafficSwarmAction. `EIDRIVE_MAPS` names the folder with the towns.
 
     python benchmarks/bench_traffic.py [--town Town04] [--scripted 200] [--swarm 100] [--seconds 30] [--runs 3]
 """
@@ -19,7 +19,7 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from bench_scenario_1 import shares_by_room
+from bench_scenario_1 import shares_by_package
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.randomness import generator
@@ -69,19 +69,19 @@ rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
 
 
 def scenario_text(town: Path, scripted: int, swarm: int, seconds: float) -> str:
-    """A scenario with that many scripted cars, at places that a fixed seed chooses, and a swarm around the first."""
+    """Return a scenario with scripted cars, at positions of a fixed seed, and a swarm around the first."""
     lanes = Fleet(RoadNetwork.load(town)).lanes
     rng = generator(0, "bench_traffic")
     rows = np.flatnonzero(lanes.tables.lane_drivable & ~lanes.in_junction & (lanes.length > 20.0))
     shares = lanes.length[rows] / lanes.length[rows].sum()
-    taken: list[tuple[int, float]] = []
-    while len(taken) < scripted:
+    occupied: list[tuple[int, float]] = []
+    while len(occupied) < scripted:
         row = int(rng.choice(rows, p=shares))
         progress = float(rng.uniform(5.0, lanes.length[row] - 5.0))
-        if all(row != other or abs(progress - place) > 12.0 for other, place in taken):
-            taken.append((row, progress))
+        if all(row != other or abs(progress - place) > 12.0 for other, place in occupied):
+            occupied.append((row, progress))
     placed, groups = [], []
-    for n, (row, progress) in enumerate(taken):
+    for n, (row, progress) in enumerate(occupied):
         key = lanes.keys[row]
         s = float(lanes.s(np.array([row]), np.array([progress]))[0])
         placed.append(PLACED.format(n=n, road=key.road, lane=key.lane, s=s, speed=rng.uniform(5.0, 14.0)))
@@ -106,21 +106,21 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--profile", action="store_true", help="also print the functions that take the most time")
-    given = parser.parse_args()
+    options = parser.parse_args()
     folder = os.environ.get("EIDRIVE_MAPS")
     if not folder:
-        sys.exit("bench_traffic: EIDRIVE_MAPS is not set; it names the folder with CARLA's towns (Town04.xodr)")
-    town = (Path(folder) / given.town).with_suffix(".xodr").resolve()
+        sys.exit("bench_traffic: EIDRIVE_MAPS is not set; it must name the folder with CARLA's towns (Town04.xodr)")
+    town = (Path(folder) / options.town).with_suffix(".xodr").resolve()
 
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(temporary) / "traffic.xosc"
-        path.write_text(scenario_text(town, given.scripted, given.swarm, given.seconds), encoding="utf-8")
+        path.write_text(scenario_text(town, options.scripted, options.swarm, options.seconds), encoding="utf-8")
 
         def build() -> Simulation:
-            return Simulation(load_scenario(path), seed=1, settings=RunSettings(time_limit=given.seconds + 1.0))
+            return Simulation(load_scenario(path), seed=1, settings=RunSettings(time_limit=options.seconds + 1.0))
 
         loading, running, cpu, hashes = [], [], [], set()
-        for _ in range(given.runs):
+        for _ in range(options.runs):
             started = time.perf_counter()
             simulation = build()
             loading.append(time.perf_counter() - started)
@@ -136,18 +136,18 @@ def main() -> None:
         profile.disable()
     ticks = round(result.simulated_s / 0.05)
     swarm = len(simulation.storyboard.context.traffic.names)
-    print(f"{given.town}: {given.scripted} scripted cars, a swarm of {given.swarm} ({swarm} there at the end)")
-    same = "the same trace" if len(hashes) == 1 else f"{len(hashes)} DIFFERENT TRACES"
-    print(f"  simulated {result.simulated_s:.2f} s in {ticks} ticks of 0.05 s, {given.runs} runs, {same}")
+    print(f"{options.town}: {options.scripted} scripted cars, a swarm of {options.swarm} ({swarm} at the end)")
+    comparison = "equal traces" if len(hashes) == 1 else f"{len(hashes)} DIFFERENT TRACES"
+    print(f"  simulated {result.simulated_s:.2f} s in {ticks} ticks of 0.05 s, {options.runs} runs, {comparison}")
     print(f"  simulated s per wall s     {result.simulated_s / median(running):8.2f}   (aim: above 1)")
     print(f"  simulated s per s of CPU   {result.simulated_s / median(cpu):8.2f}")
     print(f"  per tick                   {1e3 * median(running) / ticks:8.3f} ms")
     print(f"  loading                    {median(loading):8.3f} s")
-    print("where the time of a run goes (cProfile; libraries count for the room that calls them):")
-    for room, share in shares_by_room(profile).items():
+    print("time of a run by package (cProfile; libraries count for the package that calls them):")
+    for package, share in shares_by_package(profile).items():
         if share >= 0.005:
-            print(f"  {room:24} {100 * share:5.1f} %  {'#' * round(50 * share)}")
-    if given.profile:
+            print(f"  {package:24} {100 * share:5.1f} %  {'#' * round(50 * share)}")
+    if options.profile:
         pstats.Stats(profile).sort_stats("tottime").print_stats(40)
 
 

@@ -1,4 +1,4 @@
-"""How long scenario 1 takes with each detector on ego and roadside unit, and what takes the time."""
+"""Processor time of scenario 1 with each detector on ego and roadside unit, by component."""
 
 from __future__ import annotations
 
@@ -22,47 +22,47 @@ from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 SCENARIO = "coop/scenario_1"
-USUAL = ""
+DEFAULT = ""
 AS_EI_DRIVE = "{camera: {width: 800, height: 600, rate: 20}, lidar: {rate: 20}}"
-"""A picture of CARLA's default size and a sweep in each tick."""
+"""Image of CARLA's default size and a lidar reading in each tick."""
 CASES = (
-    ("yolov5", USUAL),
-    ("ssd", USUAL),
-    ("lidar", USUAL),
+    ("yolov5", DEFAULT),
+    ("ssd", DEFAULT),
+    ("lidar", DEFAULT),
     ("yolov5", AS_EI_DRIVE),
 )
 PARTS: dict[str, tuple[tuple[type, str], ...]] = {
     "images": ((Camera, "read"),),
     "network": ((ImageNetwork, "find"),),
     "detector": ((LearnedDetector, "detect"), (LidarDetector, "detect")),
-    "LiDAR": ((Lidar, "read"),),
+    "lidar": ((Lidar, "read"),),
 }
-"""What is measured, and where; a detector's time holds that of its network, which is taken off."""
+"""Measured methods by component; the time of a detector contains that of its network, which is subtracted."""
 
 
-class Spent(NamedTuple):
-    """Of one run: simulated time, processor time and its parts [s], and whether it passed."""
+class RunTime(NamedTuple):
+    """Simulated time, processor time and its parts [s] of one run, and whether it passed."""
 
     simulated: float
-    all_of_it: float
+    total: float
     parts: dict[str, float]
     passed: bool
 
 
-def run(detector: str, sensors: str, seed: int) -> Spent:
-    """Play the scenario once; `sensors` is what the stations' property of that name says, or nothing."""
-    with _scenario(sensors) as path, _watched() as parts:
+def run(detector: str, sensors: str, seed: int) -> RunTime:
+    """Run the scenario once; `sensors` is the property of that name of the stations, empty for the default."""
+    with _scenario(sensors) as path, _measure_parts() as parts:
         simulation = Simulation(load_for_seed(path, seed, {}), seed=seed, settings=RunSettings(detector=detector))
-        began = time.process_time()
+        start = time.process_time()
         result = simulation.run()
-        spent = time.process_time() - began
+        times = time.process_time() - start
     parts["detector"] -= parts["network"]
-    return Spent(result.simulated_s, spent, parts, result.passed)
+    return RunTime(result.simulated_s, times, parts, result.passed)
 
 
 @contextmanager
 def _scenario(sensors: str) -> Iterator[Path]:
-    """The scenario's file, or a copy that says what the stations sense with."""
+    """Yield the path of the scenario, or of a copy with these sensors."""
     path = resolve_scenario(SCENARIO)
     if not sensors:
         yield path
@@ -76,48 +76,48 @@ def _scenario(sensors: str) -> Iterator[Path]:
 
 
 @contextmanager
-def _watched() -> Iterator[dict[str, float]]:
-    """Processor time [s] that goes by in each of PARTS."""
-    spent = dict.fromkeys(PARTS, 0.0)
-    kept: list[tuple[type, str, Callable[..., Any]]] = []
-    for part, places in PARTS.items():
-        for kind, name in places:
-            kept.append((kind, name, getattr(kind, name)))
-            setattr(kind, name, _timed(kept[-1][2], spent, part))
+def _measure_parts() -> Iterator[dict[str, float]]:
+    """Measure the processor time of each of PARTS [s]."""
+    times = dict.fromkeys(PARTS, 0.0)
+    originals: list[tuple[type, str, Callable[..., Any]]] = []
+    for part, methods in PARTS.items():
+        for kind, name in methods:
+            originals.append((kind, name, getattr(kind, name)))
+            setattr(kind, name, _timed(originals[-1][2], times, part))
     try:
-        yield spent
+        yield times
     finally:
-        for kind, name, method in kept:
+        for kind, name, method in originals:
             setattr(kind, name, method)
 
 
-def _timed(method: Callable[..., Any], spent: dict[str, float], part: str) -> Callable[..., Any]:
+def _timed(method: Callable[..., Any], times: dict[str, float], part: str) -> Callable[..., Any]:
     @wraps(method)
-    def wrapped(*arguments: Any, **named: Any) -> Any:
-        began = time.process_time()
+    def wrapped(*arguments: Any, **options: Any) -> Any:
+        start = time.process_time()
         try:
-            return method(*arguments, **named)
+            return method(*arguments, **options)
         finally:
-            spent[part] += time.process_time() - began
+            times[part] += time.process_time() - start
 
     return wrapped
 
 
 def print_table(seed: int, repeats: int) -> None:
-    """Play all cases, each as often, and print the best of each."""
+    """Run all cases repeatedly, and print the fastest run of each."""
     cv2.setNumThreads(1)
-    run("yolov5", USUAL, seed)
+    run("yolov5", DEFAULT, seed)
     print(
-        f"{SCENARIO}, whole runs, ego and roadside unit alike; torch {torch.get_num_threads()} thread, "
-        f"OpenCV {cv2.getNumThreads()} thread; simulated seconds per second of processor time, and how that is spent"
+        f"{SCENARIO}, complete runs, equal detectors on ego and roadside unit; torch {torch.get_num_threads()} thread, "
+        f"OpenCV {cv2.getNumThreads()} thread; simulated time per processor time, and shares by component"
     )
     print(f"{'':38}" + "".join(f"{part:>10}" for part in (*PARTS, "rest")))
     for detector, sensors in CASES:
         best = min(
-            (run(detector, sensors, seed) for _ in range(repeats)), key=lambda one: one.all_of_it / one.simulated
+            (run(detector, sensors, seed) for _ in range(repeats)), key=lambda entry: entry.total / entry.simulated
         )
-        shares = [*best.parts.values(), best.all_of_it - sum(best.parts.values())]
-        name = f"{detector}, {'800 x 600 and LiDAR at 20 Hz' if sensors else 'usual sensors'}"
-        cells = "".join(f"{100 * share / best.all_of_it:8.0f} %" for share in shares)
+        shares = [*best.parts.values(), best.total - sum(best.parts.values())]
+        name = f"{detector}, {'800 x 600 and lidar at 20 Hz' if sensors else 'default sensors'}"
+        cells = "".join(f"{100 * share / best.total:8.0f} %" for share in shares)
         verdict = "passed" if best.passed else "failed"
-        print(f"{name:38}{cells}   {best.simulated / best.all_of_it:.2f} times real time, {verdict}")
+        print(f"{name:38}{cells}   {best.simulated / best.total:.2f} times real time, {verdict}")

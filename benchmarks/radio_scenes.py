@@ -1,4 +1,4 @@
-"""A generated scenario of many stations: cars on a straight road of four lanes, each of which says where it is."""
+"""Generated scenario of many stations: cars on a straight road of four lanes that send CAM."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from itertools import cycle
 from pathlib import Path
 
 LENGTH = 2000.0
-"""Over which the cars are spread at the start [m]."""
+"""Length over which the cars are spread at the start [m]."""
 SPEED = 25.0
-"""[m/s]"""
+"""Speed of the cars [m/s]."""
 EGO = "Car000"
-"""It listens, in any case."""
+"""Name of the car that always receives messages."""
 
 _LANE = (
     '<lane id="{id}" type="driving" level="false"><link/><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
@@ -31,7 +31,7 @@ _CAR = """
     <Property name="module" value="eidrive"/><Property name="planner" value="none"/>
     <Property name="detector" value="oracle"/><Property name="range" value="1"/>
     <Property name="messages" value="cam"/><Property name="generation" value="{generation}"/>{rate}
-    <Property name="fusion" value="{fusion}"/><Property name="cooperates_with" value="{hears}"/>
+    <Property name="fusion" value="{fusion}"/><Property name="cooperates_with" value="{senders}"/>
   </Properties></Controller></ObjectController>
 </ScenarioObject>"""
 _START = """
@@ -49,13 +49,13 @@ _START = """
 
 
 def write_scenario(folder: Path, stations: int, *, rate: float | None, all_listen: bool) -> Path:
-    """The scenario in this folder, its road beside it.
+    """Write the scenario and its road to this folder, and return its path.
 
-    The cars drive as scripted, without physics, so that what is measured are stations and radio. They have an oracle
-    that sees one meter far, as a CAM is of its sender alone.
+    The cars are scripted, without physics, so that the measurement covers stations and radio. They have an oracle with
+    a range of one meter, because a CAM describes only its sender.
 
-    rate        of the messages [Hz]; None: by the rules of ETSI for CAM
-    all_listen  whether every station hears all others, or the first one alone
+    rate        of the messages [Hz]; None: by the ETSI generation rules for CAM
+    all_listen  whether every station receives from all others, or only the first one
     """
     road = folder / "straight.xodr"
     sides = {
@@ -73,13 +73,13 @@ def write_scenario(folder: Path, stations: int, *, rate: float | None, all_liste
     )
     names = [f"Car{number:03d}" for number in range(stations)]
     generation = "etsi" if rate is None else "rate"
-    said = "" if rate is None else f'<Property name="message_rate" value="{rate:g}"/>'
+    rate_property = "" if rate is None else f'<Property name="message_rate" value="{rate:g}"/>'
     cars = "".join(
         _CAR.format(
             name=name,
             generation=generation,
-            rate=said,
-            hears="all" if all_listen or name == EGO else "none",
+            rate=rate_property,
+            senders="all" if all_listen or name == EGO else "none",
             fusion="covariance_intersection" if all_listen or name == EGO else "average",
         )
         for name in names

@@ -1,4 +1,4 @@
-"""Seven road users at random around a LiDAR, on a car or a mast: scenes that no threshold was chosen by."""
+"""Seven random road users around a lidar, on a car or a mast: scenes that were not used to choose thresholds."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ SIZES: Mapping[str, tuple[float, float, float]] = {
     "pedestrian": (0.5, 0.5, 1.75),
 }
 KINDS = ("car", "car", "car", "van", "truck", "bus", "motorbike", "pedestrian")
-OTHERS, NEAREST, FARTHEST, ROOM = 7, 6.0, 45.0, 1.0
+OTHERS, NEAREST, FARTHEST, CLEARANCE = 7, 6.0, 45.0, 1.0
 
 
 class Scene(NamedTuple):
-    """A sweep, and what stands there: kinds and boxes (7, 7)."""
+    """Lidar reading, and the true objects: kinds and boxes (7, 7)."""
 
     readings: Readings
     kinds: tuple[str, ...]
@@ -37,26 +37,29 @@ class Scene(NamedTuple):
 
 
 def random_scenes(count: int, seed: int) -> Iterator[Scene]:
-    """Scenes without a map; every second one is seen from a mast of 5 m."""
+    """Yield scenes without a map; every second one is measured from a mast of 5 m."""
     rng = np.random.default_rng(seed)
     for number in range(count):
         station = "mast" if number % 2 else "car"
         size = (0.3, 0.3, 5.0) if station == "mast" else SIZES["car"]
-        placed = [("station", [0.0, 0.0, size[2] / 2, *size, 0.0])]
-        while len(placed) <= OTHERS:
+        objects = [("station", [0.0, 0.0, size[2] / 2, *size, 0.0])]
+        while len(objects) <= OTHERS:
             kind = str(rng.choice(KINDS))
             reach, bearing = rng.uniform(NEAREST, FARTHEST), rng.uniform(-math.pi, math.pi)
             length, width, height = SIZES[kind]
             x, y, yaw = reach * math.cos(bearing), reach * math.sin(bearing), rng.uniform(-math.pi, math.pi)
-            if not any(overlap([x, y, height / 2, length + ROOM, width + ROOM, height, yaw], box) for _, box in placed):
-                placed.append((kind, [x, y, height / 2, length, width, height, yaw]))
+            if not any(
+                overlap([x, y, height / 2, length + CLEARANCE, width + CLEARANCE, height, yaw], box)
+                for _, box in objects
+            ):
+                objects.append((kind, [x, y, height / 2, length, width, height, yaw]))
         with World(None, dt=0.05) as world:
             specs = []
-            for row, (kind, box) in enumerate(placed):
+            for row, (kind, box) in enumerate(objects):
                 shape = kind if row else "rsu" if station == "mast" else "car"
                 wheels = 0.0 if shape in ("rsu", "motorbike", "pedestrian") else 2.8
                 body = (box[3], box[4], box[5])
                 specs.append(ActorSpec(str(row), shape, kind, body, (0.0, 0.0, box[2]), wheelbase=wheels))
                 world.add(specs[-1], Placement(box[0], box[1], yaw=box[6]))
             readings = Rig(specs[0], {"lidar": LidarSettings()}, seed=seed).read(world, world.view())
-        yield Scene(readings, tuple(kind for kind, _ in placed[1:]), np.array([box for _, box in placed[1:]]))
+        yield Scene(readings, tuple(kind for kind, _ in objects[1:]), np.array([box for _, box in objects[1:]]))
