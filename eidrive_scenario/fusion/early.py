@@ -16,7 +16,7 @@ from eidrive_scenario.fusion.covariance_intersection import (
 )
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compressed
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compress
 
 
 class EarlyFusionSettings(CovarianceIntersectionSettings):
@@ -49,7 +49,7 @@ class EarlyFusion(CovarianceIntersectionFusion):
         if not readings.lidars:
             return None
         points = np.concatenate([_to_world(reading) for reading in readings.lidars.values()])
-        return compressed(points, readings.time, self.early.cell)
+        return compress(points, readings.time, self.early.cell)
 
     def merge_readings(self, readings: Readings, received: Sequence[Array]) -> Readings:
         """Return the readings with received points (N, 3) added to those of the first lidar."""

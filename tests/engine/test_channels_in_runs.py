@@ -58,7 +58,7 @@ def edited(tmp_path: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def play(source: Path, channel: str | None, *observers: Observer, seed: int = 1, **more: object) -> RunResult:
+def simulate(source: Path, channel: str | None, *observers: Observer, seed: int = 1, **more: object) -> RunResult:
     settings = RunSettings(channel=channel, **more)  # type: ignore[arg-type]
     return run_file(source, seed=seed, settings=settings, observers=observers)
 
@@ -68,11 +68,11 @@ def test_run_with_truck_between_antennas_has_the_model_blockage_loss(tmp_path: P
     hidden = edited(tmp_path, (RSU_AT, BEHIND_THE_TRUCK))
     with_truck, without = FrameCollector(), FrameCollector()
     log, recording = tmp_path / "run.log", tmp_path / "recording.mcap"
-    play(hidden, PLAIN, with_truck, RunLog(log), Recorder(recording, metadata={}), time_limit=1.5)
+    simulate(hidden, PLAIN, with_truck, RunLog(log), Recorder(recording, metadata={}), time_limit=1.5)
     away = edited(
         tmp_path, (RSU_AT, BEHIND_THE_TRUCK), ('<WorldPosition x="25.4" y="8.016"', '<WorldPosition x="25.4" y="80"')
     )
-    play(away, PLAIN, without, time_limit=1.5)
+    simulate(away, PLAIN, without, time_limit=1.5)
     blocked, clear = (
         [event for frame in collector.frames for event in frame.links] for collector in (with_truck, without)
     )
@@ -137,7 +137,7 @@ def test_run_without_loss_and_delay_equals_shared_memory(scenario: str) -> None:
     path = resolve_scenario(scenario)
     channel = "{delay: {kind: constant, seconds: 0}, loss: {kind: bernoulli, probability: 0}}"
     collector, shared = FrameCollector(), FrameCollector()
-    play(path, channel, collector)
+    simulate(path, channel, collector)
     simulation = Simulation(
         load_for_seed(path, 1, {}), seed=1, settings=RunSettings(channel="ideal"), observers=[shared]
     )
@@ -152,12 +152,12 @@ def test_run_without_loss_and_delay_equals_shared_memory(scenario: str) -> None:
 )
 def test_run_with_total_loss_equals_no_cooperation(loss: str) -> None:
     lossy, alone = FrameCollector(), FrameCollector()
-    assert not play(ONE, f"{{loss: {loss}}}", lossy).passed
-    assert not play(ONE, "none", alone).passed
+    assert not simulate(ONE, f"{{loss: {loss}}}", lossy).passed
+    assert not simulate(ONE, "none", alone).passed
     assert lossy.motion == alone.motion
     assert lossy.known == alone.known
     jammed = FrameCollector()
-    play(ONE, f"{{model: radio, loss: {loss}}}", jammed)
+    simulate(ONE, f"{{model: radio, loss: {loss}}}", jammed)
     assert jammed.motion == alone.motion
 
 
@@ -165,7 +165,7 @@ def test_run_deliveries_with_more_loss_are_a_subset() -> None:
     received = []
     for probability in (0.1, 0.4, 0.8):
         collector = FrameCollector()
-        play(ONE, f"{{loss: {{kind: bernoulli, probability: {probability}}}}}", collector, time_limit=4.0)
+        simulate(ONE, f"{{loss: {{kind: bernoulli, probability: {probability}}}}}", collector, time_limit=4.0)
         received.append({e.number for frame in collector.frames for e in frame.links if e.outcome == "delivered"})
     assert received[0] > received[1] > received[2]
 
@@ -177,7 +177,7 @@ def test_run_with_reversed_entities_has_equal_links(tmp_path: Path) -> None:
     reordered = edited(tmp_path, ("".join(entities), "".join(reversed(entities))))
     for channel in ("80211p_urban", "cv2x_highway", "bursty"):
         forward, backward = FrameCollector(), FrameCollector()
-        first, second = play(ONE, channel, forward), play(reordered, channel, backward)
+        first, second = simulate(ONE, channel, forward), simulate(reordered, channel, backward)
         assert [f.view.position[f.view.row("Ego")].tolist() for f in forward.frames] == [
             f.view.position[f.view.row("Ego")].tolist() for f in backward.frames
         ]
@@ -201,8 +201,8 @@ def sent_messages(collector: FrameCollector) -> list[Message]:
 
 def test_run_with_etsi_generation_sends_fewer_bytes_at_smaller_distance(tmp_path: Path) -> None:
     collector = FrameCollector()
-    etsi = play(with_properties(tmp_path, "RsuStack", ("generation", "etsi")), "ideal", collector)
-    often, never = play(ONE, "ideal"), play(ONE, "none")
+    etsi = simulate(with_properties(tmp_path, "RsuStack", ("generation", "etsi")), "ideal", collector)
+    often, never = simulate(ONE, "ideal"), simulate(ONE, "none")
     assert etsi.links["RSU", "Ego"].bytes_sent < 0.3 * often.links["RSU", "Ego"].bytes_sent
     apart = [result.metrics["min_distance.Ego.Incoming.center"] for result in (never, etsi, often)]
     assert apart[0] < apart[1] <= apart[2]
@@ -221,8 +221,8 @@ def test_run_in_congested_channel_with_etsi_generation_drops_no_messages(tmp_pat
     LIMERIC applies the minimum share of 0.06 %: the interval after a message of T = 0.3 to 0.4 ms is T / 0.0006.
     """
     collector = FrameCollector()
-    by_rules = play(with_properties(tmp_path, "RsuStack", ("generation", "etsi")), "congested", collector)
-    often = play(ONE, "congested")
+    by_rules = simulate(with_properties(tmp_path, "RsuStack", ("generation", "etsi")), "congested", collector)
+    often = simulate(ONE, "congested")
     assert "queue" not in by_rules.links["RSU", "Ego"].lost_by
     assert often.links["RSU", "Ego"].lost_by["queue"] > 0.8 * often.links["RSU", "Ego"].sent
     messages = sent_messages(collector)
@@ -237,7 +237,7 @@ def test_run_with_cam_only_reports_the_sender(tmp_path: Path) -> None:
     collector = FrameCollector()
     path = with_properties(tmp_path, "RsuStack", ("messages", "cam"), ("generation", "etsi"))
     path.write_text(path.read_text().replace(LONG_RANGE, SHORT_RANGE))
-    assert not play(path, "ideal", collector, time_limit=3.0).passed
+    assert not simulate(path, "ideal", collector, time_limit=3.0).passed
     messages = sent_messages(collector)
     assert {message.kind for message in messages} == {"cam"}
     assert set(np.round(np.diff([message.generated for message in messages]), 9)) == {1.0}
@@ -250,8 +250,8 @@ def test_run_with_cam_and_cpm_reports_sender_and_objects(tmp_path: Path) -> None
     collector, alone = FrameCollector(), FrameCollector()
     path = with_properties(tmp_path, "RsuStack", ("messages", "[cpm, cam]"))
     path.write_text(path.read_text().replace(LONG_RANGE, SHORT_RANGE))
-    assert play(path, "ideal", collector).passed
-    play(edited(tmp_path, (LONG_RANGE, SHORT_RANGE)), "ideal", alone)
+    assert simulate(path, "ideal", collector).passed
+    simulate(edited(tmp_path, (LONG_RANGE, SHORT_RANGE)), "ideal", alone)
     more = [
         len(b.steps["Ego"].fused) - len(a.steps["Ego"].fused)
         for a, b in zip(alone.frames, collector.frames, strict=False)
@@ -261,9 +261,9 @@ def test_run_with_cam_and_cpm_reports_sender_and_objects(tmp_path: Path) -> None
 
 def test_run_with_clock_offset_beyond_the_timeout_ignores_reports(tmp_path: Path) -> None:
     """Reports of a unit whose clock is 1.2 s behind are older than the report timeout of the receivers."""
-    late = play(with_properties(tmp_path, "RsuStack", ("clock_offset", "-1.2")), "ideal")
+    late = simulate(with_properties(tmp_path, "RsuStack", ("clock_offset", "-1.2")), "ideal")
     assert not late.passed
-    assert play(with_properties(tmp_path, "RsuStack", ("clock_offset", "0.01")), "ideal").passed
+    assert simulate(with_properties(tmp_path, "RsuStack", ("clock_offset", "0.01")), "ideal").passed
 
 
 def test_run_with_asn1_modules_has_encoded_message_sizes(tmp_path: Path) -> None:
@@ -272,7 +272,7 @@ def test_run_with_asn1_modules_has_encoded_message_sizes(tmp_path: Path) -> None
     (tmp_path / "tiny.asn1").write_text(module.read_text())
     path = with_properties(tmp_path, "RsuStack", ("asn1_files", "tiny.asn1"), ("security_bytes", "100"))
     collector = FrameCollector()
-    play(path, "ideal", collector, time_limit=1.0)
+    simulate(path, "ideal", collector, time_limit=1.0)
     by_count = {len(message.detections): message.size for message in sent_messages(collector)}
     # bits: header 8 + 8 + 32, time 16, station type 8, position 31 + 32, counts 1 + 8; 94 and 7 per object
     assert by_count
@@ -335,7 +335,7 @@ def test_run_with_invalid_station_properties_raises_with_line(
     tmp_path: Path, properties: tuple[tuple[str, str], ...], message: str
 ) -> None:
     with pytest.raises(InputError) as caught:
-        play(with_properties(tmp_path, "RsuStack", *properties), "ideal")
+        simulate(with_properties(tmp_path, "RsuStack", *properties), "ideal")
     assert message in str(caught.value)
     assert re.search(r"edited\.xosc:\d+: ", str(caught.value))
 

@@ -76,28 +76,28 @@ def cv2x_mode4_errors(
     """
     height = ANTENNA - environment_height
 
-    def received(meters: Array) -> Array:
+    def received_power(meters: Array) -> Array:
         return power - winner_b1(meters, FREQUENCY, height, height)
 
     blocks, ratios, block_errors = CODINGS[subchannels]
     noise = NOISE - 10.0 * np.log10(BLOCKS / blocks)
     curve = np.interp(RATIOS, ratios, block_errors)
-    errors = errors_over(signal(received(distance), SHADOWING, SENSING), curve)
+    errors = errors_over(signal(received_power(distance), SHADOWING, SENSING), curve)
     propagation = errors @ interference(np.array([NO_INTERFERENCE]), SHADOWING, noise)[0]  # (13)
-    not_sensed = 1.0 - sensed_share(received(distance), SENSING, SHADOWING)  # (10)
+    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING, SHADOWING)  # (10)
 
     count = round(FARTHEST_INTERFERER * density)
     to_receiver = np.arange(-count, count + 1) / density
     to_receiver = to_receiver[to_receiver != 0.0]
     to_sender = np.abs(to_receiver + distance[:, None])
-    with_interferer = errors @ interference(received(to_receiver), SHADOWING, noise).T  # (17)
+    with_interferer = errors @ interference(received_power(to_receiver), SHADOWING, noise).T  # (17)
     certain = propagation[:, None] >= 1.0
     destroys = np.where(
         certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
     )  # (18)
 
     resources = subchannels * 1000.0 / rate  # (28)
-    power_by_distance = received(np.arange(-REACH, REACH + 1.0))
+    power_by_distance = received_power(np.arange(-REACH, REACH + 1.0))
     sensed = sensed_share(power_by_distance, SENSING, SHADOWING)  # (11)
     in_reach = density * float(sensed.sum())  # (29.1)
     overlap = autocorrelation(sensed)  # (30.2)
@@ -111,12 +111,12 @@ def cv2x_mode4_errors(
         common = overlap / overlap[0] * (density * excluded * overlap[0] / in_reach - apart) + apart
         candidates = CANDIDATES * resources
         both = (resources - 2.0 * excluded + common) * (candidates / (resources - excluded)) ** 2
-        unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received(to_sender), threshold, SHADOWING)
+        unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received_power(to_sender), threshold, SHADOWING)
         chosen = unaware * both[np.floor(to_sender + 0.5).astype(np.int64)] / candidates**2
         lost: Array = 1.0 - np.prod(1.0 - chosen * destroys, axis=1)
         return lost
 
-    excluded = _excluded(in_reach, resources)
+    excluded = _count_excluded(in_reach, resources)
     channel_busy_ratio = excluded / resources  # (34)
     weight = float(np.clip(2.0 * channel_busy_ratio - 0.4, 0.0, 1.0))  # (22)
     collision = weight * collides(excluded, SENSING)
@@ -132,7 +132,7 @@ def cv2x_mode4_errors(
     return ErrorTable(distance, given, channel_busy_ratio)
 
 
-def _excluded(in_reach: float, resources: float) -> float:
+def _count_excluded(in_reach: float, resources: float) -> float:
     """Return the number of resources that sensing excludes with `in_reach` vehicles in reach (29), (33)."""
     half = in_reach / 2.0
     shared = np.maximum(1.0 - np.arange(1.0, half + 1e-9) / (resources - half), 0.0)
@@ -144,7 +144,7 @@ def _raise_threshold(power: Array, density: float, resources: float) -> tuple[fl
     threshold = SENSING
     while True:
         in_reach = 2.0 * density * float(sensed_share(power, threshold, SHADOWING).sum())
-        excluded = _excluded(in_reach, resources)
+        excluded = _count_excluded(in_reach, resources)
         if resources - excluded >= CANDIDATES * resources:
             return threshold, excluded
         threshold += STEP

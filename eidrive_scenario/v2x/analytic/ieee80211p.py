@@ -68,11 +68,11 @@ def ieee80211p_errors(
     """
     height = ANTENNA - environment_height
 
-    def received(meters: Array) -> Array:
+    def received_power(meters: Array) -> Array:
         return power - winner_b1(meters, FREQUENCY, height, height)
 
     duration = airtime(size, bit_rate)
-    sensed = sensed_share(received(np.arange(-REACH, REACH + 1.0)), SENSING, SHADOWING)  # (13)
+    sensed = sensed_share(received_power(np.arange(-REACH, REACH + 1.0)), SENSING, SHADOWING)  # (13)
     unsaturated = offered_load(density, rate, size, power, bit_rate, height)
     square, linear, constant = FIT
     channel_busy_ratio = square * unsaturated**2 + linear * unsaturated + constant  # (35)
@@ -80,20 +80,20 @@ def ieee80211p_errors(
     overlap /= overlap.max()  # (20)
 
     curve = np.interp(RATIOS + 10.0 * np.log10(BANDWIDTH / bit_rate), *FRAME_ERRORS)
-    not_sensed = 1.0 - sensed_share(received(distance), SENSING, SHADOWING)  # (12)
-    errors = errors_over(signal(received(distance), SHADOWING, SENSING), curve)
+    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING, SHADOWING)  # (12)
+    errors = errors_over(signal(received_power(distance), SHADOWING, SENSING), curve)
     propagation = errors @ noise_alone(NOISE)[0]  # (24)
 
     to_receiver = _interferers(density)
     to_sender = np.abs(to_receiver + distance[:, None])
     closer = np.abs(to_receiver) < np.abs(distance)[:, None]
-    with_interferer = errors @ interference(received(to_receiver), SHADOWING, NOISE).T  # (30)
+    with_interferer = errors @ interference(received_power(to_receiver), SHADOWING, NOISE).T  # (30)
     certain = propagation[:, None] >= 1.0
     destroys = np.where(
         certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
     )  # (31)
-    at_receiver = sensed_share(received(to_receiver), SENSING, SHADOWING)
-    senses = sensed_share(received(to_sender), SENSING, SHADOWING)
+    at_receiver = sensed_share(received_power(to_receiver), SENSING, SHADOWING)
+    senses = sensed_share(received_power(to_sender), SENSING, SHADOWING)
     share = rate / (1.0 - channel_busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
     same_slot = SLOT * share * senses  # (22)
     hidden = duration * share * (1.0 - senses)  # (18)

@@ -32,7 +32,7 @@ def signal(power: Array, spread: float, threshold: float) -> Array:
     """Return the power distribution (D, L) of the sensed packets, for mean powers (D,) [dBm]."""
     density = np.exp(-0.5 * ((LEVELS - power[:, None]) / spread) ** 2)
     density[:, threshold > LEVELS] = 0.0
-    return _normalized(density)
+    return _normalize(density)
 
 
 def noise_alone(noise: float) -> Array:
@@ -49,7 +49,7 @@ def interference(power: Array, spread: float, noise: float) -> Array:
     exponent = -0.5 * ((10.0 * np.log10(alone) - power[:, None]) / spread) ** 2
     density = np.zeros((len(power), len(LEVELS)))
     density[:, noise < LEVELS] = total / alone * np.exp(exponent)
-    return _normalized(density)
+    return _normalize(density)
 
 
 def errors_over(packets: Array, curve: Array) -> Array:
@@ -69,6 +69,6 @@ def autocorrelation(values: Array) -> Array:
     return correlated
 
 
-def _normalized(density: Array) -> Array:
+def _normalize(density: Array) -> Array:
     shares: Array = density / density.sum(axis=1, keepdims=True)
     return shares

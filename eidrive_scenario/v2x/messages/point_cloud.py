@@ -48,7 +48,7 @@ class PointCloud:
         return np.asarray(np.asarray(self.corner) + (indices + 0.5) * self.cell, dtype=np.float64)
 
 
-def compressed(points: Array, time: float, cell: float) -> PointCloud:
+def compress(points: Array, time: float, cell: float) -> PointCloud:
     """Return the points (N, 3) on a grid of this cell size [m], one point per cell, within half a cell."""
     if not len(points):
         return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8))

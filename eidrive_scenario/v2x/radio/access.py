@@ -86,7 +86,7 @@ class MediumAccess(ABC):
         """Index of the current period of congestion control; None before the first message."""
         self.fading: FadingDraws | None = None
         """Fading of each message at each station; None: power of the link budget."""
-        self.on_air: list[Transmission] = []
+        self.active: list[Transmission] = []
         """Transmissions that may overlap with unfinished ones."""
 
     def enqueue(self, transmissions: Sequence[Transmission]) -> None:
@@ -144,10 +144,10 @@ class MediumAccess(ABC):
             ("_period_busy", 0.0),
         ):
             setattr(self, field, reorder_rows(getattr(self, field), rows, fresh))
-        for entry in self.on_air:
+        for entry in self.active:
             if entry.gain is not None:
                 entry.gain = reorder_rows(entry.gain, rows, 0.0)
-        self.gate = self.gate.reordered(rows)
+        self.gate = self.gate.reorder(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
         return lost
@@ -156,9 +156,9 @@ class MediumAccess(ABC):
     def reorder(self, rows: Sequence[int | None]) -> None:
         """Reorder the state of the stations; `rows` contains the former row of each station, None for new ones."""
 
-    def forget(self, before: float) -> None:
+    def evict_before(self, time: float) -> None:
         """Remove transmissions that ended before this time [s] and overlap with no unfinished one."""
-        self.on_air = [entry for entry in self.on_air if entry.end > before]
+        self.active = [entry for entry in self.active if entry.end > time]
 
     def _arrive(self, transmission: Transmission) -> list[Transmission]:
         row = self._rows[transmission.message.sender]
@@ -199,7 +199,7 @@ class MediumAccess(ABC):
             transmission.gain = self.fading.gain_db(row, transmission.message.number)
         self._waiting[row].popleft()
         self._last_start[row], self._last_use[row] = start, transmission.duration * self.share(transmission)
-        self.on_air.append(transmission)
+        self.active.append(transmission)
 
     def _measure(self, now: float) -> None:
         """Pass the channel busy ratio of each completed period to congestion control."""

@@ -92,7 +92,7 @@ class LinkBudget:
         names, positions = surroundings.names, surroundings.positions
         first, second = self._first, self._second
         distance = np.linalg.norm(positions[first] - positions[second], axis=1)
-        between, blockers = self._between(surroundings, positions, distance)
+        between, blockers = self._link_geometry(surroundings, positions, distance)
         shadow = self._update_shadowing(positions, between.states)
         mean_loss = self._path_loss.loss(between, self._frequency, ndtr(shadow[1]))
         spread = np.take(self._path_loss.spreads, between.states) if self._spread is None else self._spread
@@ -108,7 +108,7 @@ class LinkBudget:
         places = [surroundings.places[name] for name in names]
         moved = [math.dist(here, there) for here, there in zip(self._places.tolist(), places, strict=True)]
         self._places = np.array(places, dtype=float).reshape(-1, 3)
-        between, blockers = self._links(surroundings, places)
+        between, blockers = self._link_geometry_scalar(surroundings, places)
         distance, loss, mean_loss = ([[0.0] * len(names) for _ in names] for _ in range(3))
         states = [[LOS] * len(names) for _ in names]
         for pair, (link, a, b) in enumerate(zip(between, self._first.tolist(), self._second.tolist(), strict=True)):
@@ -122,7 +122,7 @@ class LinkBudget:
         codes = np.array(states, dtype=np.int64)
         return Budget(names, self._rows, np.array(distance), np.array(loss), np.array(mean_loss), codes, blockers)
 
-    def _links(
+    def _link_geometry_scalar(
         self, surroundings: RadioEnvironment, places: Sequence[tuple[float, float, float]]
     ) -> tuple[list[Link], dict[tuple[int, int], tuple[str, ...]]]:
         """Return the geometry of each link, and the blocking bodies by rows, evaluated pair by pair."""
@@ -200,7 +200,7 @@ class LinkBudget:
         self._keys = np.stack([keys("shadowing"), keys("blockage")])
         self._sight_keys = keys("sight")
 
-    def _between(
+    def _link_geometry(
         self, surroundings: RadioEnvironment, positions: Array, distance: Array
     ) -> tuple[LinkGeometry, dict[tuple[int, int], tuple[str, ...]]]:
         count = len(distance)

@@ -180,7 +180,7 @@ class RadioChannel(LinkChannel):
         lost = self._access.rearrange(names)
         gone = [entry for entry in self._open if entry.message.sender not in names]
         self._open = [entry for entry in self._open if entry not in gone]
-        self._access.on_air = [entry for entry in self._access.on_air if entry.message.sender in names]
+        self._access.active = [entry for entry in self._access.active if entry.message.sender in names]
         self._rows = {name: row for row, name in enumerate(names)}
         self._receivers.clear()
         self._counters = LinkCounterTable(names)
@@ -219,7 +219,7 @@ class RadioChannel(LinkChannel):
         self._open = [entry for entry in under_way if entry.end > now]
         if ended:
             self._receive(ended, power, self._budget)
-        self._access.forget(min((entry.start for entry in self._open), default=now))
+        self._access.evict_before(min((entry.start for entry in self._open), default=now))
 
     def _drop(self, entry: Transmission) -> None:
         """Record a message that was dropped from a queue."""
@@ -231,7 +231,7 @@ class RadioChannel(LinkChannel):
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
         """Determine the receptions of ended transmissions and enqueue their deliveries."""
-        receptions = self._receiver.receive(ended, self._access.on_air, power, budget, self._keys)
+        receptions = self._receiver.receive(ended, self._access.active, power, budget, self._keys)
         plain = isinstance(self.profile.loss, NoLoss)
         receivers = []
         for place, entry in enumerate(ended):

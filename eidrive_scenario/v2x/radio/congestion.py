@@ -123,7 +123,7 @@ class DccGate:
             return min(max(wanted, self.control.interval_min), self.control.interval_max)
         return float(self.reactive[station])
 
-    def reordered(self, rows: list[int | None]) -> DccGate:
+    def reorder(self, rows: list[int | None]) -> DccGate:
         """Return the gate for reordered stations, each with the state of its former row or a new state."""
         gate = DccGate(self.control, len(rows), self.background)
         for row, old in enumerate(rows):

@@ -44,11 +44,11 @@ class ErrorCurve:
         elif ratio_db > self.ratios[-1]:
             error = self.floor
         else:
-            error = interpolated(ratio_db, self.ratios, self.errors)
+            error = interpolate(ratio_db, self.ratios, self.errors)
         return error if self.size is None else 1.0 - (1.0 - error) ** (size / self.size)
 
 
-def interpolated(x: float, places: Sequence[float], values: Sequence[float]) -> float:
+def interpolate(x: float, places: Sequence[float], values: Sequence[float]) -> float:
     """Return `numpy.interp` of one number: linear between ascending places, constant beyond their ends."""
     after = bisect_right(places, x)
     if after == 0:

@@ -15,7 +15,7 @@ from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.counter_random import Keys, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import TOLERANCE, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
-from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolated
+from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolate
 
 Codes = NDArray[np.int8]
 Rows = NDArray[np.int64]
@@ -56,33 +56,33 @@ class Receiver:
     background: tuple[ErrorTable, Array] | None = None
 
     def receive(
-        self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+        self, ended: Sequence[Transmission], active: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
     ) -> Receptions:
         """Return the receptions of the transmissions in `ended`.
 
-        on_air  all transmissions that may overlap with them, including themselves
+        active  all transmissions that may overlap with them, including themselves
         power   (N, N) received power by sender (row) and receiver (column) [dBm]
         keys    (N, N) keys of the links, by sender and receiver
         """
         few = len(ended) * len(power) <= MAX_SCALAR
-        return (self._receive_scalar if few else self._receive_array)(ended, on_air, power, budget, keys)
+        return (self._receive_scalar if few else self._receive_array)(ended, active, power, budget, keys)
 
     def _receive_array(
-        self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+        self, ended: Sequence[Transmission], active: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
     ) -> Receptions:
-        rows = np.array([budget.rows[entry.message.sender] for entry in on_air], dtype=np.int64)
-        place = {id(entry): index for index, entry in enumerate(on_air)}
+        rows = np.array([budget.rows[entry.message.sender] for entry in active], dtype=np.int64)
+        place = {id(entry): index for index, entry in enumerate(active)}
         own = np.array([place[id(entry)] for entry in ended], dtype=np.int64)
-        start, end = (np.array([getattr(entry, name) for entry in on_air]) for name in ("start", "end"))
-        first = np.array([entry.first_band for entry in on_air])
-        last = first + np.array([entry.bands for entry in on_air])
+        start, end = (np.array([getattr(entry, name) for entry in active]) for name in ("start", "end"))
+        first = np.array([entry.first_band for entry in active])
+        last = first + np.array([entry.bands for entry in active])
         overlapping = (start[None, :] < end[own, None] - TOLERANCE) & (start[own, None] < end[None, :] - TOLERANCE)
         overlapping[np.arange(len(own)), own] = False
         same_band = overlapping & (first[None, :] < last[own, None]) & (first[own, None] < last[None, :])
 
         senders = rows[own]
         received = power[rows]
-        for index, entry in enumerate(on_air):
+        for index, entry in enumerate(active):
             if entry.gain is not None:
                 received[index] += entry.gain
         signal = received[own]
@@ -117,7 +117,7 @@ class Receiver:
         return Receptions(causes, snr, senders)
 
     def _receive_scalar(
-        self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+        self, ended: Sequence[Transmission], active: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
     ) -> Receptions:
         """Return the receptions, evaluated one by one."""
         powers, links = power.tolist(), keys.tolist()
@@ -125,13 +125,13 @@ class Receiver:
             id(entry): powers[budget.rows[entry.message.sender]]
             if entry.gain is None
             else (power[budget.rows[entry.message.sender]] + entry.gain).tolist()
-            for entry in on_air
+            for entry in active
         }
         states, mean_loss = budget.states.tolist(), budget.mean_loss.tolist()
         senders = [budget.rows[entry.message.sender] for entry in ended]
         causes, ratios = [], []
         for entry, sender in zip(ended, senders, strict=True):
-            overlapping = [other for other in on_air if other is not entry and _overlap(other, entry)]
+            overlapping = [other for other in active if other is not entry and _overlap(other, entry)]
             transmitting = {budget.rows[other.message.sender] for other in overlapping}
             disturbing = sorted(
                 (other for other in overlapping if _common_share(other, entry) > 0.0),
@@ -170,11 +170,11 @@ class Receiver:
     def _in_background(self, cause: int, mean_loss: float, link: int, number: int) -> int:
         """Return `_add_background` for one reception."""
         losses, distances, given = self._background_lists
-        distance = interpolated(mean_loss, losses, distances)
+        distance = interpolate(mean_loss, losses, distances)
         for salt, code, probabilities in given:
             if cause == DELIVERED or cause > code:
                 draw = uniform(link + salt, number)
-                cause = code if draw < interpolated(distance, distances, probabilities) else cause
+                cause = code if draw < interpolate(distance, distances, probabilities) else cause
         return cause
 
     @cached_property

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.codec import codec
-from eidrive_scenario.v2x.messages.point_cloud import HEADER_BYTES, PointCloud, compressed
+from eidrive_scenario.v2x.messages.point_cloud import HEADER_BYTES, PointCloud, compress
 
 COORDINATE = st.floats(-500.0, 500.0)
 
@@ -18,11 +18,9 @@ COORDINATE = st.floats(-500.0, 500.0)
 @given(
     st.lists(st.tuples(COORDINATE, COORDINATE, st.floats(-5.0, 20.0)), max_size=60), st.sampled_from([0.05, 0.1, 1.0])
 )
-def test_compressed_points_are_restored_within_half_a_cell(
-    places: list[tuple[float, float, float]], cell: float
-) -> None:
+def test_compress_points_are_restored_within_half_a_cell(places: list[tuple[float, float, float]], cell: float) -> None:
     points = np.array(places).reshape(-1, 3)
-    restored = compressed(points, 1.0, cell).points()
+    restored = compress(points, 1.0, cell).points()
     assert len(restored) <= len(points)
     for point in points:
         assert np.abs(restored - point).max(axis=1).min() <= cell / 2 + 1e-9
@@ -30,35 +28,35 @@ def test_compressed_points_are_restored_within_half_a_cell(
         assert np.abs(points - point).max(axis=1).min() <= cell / 2 + 1e-9
 
 
-def test_compressed_steps_are_encoded_in_groups_of_seven_bits() -> None:
+def test_compress_steps_are_encoded_in_groups_of_seven_bits() -> None:
     """Cells 0, 1, 201 and 20201 of a row: steps 0, 1, 200 = 1·128 + 72 and 20000 = 1·128² + 28·128 + 32."""
     row = np.zeros((4, 3))
     row[:, 2] = [0.5, 1.5, 201.5, 20201.5]
-    cloud = compressed(row, 0.0, 1.0)
+    cloud = compress(row, 0.0, 1.0)
     assert cloud.steps.tolist() == [0, 1, 128 + 72, 1, 128 + 32, 128 + 28, 1]
     assert cloud.size == HEADER_BYTES + 7
     np.testing.assert_allclose(cloud.points(), row + np.array([0.5, 0.5, 0.0]))
 
 
-def test_compressed_points_of_one_cell_become_one() -> None:
-    assert len(compressed(np.full((50, 3), 0.03), 0.0, 0.1).points()) == 1
+def test_compress_points_of_one_cell_become_one() -> None:
+    assert len(compress(np.full((50, 3), 0.03), 0.0, 0.1).points()) == 1
 
 
-def test_compressed_without_points_has_header_size() -> None:
-    cloud = compressed(np.empty((0, 3)), 0.0, 0.1)
+def test_compress_without_points_has_header_size() -> None:
+    cloud = compress(np.empty((0, 3)), 0.0, 0.1)
     assert cloud.points().shape == (0, 3)
     assert cloud.size == HEADER_BYTES
 
 
-def test_compressed_sweep_has_a_fifth_of_its_float_size() -> None:
+def test_compress_sweep_has_a_fifth_of_its_float_size() -> None:
     """5,000 points on a street of 100 m: three 32-bit floats each are 60 kB."""
     rng = generator(0, "sweep")
     points = np.stack([rng.uniform(-50, 50, 5000), rng.uniform(-50, 50, 5000), rng.uniform(0, 0.1, 5000)], axis=1)
-    assert compressed(points, 0.0, 0.1).size < 12_000
+    assert compress(points, 0.0, 0.1).size < 12_000
 
 
 def test_recording_codec_preserves_point_cloud() -> None:
-    cloud = compressed(generator(0, "few").uniform(-5, 5, (20, 3)), 2.5, 0.1)
+    cloud = compress(generator(0, "few").uniform(-5, 5, (20, 3)), 2.5, 0.1)
     kept = codec(PointCloud)
     again = kept.decode(kept.encode(cloud))
     np.testing.assert_array_equal(again.steps, cloud.steps)
@@ -66,6 +64,6 @@ def test_recording_codec_preserves_point_cloud() -> None:
 
 
 @pytest.mark.parametrize("cell", [0.05, 0.2])
-def test_compressed_is_independent_of_the_order_of_points(cell: float) -> None:
+def test_compress_is_independent_of_the_order_of_points(cell: float) -> None:
     points = generator(0, "order").uniform(-20, 20, (200, 3))
-    np.testing.assert_array_equal(compressed(points, 0, cell).steps, compressed(points[::-1], 0, cell).steps)
+    np.testing.assert_array_equal(compress(points, 0, cell).steps, compress(points[::-1], 0, cell).steps)

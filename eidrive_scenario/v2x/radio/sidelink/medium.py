@@ -147,7 +147,7 @@ class Sidelink(MediumAccess):
         self._sending = [sending for sending in self._sending if sending.row in former]
         for sending in self._sending:
             sending.row = former[sending.row]
-        for entry in self.on_air:
+        for entry in self.active:
             if entry.control is not None:
                 entry.control = reorder_rows(entry.control, rows, PROPAGATION).astype(np.int8)
         self._history.rearrange(rows)
