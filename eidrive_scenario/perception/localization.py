@@ -179,7 +179,7 @@ class Localizer:
             yaw_rate=float(self._imu.angular_rate[2]) - turn_bias if self._imu is not None else 0.0,
             acceleration=float(self._imu.acceleration[0]) - acceleration_bias if self._imu is not None else 0.0,
         )
-        return _moved(readings, self._ego)
+        return _at_pose(readings, self._ego)
 
     def _first(self, truth: EgoState) -> Estimate:
         seed, *key = self._key
@@ -193,7 +193,7 @@ class Localizer:
         return Estimate(state, np.diag(deviations**2))
 
 
-def _moved(readings: Readings, ego: EgoState) -> Readings:
+def _at_pose(readings: Readings, ego: EgoState) -> Readings:
     """Return the readings as if the station were at its estimated pose."""
     truth = readings.ego
     turn = ego.yaw - truth.yaw

@@ -71,17 +71,17 @@ class Perception:
             if self._checked:
                 check_detections(self.detector, "detect", found)
             if self._latency <= 0.0 and not self._computing:
-                return self._tracked(found, readings)
+                return self._track(found, readings)
             self._computing.append((now + self._latency, found, readings))
         newest = None
         while self._computing and self._computing[0][0] <= now + TIME_TOLERANCE:
             _, found, past = self._computing.popleft()
-            newest = self._tracked(found, past)
+            newest = self._track(found, past)
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
         return newest
 
-    def _tracked(self, found: Detections, readings: Readings) -> Detections:
+    def _track(self, found: Detections, readings: Readings) -> Detections:
         if self._tracker is None:
             return found
 

@@ -26,8 +26,7 @@ LEAST_FACING = 0.25
 LEAST_HEIGHT = 6.0
 """Minimum height of a light in the image [px]."""
 SURE, SURE_IN_BOX = 0.9, 0.6
-"""Minimum probability of a lamp state: for lights that only the map locates, and for lights that the network detected.
-"""
+"""Minimum probability of a lamp state: for lights that only the map locates, and for detected lights."""
 STOP = "stop"
 """State of a detected stop sign."""
 _REQUIRED_LAMPS = {"red": {RED}, "redYellow": {RED, YELLOW}, "yellow": {YELLOW}, "green": {GREEN}}

@@ -46,10 +46,10 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
     merged = [one for one in found if one.fit.deviation <= DOUBTFUL]
     for doubtful in (one for one in found if one.fit.deviation > DOUBTFUL):
         parts = clusters(scan.points[doubtful.rows], scan.pattern.azimuth, grazing=False)
-        pieces = [doubtful.rows[part] for part in parts]
+        part_rows = [doubtful.rows[part] for part in parts]
         good = [
             one
-            for one in (_fit_clusters(scan, surroundings, pieces, min_points) if len(parts) > 1 else [])
+            for one in (_fit_clusters(scan, surroundings, part_rows, min_points) if len(parts) > 1 else [])
             if one.fit.deviation <= DOUBTFUL
         ]
         merged += good or [doubtful]
@@ -61,8 +61,8 @@ def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], 
     headings = np.full(len(groups), np.nan)
     few = [number for number, rows in enumerate(groups) if len(rows) < FEW]
     if few and surroundings.has_map:
-        middles = np.array([scan.points[groups[number], :2].mean(axis=0) for number in few])
-        headings[few] = surroundings.lane_heading(scan.frame.to_world(middles)) - scan.frame.yaw
+        centers = np.array([scan.points[groups[number], :2].mean(axis=0) for number in few])
+        headings[few] = surroundings.lane_heading(scan.frame.to_world(centers)) - scan.frame.yaw
     found = []
     for rows, heading in zip(groups, headings.tolist(), strict=True):
         fit = scan.fit(rows, tuple(PRIORS), heading if math.isfinite(heading) else None)
@@ -91,7 +91,7 @@ def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
     while again:
         again = False
         for one, other in combinations(merged, 2):
-            if overlap(_enlarged(one.fit.box), other.fit.box):
+            if overlap(_enlarge(one.fit.box), other.fit.box):
                 rows = np.concatenate([one.rows, other.rows])
                 fit = scan.fit(rows, tuple(PRIORS))
                 if fit is not None and fit.deviation <= DOUBTFUL:
@@ -102,6 +102,6 @@ def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
     return merged
 
 
-def _enlarged(box: Sequence[float]) -> Sequence[float]:
+def _enlarge(box: Sequence[float]) -> Sequence[float]:
     x, y, z, length, width, height, yaw = box
     return x, y, z, length + 2.0 * TOUCHING, width + 2.0 * TOUCHING, height, yaw

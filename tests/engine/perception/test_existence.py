@@ -83,7 +83,8 @@ def test_existence_of_simulated_tracks_is_calibrated() -> None:
     )
     side = 60.0
     tracker, objects = Tracker(settings), np.empty((0, 2))
-    stated, true = [], []
+    stated: list[float] = []
+    true: list[bool] = []
     for scan in range(scans):
         objects = objects[rng.uniform(size=len(objects)) < math.exp(-step / lifetime)]
         objects = np.concatenate([objects, rng.uniform(0.0, side, (rng.poisson(birth * side**2), 2))])

@@ -16,8 +16,9 @@ def rings(height: float, slope: tuple[float, float] = (0.0, 0.0), columns: int =
     azimuth = np.arange(columns) * 2 * math.pi / columns
     distance = height / np.tan(np.radians(np.arange(3.0, 31.0, 1.3)))
     x, y = (np.outer(f(azimuth), distance).ravel() for f in (np.cos, np.sin))
-    plane = np.column_stack([x, y, slope[0] * x + slope[1] * y])
-    return plane[np.hypot(plane[:, 0], plane[:, 1]) < 40.0]
+    plane: np.ndarray = np.column_stack([x, y, slope[0] * x + slope[1] * y])
+    near: np.ndarray = plane[np.hypot(plane[:, 0], plane[:, 1]) < 40.0]
+    return near
 
 
 def wall(x: float, y0: float, y1: float, low: float, high: float) -> np.ndarray:

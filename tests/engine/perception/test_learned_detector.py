@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 from collections.abc import Iterator
@@ -14,7 +15,6 @@ import pytest
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.perception.detector import DetectorContext
-from eidrive_scenario.perception.learned import detector as module
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, misspelt, object_category
 from eidrive_scenario.perception.learned.detector import (
     SHIPPED,
@@ -222,7 +222,7 @@ def test_build_network_with_file_without_weights_raises(tmp_path: Path) -> None:
 
 
 def test_build_network_without_torch_raises_error_with_hint(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(SettingError, match=r"requires torch.*run: pip install eidrive-scenario\[learned\]"):
         build_network("ssd", LearnedSettings())
 

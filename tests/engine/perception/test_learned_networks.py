@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -166,7 +167,7 @@ def test_yolo_loss_excludes_cells_of_ignored_objects() -> None:
     assert half_ignored == pytest.approx(none_ignored / 2, rel=1e-6)
 
 
-def images_and_targets() -> tuple[torch.Tensor, Targets]:
+def images_and_targets() -> tuple[Any, Targets]:
     """Return two images of two colored rectangles on noise, and their targets."""
     draws = torch.Generator().manual_seed(3)
     image = 0.2 * torch.rand(2, 3, 128, 256, generator=draws)
@@ -190,7 +191,7 @@ def test_network_overfits_single_image_and_fold_preserves_outputs(name: str) -> 
         loss, parts = loss_of(network(image), targets)
         assert loss.item() == pytest.approx(sum(parts.values()), rel=1e-4)
         optimizer.zero_grad()
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         optimizer.step()
         losses.append(loss.item())
     assert losses[-1] < 0.35 * losses[0]

@@ -177,12 +177,13 @@ def test_lift_truck_leaving_view_keeps_position(street: Any, x: float) -> None:
     Its visible part shrinks. Its center stays within the 99 % region of the stated covariance, and within 2 m.
     """
     truck = street.thing("Truck", x, 6.2, math.pi / 2, "truck")
-    sensors = {"front": CameraSettings(width=512, height=384), "roof": LidarSettings(field_of_view=110.0)}
+    lidar = LidarSettings(field_of_view=110.0)
+    sensors = {"front": CameraSettings(width=512, height=384), "roof": lidar}
     readings = street.readings([street.thing("Ego", 0, 0), truck], sensors)
     view, cloud = readings.cameras["front"], readings.lidars["roof"]
     rows, columns = np.nonzero(view.segmentation == 1)
     edges = np.array([[columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]], dtype=float)
-    pattern = pattern_from_settings(sensors["roof"])
+    pattern = pattern_from_settings(lidar)
     found = lift(edges, ["truck"], [1.0], view, cloud, time=0.0, pattern=pattern)
     off = found.boxes[0, :2] - truck.box[:2]
     assert np.hypot(*off) < 2.0

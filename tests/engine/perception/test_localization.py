@@ -135,7 +135,7 @@ def test_filter_nees_under_assumed_noise_is_within_chi_square_bounds() -> None:
             off = state[:5] - np.array([*truth, bias])
             off[2] = wrap_angle(float(off[2]))
             nees[tick] += off @ np.linalg.solve(covariance[:5, :5], off) / runs
-    low, high = chi2.ppf([0.005, 0.995], 5 * runs) / runs
+    low, high = np.asarray(chi2.ppf([0.005, 0.995], 5 * runs)) / runs
     assert np.mean((nees > low) & (nees < high)) > 0.9
     assert low < nees.mean() < high
 
@@ -181,7 +181,7 @@ def test_localizer_nees_in_simulated_world_is_within_chi_square_bounds() -> None
                     errors.append(float(np.hypot(off[0], off[1])))
                 world.step({}, {"Ego": Control(0.12, 0.0, sway * math.sin(0.03 * tick))})
     draws = effective_samples(np.array(nees).reshape(12, -1))
-    low, high = chi2.ppf([0.005, 0.995], 4 * draws) / draws
+    low, high = np.asarray(chi2.ppf([0.005, 0.995], 4 * draws)) / draws
     assert 20 < draws < 500, "a drive of 18 s has some independent samples, but not one per tick"
     assert low < np.mean(nees) < high
     assert np.sqrt(np.mean(np.square(errors))) < 0.6 * 0.3 * math.sqrt(2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -34,7 +35,7 @@ def cars(time: float, *places: tuple[float, ...], deviation: float = 0.1, names:
     )
 
 
-def tracker(kind: str = "cv", **settings: Any) -> Tracker:
+def tracker(kind: Any = "cv", **settings: Any) -> Tracker:
     return Tracker(TrackerSettings(kind=kind, **settings))
 
 
@@ -92,13 +93,18 @@ def test_missed_track_in_view_follows_bernoulli_recursion_until_deleted() -> Non
     assert len(track.update(cars(33 * DT))) == 0
 
 
+def constant_share(share: float, boxes: np.ndarray) -> np.ndarray:
+    return np.full(len(boxes), share)
+
+
 def test_track_half_in_view_loses_less_existence() -> None:
     existence = []
     for share in (0.0, 0.5, 1.0):
         track = tracker()
         for tick in range(10):
             track.update(cars(tick * DT, (0.0, 0.0)))
-        existence.append(float(track.update(cars(1.0), lambda boxes, s=share: np.full(len(boxes), s)).existence[0]))
+        seen = partial(constant_share, share)
+        existence.append(float(track.update(cars(1.0), seen).existence[0]))
     assert existence[0] > existence[1] > existence[2] > 0.5
 
 
@@ -227,7 +233,7 @@ def test_track_nees_is_within_chi_square_bounds(kind: str) -> None:
                     heading += turn * small
                     vx, vy = speed * math.cos(heading), speed * math.sin(heading)
                 x, y = x + vx * small, y + vy * small
-    low, high = chi2.ppf([0.005, 0.995], 2 * runs) / runs
+    low, high = np.asarray(chi2.ppf([0.005, 0.995], 2 * runs)) / runs
     settled = nees[20:]
     assert np.mean((settled > low) & (settled < high)) > 0.9
     assert low < settled.mean() < high

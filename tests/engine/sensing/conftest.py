@@ -55,7 +55,8 @@ class BoxScene:
         return Hits(np.array(rows, dtype=np.int64), np.array(fractions), np.array(normals).reshape(-1, 3))
 
     def first_hit(self, origins: Sequence[tuple[float, ...]], targets: Sequence[tuple[float, ...]]) -> list[int]:
-        return self.raycast(np.array(origins), np.array(targets)).rows.tolist()
+        rows: list[int] = self.raycast(np.array(origins), np.array(targets)).rows.tolist()
+        return rows
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         self.images.append((pose, pinhole))

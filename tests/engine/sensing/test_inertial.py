@@ -81,7 +81,7 @@ def test_gnss_bias_has_stated_initial_value_and_random_walk(boxes: Any) -> None:
 
 def test_imu_noise_scales_with_sampling_rate(boxes: Any) -> None:
     """0.02 m/s²/√Hz at 100 Hz is 0.2 m/s², at 25 Hz half of that."""
-    flat = {"gyroscope_bias": 0.0, "gyroscope_walk": 0.0}
+    flat: dict[str, Any] = {"gyroscope_bias": 0.0, "gyroscope_walk": 0.0}
     fast = imu_errors(boxes, 4000, step=0.01, accelerometer_noise=0.02, gyroscope_noise=0.001, **flat)
     slow = imu_errors(boxes, 4000, step=0.04, accelerometer_noise=0.02, gyroscope_noise=0.001, **flat)
     margin = 5 / math.sqrt(2 * 4000)
@@ -90,7 +90,7 @@ def test_imu_noise_scales_with_sampling_rate(boxes: Any) -> None:
 
 
 def test_imu_bias_is_constant_with_stated_deviation(boxes: Any) -> None:
-    without_noise = {"accelerometer_noise": 0.0, "gyroscope_noise": 0.0, "gyroscope_walk": 0.0}
+    without_noise: dict[str, Any] = {"accelerometer_noise": 0.0, "gyroscope_noise": 0.0, "gyroscope_walk": 0.0}
     runs = [
         imu_errors(boxes, 2, seed=s, accelerometer_bias=0.1, gyroscope_bias=0.01, **without_noise) for s in range(300)
     ]

@@ -69,7 +69,7 @@ def test_directions_continue_rotation_between_readings(boxes: Any) -> None:
 def test_intensity_is_reflectivity_times_cosine_times_attenuation(boxes: Any) -> None:
     view = ego_and(boxes, Car=(20.0, 0.0, 0.6))
     scene = boxes.scene(view, ground=True)
-    settings = {"range_noise": 0.0, "attenuation": 0.01, "weather": False}
+    settings: dict[str, Any] = {"range_noise": 0.0, "attenuation": 0.01, "weather": False}
     found = measure(boxes, scene, points_per_second=32 * 180 * 20, **settings)
     points = found.points + found.pose[:3, 3]
     distance = np.linalg.norm(found.points, axis=1)
@@ -202,7 +202,7 @@ def test_rotated_scene_returns_same_points(boxes: Any, angle: float) -> None:
     cos, sin = math.cos(angle), math.sin(angle)
     actors = {"Ego": (2.0, 1.0, 0.3), "A": (14.0, 3.0, 1.0), "B": (-9.0, 6.0, -0.4)}
     turned = {name: (cos * x - sin * y, sin * x + cos * y, yaw + angle) for name, (x, y, yaw) in actors.items()}
-    settings = {"channels": 16, "points_per_second": 16 * 120 * 20, "range_noise": 0.0}
+    settings: dict[str, Any] = {"channels": 16, "points_per_second": 16 * 120 * 20, "range_noise": 0.0}
     first = measure(boxes, boxes.scene(boxes.view(actors), ground=True), **settings)
     second = measure(boxes, boxes.scene(boxes.view(turned), ground=True), **settings)
     assert len(first.points) > 500
@@ -213,7 +213,7 @@ def test_rotated_scene_returns_same_points(boxes: Any, angle: float) -> None:
 def test_mirrored_scene_returns_mirrored_points(boxes: Any) -> None:
     actors = {"Ego": (0.0, 0.0, 0.0), "A": (14.0, 3.0, 1.0), "B": (-9.0, 6.0, -0.4)}
     mirrored = {name: (x, -y, -yaw) for name, (x, y, yaw) in actors.items()}
-    settings = {"channels": 16, "points_per_second": 16 * 120 * 20, "range_noise": 0.0}
+    settings: dict[str, Any] = {"channels": 16, "points_per_second": 16 * 120 * 20, "range_noise": 0.0}
     first = measure(boxes, boxes.scene(boxes.view(actors), ground=True), **settings)
     second = measure(boxes, boxes.scene(boxes.view(mirrored), ground=True), **settings)
 

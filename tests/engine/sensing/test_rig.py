@@ -84,7 +84,7 @@ def test_camera_pose_and_intrinsics(boxes: Any) -> None:
     np.testing.assert_allclose(reading.pose[:3, 3], [10, 22.5, 1.0], atol=1e-3)
     np.testing.assert_allclose(reading.intrinsics, [[400, 0, 400], [0, 400, 300], [0, 0, 1]])
     assert reading.rgb.shape == (600, 800, 3)
-    assert scene.images[0][1] == Pinhole(800, 600, pytest.approx(400.0), 400.0, 300.0)
+    assert scene.images[0][1] == Pinhole(800, 600, pytest.approx(400.0), 400.0, 300.0)  # type: ignore[arg-type]
 
 
 def test_positive_pitch_turns_camera_down(boxes: Any) -> None:

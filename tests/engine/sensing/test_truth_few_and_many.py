@@ -45,7 +45,7 @@ def test_is_occluded_by_small_along_face_equals_arrays() -> None:
 
 def stations(boxes: Any, view: WorldView) -> list[TruthSensor]:
     """Return sensors with different positions, fields of view and ranges."""
-    kinds = [
+    kinds: list[dict[str, Any]] = [
         {"field_of_view": 100.0, "mount": "front"},
         {"field_of_view": 360.0, "range": 30.0},
         {"field_of_view": 200.0, "mount": Mount(x=0.0, y=0.0, z=0.7, yaw=150.0)},
