@@ -1,7 +1,7 @@
-"""Entities that are defined outside of the scenario: ExternalObjectReferences, found in the road network where it can.
+"""External objects: entities that are defined outside of the scenario by an ExternalObjectReference.
 
-One that has the id or name of an object of the road network has that object's size, and stands where it stands unless
-the scenario puts it somewhere else.
+A reference with the id or name of an object of the road network has the size of that object, and its pose unless the
+scenario places the entity elsewhere.
 """
 
 from __future__ import annotations
@@ -17,37 +17,37 @@ from eidrive_scenario.world.specs import actor_spec
 
 
 class ExternalObjects:
-    """The entities of one scenario that are defined elsewhere."""
+    """External objects of one scenario."""
 
     def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
         self._scenario = scenario
-        self._found: Mapping[str, PlacedObject | None] = {
+        self._objects: Mapping[str, PlacedObject | None] = {
             name: _find(reference.name, roads) for name, reference in scenario.external.items()
         }
         self.warnings = tuple(
             Diagnostic(
-                f"entity {name!r} refers to the external object {scenario.external[name].name!r}, "
-                "of which nothing is known here: a box of half a meter stands for it",
-                "give it a Vehicle, Pedestrian or MiscObject",
+                f"entity {name!r} is represented by a box of 0.5 m: the external object "
+                f"{scenario.external[name].name!r} is unknown",
+                "define a Vehicle, Pedestrian or MiscObject",
                 scenario.external[name].source,
                 scenario.external[name].line,
             )
-            for name, found in self._found.items()
+            for name, found in self._objects.items()
             if found is None
         )
 
-    def places(self) -> Mapping[str, PlacedObject]:
-        """Those that the road network has, and how they stand there."""
-        return {name: found for name, found in self._found.items() if found is not None}
+    def in_road_network(self) -> Mapping[str, PlacedObject]:
+        """Return the external objects that are objects of the road network, by entity."""
+        return {name: found for name, found in self._objects.items() if found is not None}
 
     def body(self, name: str) -> ActorSpec | None:
-        """The body of one that the road network has; None for all others."""
-        found = self._found.get(name)
+        """Return the body of an entity that is an object of the road network; None for other entities."""
+        found = self._objects.get(name)
         if found is None:
             return None
-        usual = actor_spec(name, self._scenario.entities[name])
-        size = (found.length or usual.size[0], found.width or usual.size[1], found.height or usual.size[2])
-        return replace(usual, size=size, offset=(0.0, 0.0, size[2] / 2.0))
+        default = actor_spec(name, self._scenario.entities[name])
+        size = (found.length or default.size[0], found.width or default.size[1], found.height or default.size[2])
+        return replace(default, size=size, offset=(0.0, 0.0, size[2] / 2.0))
 
 
 def _find(name: str, roads: RoadNetwork | None) -> PlacedObject | None:

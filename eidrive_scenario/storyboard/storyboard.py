@@ -1,4 +1,4 @@
-"""The storyboard of one run: ticks the tree, moves what is scripted, and says what the world shall do."""
+"""Storyboard of one run: it ticks the tree, moves scripted actors and returns commands."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ COMPLETE = "storyboard complete"
 
 
 class Storyboard:
-    """The standard's storyboard over one scenario.
+    """Storyboard of one scenario.
 
-    Raises ScenarioError, with all findings at once, for what the scenario asks and nobody can execute.
+    Raise ScenarioError with all diagnostics if the scenario has elements that are not executable.
     """
 
     def __init__(
@@ -61,16 +61,16 @@ class Storyboard:
         )
         self.context.warnings += unassigned_controller_warnings(self.context.actors, controllers or {})
         self.ended: str | None = None
-        """Why the run is over, as far as the storyboard has a say; None while it goes on."""
+        """Reason for the end of the run by the storyboard; None while it continues."""
 
     @property
     def road_objects(self) -> frozenset[str]:
-        """The ids of the road network's objects that are entities of the scenario."""
-        return frozenset(placed.object.id for placed in self._external.places().values())
+        """Ids of the objects of the road network that are entities of the scenario."""
+        return frozenset(placed.object.id for placed in self._external.in_road_network().values())
 
     @property
     def changes(self) -> tuple[StateChange, ...]:
-        """What changed its state in the last tick."""
+        """State changes of the last tick."""
         return tuple(self.context.progress.changes)
 
     def check_accepts_external_poses(self, name: str) -> None:
@@ -81,17 +81,17 @@ class Storyboard:
             raise SettingError(Diagnostic(message, hint, "set_pose"))
 
     def initial(self) -> Commands:
-        """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
+        """Execute Init and return its commands, before the first view. Call once."""
         self.context.signals.advance(0.0)
         self.init.start()
-        for name, placed in self._external.places().items():
+        for name, placed in self._external.in_road_network().items():
             if not self.context.actors[name].present:
                 self.context.add_actor(name, ResolvedPosition(placed.pose))
-        self._bring_trailers()
+        self._add_trailers()
         for actor in self.context.actors.values():
             actor.motion.initialize()
-        self._refresh(self.context.commands)
-        return self._finished(self.context.commands)
+        self._update_spawns(self.context.commands)
+        return self._completed_commands(self.context.commands)
 
     def tick(
         self,
@@ -111,61 +111,61 @@ class Storyboard:
         if self.root.state is ElementState.COMPLETE and self.ended is None:
             self.ended = STOPPED if self.root.record.transitions[-1][1] is ElementTransition.STOP else COMPLETE
         commands = self.context.commands
-        trains = self._bring_trailers()
-        self._refresh(commands)
+        towed_pairs = self._add_trailers()
+        self._update_spawns(commands)
         for controller_model in self._controller_models:
             if controller_model.actor.present and not controller_model.actor.driven:
                 controller_model.step()
-        drawn = {back.name for _, back in trains}
+        towed = {back.name for _, back in towed_pairs}
         for name, actor in self.context.actors.items():
-            if not actor.present or name in drawn:
+            if not actor.present or name in towed:
                 continue
             if not actor.driven:
                 commands.placements[name] = actor.motion.step(self.dt)
             elif actor.motion.teleported:
                 commands.placements[name] = actor.motion.placement()
         _check_placements(commands.placements)
-        for front, back in trains:
+        for front, back in towed_pairs:
             if front.present and back.present:
                 back.motion.set_towed_state(pose_behind(front, back, straight=front.motion.teleported), front.motion)
                 commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.teleported)
-        passed_over = [name for name, look in self.context.appearances.items() if not look.visibility.traffic]
-        self.context.traffic.step(view.without(passed_over), self.dt, commands)
-        return self._finished(commands)
+        invisible = [name for name, appearance in self.context.appearances.items() if not appearance.visibility.traffic]
+        self.context.traffic.step(view.without(invisible), self.dt, commands)
+        return self._completed_commands(commands)
 
-    def _bring_trailers(self) -> list[tuple[Actor, Actor]]:
-        """Trailers enter with what draws them, in line; in Init they are put there wherever they were placed.
+    def _add_trailers(self) -> list[tuple[Actor, Actor]]:
+        """Add trailers with their towing vehicles, aligned; in Init they are moved there if they were placed elsewhere.
 
-        Who draws whom, from the front of each train to its end.
+        Return towing vehicles and trailers, from front to end of each train.
         """
-        trains = list(pairs(self.context.actors))
-        for front, back in trains:
+        towed_pairs = list(pairs(self.context.actors))
+        for front, back in towed_pairs:
             if front.present and (not back.present or self.context.view.tick < 0):
                 back.motion.set_speed(front.motion.speed)
                 self.context.add_actor(back.name, ResolvedPosition(pose_behind(front, back, straight=True)))
-        return trains
+        return towed_pairs
 
-    def _refresh(self, commands: Commands) -> None:
-        """Who enters has the speed that later actions of the same tick gave it."""
+    def _update_spawns(self, commands: Commands) -> None:
+        """Update the spawns of this tick, whose speeds later actions of the tick may have set."""
         for name in commands.spawns:
-            body = self._external.body(name)
-            if body is not None:
-                commands.actor_specs[name] = body
+            spec = self._external.body(name)
+            if spec is not None:
+                commands.actor_specs[name] = spec
             commands.spawns[name] = self.context.actors[name].motion.placement()
 
-    def _finished(self, commands: Commands) -> Commands:
+    def _completed_commands(self, commands: Commands) -> Commands:
         context = self.context
         driven = [name for name, actor in context.actors.items() if actor.present and actor.driven]
         commands.driven = frozenset(driven)
         commands.goals = {name: goal for name in driven if (goal := context.actors[name].goal) is not None}
-        commands.overrides = {name: dict(held) for name, held in context.overrides.items() if held}
+        commands.overrides = {name: dict(overrides) for name, overrides in context.overrides.items() if overrides}
         commands.signals, commands.appearances = context.signals.states, context.appearances
         commands.monitors = context.monitors
         return commands
 
 
 def _check_placements(placements: Mapping[str, Placement]) -> None:
-    """Raise SimulationError for the first placement that is not finite; pybullet would take it as it is."""
+    """Raise SimulationError for the first placement that is not finite, which pybullet does not check."""
     total = 0.0
     for place in placements.values():
         total += place.x + place.y + place.z + place.yaw + place.speed
@@ -173,7 +173,7 @@ def _check_placements(placements: Mapping[str, Placement]) -> None:
         return
     for name, placement in placements.items():
         if not all(map(math.isfinite, (placement.x, placement.y, placement.z, placement.yaw, placement.speed))):
-            raise SimulationError(f"actor {name!r} would be placed at {placement} (expected finite numbers)")
+            raise SimulationError(f"actor {name!r}: invalid placement (got {placement}; expected finite numbers)")
 
 
 def _empty_view() -> WorldView:

@@ -52,14 +52,14 @@ def test_action_with_deleted_entity_is_stopped_at_its_start(scene: RunScene, act
 def test_action_stops_when_its_reference_entity_is_deleted(scene: RunScene) -> None:
     played = scene(2, ("Ego", BESIDE_OTHER), ("Ego", DELETE, after(0.95)))
     assert transitions(played, "action 0") == [(0.0, "START"), (1.1, "STOP")]
-    assert next(c.why for c in played.changes if c.element == "action 0" and c.why) == "Other is not in the world"
+    assert next(c.why for c in played.changes if c.element == "action 0" and c.why) == "Other is absent"
 
 
 def test_action_with_absent_entity_warns_at_the_end(run: Run) -> None:
     others = {"Other": (-2, 150.0, 10.0)}
     played = run(2, ("Ego", DELETE, after(0.45)), ("Other", DRIVE_TO, after(0.95)), others=others, driven=False)
     (warning,) = [text for text in played.result.warnings if "AcquirePosition" in text]
-    assert "is not performed: Other is not in the world" in warning
+    assert "not executed, as Other is absent" in warning
 
 
 @pytest.mark.element("AddEntityAction", "DeleteEntityAction")
@@ -105,7 +105,7 @@ BACK = everywhere(
 def test_action_of_absent_entity_has_no_effect(scene: RunScene, action: str) -> None:
     played = scene(3, ("Ego", DELETE, after(0.45)), ("Other", action, after(0.95)), ("Ego", BACK, after(2.05)))
     assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]
-    assert next(c.why for c in played.changes if c.element == "action 1" and c.why) == "Other is not in the world"
+    assert next(c.why for c in played.changes if c.element == "action 1" and c.why) == "Other is absent"
     assert (played.at(2.2, "Other").x, played.at(2.2, "Other").y) == (300.0, -2.0)
     assert played.at(3.0, "Other").speed == 10.0
 

@@ -110,7 +110,7 @@ def test_closed_route_of_driven_vehicle_is_driven_in_laps(run: Run, relieved: bo
 
 
 def test_closed_route_without_a_path_back_is_rejected(run: Run) -> None:
-    with pytest.raises(ScenarioError, match="no way leads round the closed route 'round'"):
+    with pytest.raises(ScenarioError, match="closed route 'round' is not drivable"):
         played(run, 1.0, assign("true", (1, 70.0), (3, 30.0)), driven=False)
 
 

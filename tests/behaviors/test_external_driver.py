@@ -79,5 +79,5 @@ def test_controller_model_for_unknown_controller_warns(simulation: Simulation) -
     simulation.close()
     with Simulation(scenario, settings=RunSettings(controllers={"joystik": "external"})) as other:
         (warning,) = map(str, other.storyboard.context.warnings)
-    assert "'joystick' of Ego is not known" in warning
-    assert "the stand-in for 'joystik' found no controller of that name" in warning
+    assert "its controller 'joystick' is not executed" in warning
+    assert "no controller is named 'joystik'" in warning

@@ -176,7 +176,7 @@ def test_selection_as_reference_requires_a_single_member(group: Run) -> None:
         '<LongitudinalAction><LongitudinalDistanceAction entityRef="{}" freespace="false" continuous="false" '
         'distance="30"/></LongitudinalAction>'
     )
-    with pytest.raises(InputError, match="names the selection 'slow' of 2 entities"):
+    with pytest.raises(InputError, match="refers to selection 'slow'; got a selection of 2 entities"):
         group(1, ("Ego", follow.format("slow")))
     alone = '<EntitySelection name="one"><Members><EntityRef entityRef="Second"/></Members></EntitySelection>'
     assert group(8, ("Ego", follow.format("one")), more=alone).result.end_reason == "stop trigger"
@@ -214,7 +214,7 @@ def test_unknown_external_object_is_a_box_with_a_warning(run: Run) -> None:
     assert "Thing" not in played.frames[0].view
     view = played.frames[-1].view
     assert view.size[view.row("Thing")].tolist() == [0.5, 0.5, 0.5]
-    assert "'elsewhere', of which nothing is known here" in played.result.warnings[0]
+    assert "external object 'elsewhere' is unknown" in played.result.warnings[0]
 
 
 def test_selection_by_type_includes_external_objects(run: Run) -> None:

@@ -86,7 +86,7 @@ def test_trailer_of_itself_is_rejected(run: Run) -> None:
     with pytest.raises(InputError) as caught:
         run(1, driven=False, more=train, globally=everywhere(PLACE.format("Front", 200)))
     messages = [diagnostic.message for diagnostic in caught.value.diagnostics]
-    assert messages == ["'A' is a trailer of itself", "'B' is a trailer of itself"]
+    assert messages == ["entity 'A' is its own trailer", "entity 'B' is its own trailer"]
 
 
 def test_trailer_of_two_vehicles_follows_the_first(run: Run) -> None:

@@ -39,7 +39,7 @@ def test_actor_listed_twice_acts_once(run: Run, actors: tuple[str, str]) -> None
 
 def test_missing_trajectory_is_rejected_with_its_line(run: Run) -> None:
     with pytest.raises(
-        InputError, match=r"scene\.xosc:\d+: FollowTrajectoryAction has no Trajectory; give it in place"
+        InputError, match=r"scene\.xosc:\d+: FollowTrajectoryAction: Trajectory is missing; define it in place"
     ):
         run(1, ("Ego", private(FOLLOW.format(trajectory=""))), driven=False)
 
@@ -75,7 +75,7 @@ ON_ROUTE = """<TeleportAction><Position><RoutePosition><RouteRef><Route name="wa
 
 
 def test_route_position_in_missing_lane_is_rejected_with_its_line(run: Run) -> None:
-    message = r"scene\.xosc:\d+: RoutePosition means no place: road '1' has no lane 7 at s = 150"
+    message = r"scene\.xosc:\d+: RoutePosition: not resolvable: road '1' has no lane 7 at s = 150"
     with pytest.raises(InputError, match=message):
         run(1, ("Ego", private(ON_ROUTE)), driven=False)
 

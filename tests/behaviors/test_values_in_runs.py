@@ -47,7 +47,9 @@ def test_user_defined_value_starts_an_event(run: Run) -> None:
 
     alone = run(1, ("Ego", NOTHING, condition))
     assert alone.begun("event 0") == []
-    assert any("nobody gave the user-defined value 'signal strength'" in warning for warning in alone.result.warnings)
+    assert any(
+        "UserDefinedValueCondition 'signal strength' is never fulfilled" in warning for warning in alone.result.warnings
+    )
     assert run(1, ("Ego", NOTHING, condition), during=during).begun("event 0") == pytest.approx([0.55])
     given = RunSettings(dt=0.05, user_values={"signal strength": "4"})
     answered = run(1, ("Ego", NOTHING, condition), settings=given)

@@ -87,7 +87,7 @@ def test_without_a_stand_in_an_unknown_controller_leaves_lane_and_speed(name: st
     with Simulation(scenario, settings=RunSettings(dt=0.1)) as simulation:
         frames = [simulation.tick()[0] for _ in range(100)]
         warnings = [str(warning) for warning in simulation.storyboard.context.warnings]
-    assert any("of Ego is not known: Ego keeps lane and speed" in warning for warning in warnings)
+    assert any("actor 'Ego' keeps lane and speed" in warning for warning in warnings)
     row = frames[0].view.row("Ego")
     speeds = {round(float(frame.view.speed[row]), 6) for frame in frames[1:12]}
     assert len(speeds) == 1

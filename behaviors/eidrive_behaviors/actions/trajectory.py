@@ -118,7 +118,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         offset = self.action.initial_distance_offset or 0.0
         return offset if self._layout.closed else min(offset, self._layout.length)
 
-    def settle(self) -> None:
+    def finish_init(self) -> None:
         """Complete the start in Init: speed, and position set by another action, are known."""
         placed_here = self._put is not None and self.actor.motion.pose == self._put
         self._update_heading()

@@ -158,7 +158,7 @@ def _history(leaf: WaitForTrigger | None) -> TriggerHistory | None:
     """Return the history of a trigger. All explanations of a trigger share one history."""
     if leaf is None:
         return None
-    existing = leaf.trigger.witness
+    existing = leaf.trigger.observer
     return existing if isinstance(existing, TriggerHistory) else TriggerHistory(leaf.trigger)
 
 

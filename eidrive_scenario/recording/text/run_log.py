@@ -11,7 +11,7 @@ from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_link
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
-from eidrive_scenario.storyboard.tree.elements import EMPTY
+from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
 
 STANDARD_OUTPUT = "-"
 _KINDS = {"maneuverGroup": "maneuver group"}
@@ -77,4 +77,4 @@ def describe_change(change: StateChange) -> str:
     verb = _VERBS[change.transition]
     if change.transition is ElementTransition.END and change.after is ElementState.STANDBY:
         verb = "ends and returns to standbyState"
-    return f"{verb}: {change.why}" if change.why and change.why != EMPTY else verb
+    return f"{verb}: {change.why}" if change.why and change.why != NO_TRIGGER else verb

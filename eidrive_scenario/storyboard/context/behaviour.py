@@ -1,4 +1,4 @@
-"""The seam of actions: an ActionBehaviour does one action of the standard for one actor."""
+"""Interface of actions: an ActionBehaviour executes one action of the standard for one actor."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ MOTION = Domain.LONGITUDINAL | Domain.LATERAL
 
 
 class ActionBehaviour(py_trees.behaviour.Behaviour):
-    """One action for one actor (none for global actions).
+    """Base class of actions, for one actor (none for global actions).
 
-    Configured in the constructor, which raises ScenarioError for what cannot be done; reset in `initialise`, which
-    runs when the action starts; one decision for the step of `context.dt` seconds in `update`, which answers SUCCESS in
-    the step that brings the action to its goal: it ends at the end of that step. In Init the step is 0 s long.
+    - The constructor configures the action. It raises ScenarioError if the action is not executable.
+    - `initialise` resets the action when it starts.
+    - `update` decides on one step of `context.dt` [s]. It returns SUCCESS in the step that reaches the goal: the action
+      ends at the end of that step. In Init the step is 0 s long.
     """
 
     third_party: ClassVar[bool] = False
-    """Whether it is no part of this project: what it decides is then checked."""
+    """Whether it is a third-party action, whose results are checked."""
     domains: ClassVar[Domain] = Domain.NONE
     immediate: ClassVar[bool] = False
-    """True for an action that moves nothing, as it sets a value: it acts as soon as it starts, and it ends at the
-    instant at which `update` answers SUCCESS."""
+    """True for an action that sets a value and moves nothing: it is executed when it starts, and it ends at the instant
+    at which `update` returns SUCCESS."""
 
     def __init_subclass__(cls, **named: Any) -> None:
         super().__init_subclass__(**named)
@@ -51,44 +52,44 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         self.context = context
         self.actor_name = actor
         self.parent_element = parent
-        """The element around the action, where attributes of older or shared types stand (EntityAction)."""
+        """Parent element of the action, which has attributes of older or shared types (EntityAction)."""
 
     @property
     def controls(self) -> Domain:
-        """The domains of this action as it is configured."""
+        """Domains that this action controls as it is configured."""
         return self.domains
 
     @property
     def at_once(self) -> bool:
-        """Whether it is over as soon as it has started, so that it may stand beside an action that lasts."""
+        """Whether it ends at its start, and thus does not conflict with an action that takes time."""
         return False
 
     @property
     def is_actor_missing(self) -> bool:
-        """Whether it would move an actor that is not in the world."""
+        """Whether it moves an actor that is absent."""
         return bool(self.controls & MOTION) and self.actor_name is not None and not self.actor.present
 
     @property
     def resource(self) -> str:
-        """What of a domain it controls, where not all of it: the name of a light. Others do not get in its way."""
+        """Part of a domain that it controls, such as the name of a light; empty for the whole domain."""
         return ""
 
     @property
     def actor(self) -> Actor:
-        """The actor that the action is about."""
+        """Actor of the action. Raise ScenarioError without one."""
         if self.actor_name is None:
-            raise self.error("has no actor", "put it into a ManeuverGroup with Actors")
+            raise self.error("has no actor", "add it to a ManeuverGroup with Actors")
         return self.context.actors[self.actor_name]
 
-    def settle(self) -> None:
-        """Finish the start in Init, once all its actions have started: places and speeds are known."""
+    def finish_init(self) -> None:
+        """Finish the start in Init after all actions of Init have started: positions and speeds are known."""
 
     @abstractmethod
     def update(self) -> Status:
-        """Decide on the step that begins now."""
+        """Decide on the current step."""
 
     def tick_once(self) -> None:
-        """Tick as py_trees does; while the action runs, without a generator, as that happens in every step of a run."""
+        """Tick as py_trees does. A running action is updated without a generator, as this happens in every step."""
         if self.status is not Status.RUNNING or self.third_party:
             super().tick_once()
             return
@@ -99,32 +100,32 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         self.status = new
 
     def describe(self) -> str:
-        """The action in words."""
+        """Describe the action."""
         return type(self.action).__name__
 
-    def abort(self, who: EntityAbsentError) -> str:
-        """Stop, as somebody whom the action is about is not in the world; why, in words. The run warns of it."""
+    def abort(self, absent: EntityAbsentError) -> str:
+        """Stop the action, as an entity that it requires is absent. Add a warning and return the reason."""
         self.stop(Status.INVALID)
-        why = f"{who} is not in the world"
-        self.context.warn(*self.error(f"is not performed: {why}", "let it wait for the entity").diagnostics)
+        why = f"{absent} is absent"
+        self.context.warn(*self.error(f"not executed, as {why}", "start it after the entity is added").diagnostics)
         return why
 
     def check_decision(self) -> None:
-        """Raise InvalidResult if `update` returned no status, or left its actor with numbers that are not finite."""
+        """Raise InvalidResult if `update` returned no status, or set values of its actor that are not finite."""
         if self.status is Status.INVALID:
             raise InvalidResult(self, "update", "returned no Status (expected RUNNING, SUCCESS or FAILURE)")
         names = self.context.actors if self.actor_name is None else (self.actor_name,)
         for actor in [self.context.actors[name] for name in names if name in self.context.actors]:
-            left: dict[str, object] = {"motion.pose": actor.motion.pose, "motion.speed": actor.motion.speed}
+            values: dict[str, object] = {"motion.pose": actor.motion.pose, "motion.speed": actor.motion.speed}
             if actor.goal is not None:
-                left |= {f"goal.{name}": value for name, value in vars(actor.goal).items() if value is not None}
-            for name, value in left.items():
+                values |= {f"goal.{name}": value for name, value in vars(actor.goal).items() if value is not None}
+            for name, value in values.items():
                 if not _is_finite(value):
                     text = f"left actor {actor.name!r} with {name} = {value!r} (expected finite numbers)"
                     raise InvalidResult(self, "update", text)
 
     def error(self, message: str, hint: str = "") -> ScenarioError:
-        """An error at the place of this action in the file."""
+        """Return an error with file and line of this action."""
         where = self.action
         return ScenarioError(Diagnostic(f"{type(where).__name__}: {message}", hint, where.source, where.line))
 

@@ -1,4 +1,4 @@
-"""The seam of conditions: a Condition is a predicate over the stage, true or false at one instant."""
+"""Interface of conditions: a Condition is a predicate over the state of the run at one instant."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.tolerances import EPSILON
 
-WORDS = {
+SYMBOLS = {
     "greaterThan": ">",
     "greaterOrEqual": "≥",
     "lessThan": "<",
@@ -24,11 +24,11 @@ WORDS = {
 }
 
 COMPLEMENTS = {">": "≤", "≥": "<", "<": "≥", "≤": ">", "=": "≠", "≠": "="}
-"""By sign, the one that holds where it does not."""
+"""Complementary relation by relation."""
 
 
 def satisfies_rule(value: float, rule: model.Rule, limit: float) -> bool:
-    """`value` against `limit` by a Rule of the standard; NaN compares to nothing."""
+    """Compare `value` with `limit` by a Rule of the standard; NaN fulfills no rule."""
     if value != value:
         return False
     match rule.value:
@@ -48,18 +48,18 @@ def satisfies_rule(value: float, rule: model.Rule, limit: float) -> bool:
 
 
 def describe_rule(rule: model.Rule) -> str:
-    """A Rule as the sign that one would write."""
-    return WORDS[rule.value]
+    """Return the symbol of a Rule."""
+    return SYMBOLS[rule.value]
 
 
 def relation(rule: model.Rule, holds: bool) -> str:
-    """Return the sign that holds between a value and its limit: that of the rule, or its complement."""
-    sign = WORDS[rule.value]
+    """Return the symbol of the relation between a value and its limit: that of the rule, or its complement."""
+    sign = SYMBOLS[rule.value]
     return sign if holds else COMPLEMENTS[sign]
 
 
 class Measure(NamedTuple):
-    """What a condition compares at one instant; `of` is the entity, "" where it is about none."""
+    """Quantity that a condition compares at one instant; `of` is the entity, empty without one."""
 
     of: str
     value: float
@@ -69,32 +69,32 @@ class Measure(NamedTuple):
 
 
 class Condition(ABC):
-    """A predicate over the stage. Edges and delays are the Trigger's, not its own."""
+    """Predicate over the state of the run. Edges and delays belong to the trigger."""
 
     instant: ClassVar[bool] = False
-    """True where what it looks at can change at one instant, as elements start and end and actions set values: it is
-    then asked again after such a change. All others are asked once per tick."""
+    """True if its value can change within a tick, as states of elements and values that actions set do. It is then
+    evaluated again after such a change. Other conditions are evaluated once per tick."""
 
     def __init__(self, element: model.Element) -> None:
         self.element = element
 
-    def bind(self, context: ConditionContext) -> None:  # noqa: B027 - most refer to nothing
-        """Look up what the element refers to, once, before the first tick. Raises ScenarioError."""
+    def bind(self, context: ConditionContext) -> None:  # noqa: B027 - most conditions have no references
+        """Resolve references of the element, once before the first tick. Raise ScenarioError if one is unknown."""
 
     @abstractmethod
     def holds(self, context: ConditionContext) -> bool:
-        """True where the condition holds now."""
+        """Whether the condition is fulfilled now."""
 
     @abstractmethod
     def explain(self, context: ConditionContext) -> str:
-        """The condition in words, with the values of now."""
+        """Describe the condition with its current values."""
 
     def describe(self) -> str:
-        """The condition in words, without values."""
+        """Describe the condition without values."""
         return type(self.element).__name__
 
     def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
-        """The quantities that it compares now, if it compares any."""
+        """Return the quantities that it compares now."""
         return ()
 
 
@@ -106,18 +106,15 @@ def truth(condition: Condition, held: object) -> bool:
 
 
 class EntityCondition(Condition):
-    """A condition on each of several triggering entities, joined by `any` or `all`.
-
-    An entity that is not in the world fulfils nothing.
-    """
+    """Condition on triggering entities, combined by `any` or `all`. An absent entity does not fulfill it."""
 
     unit: ClassVar[str] = ""
-    """Of the quantity that it compares."""
+    """Unit of the quantity that it compares."""
     third_party: ClassVar[bool] = False
-    """Whether it is no part of this project: what it returns for each entity is then checked."""
+    """Whether it is a third-party condition, whose results are checked."""
 
-    def __init_subclass__(cls, **named: Any) -> None:
-        super().__init_subclass__(**named)
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
         cls.third_party = not is_built_in(cls)
 
     def __init__(self, element: model.Element, entities: Sequence[str], rule: str = "any") -> None:
@@ -125,10 +122,10 @@ class EntityCondition(Condition):
         self.entities = tuple(entities)
         self.rule = rule
         self.fulfilled: tuple[str, ...] = ()
-        """The entities that fulfilled it when it was last asked."""
+        """Entities that fulfilled it at the last evaluation."""
 
     def holds(self, context: ConditionContext) -> bool:
-        """The rule over the entities; every one of them is asked each time, so that their histories stay whole."""
+        """Evaluate all entities and combine them by the rule; each is evaluated so that histories are complete."""
         holds_for, view = self._checked_holds_for if self.third_party else self.holds_for, context.view
         self.fulfilled = tuple([name for name in self.entities if name in view and holds_for(context, name)])
         return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
@@ -138,54 +135,54 @@ class EntityCondition(Condition):
         return held if held is True or held is False else truth(self, held)
 
     def explain(self, context: ConditionContext) -> str:
-        """What is true of those that fulfill it, or of all."""
+        """Describe the values of the entities that fulfill it; without one, of all entities."""
         names = self.fulfilled or self.entities
         return ", ".join(
-            self.explain_for(context, name) if name in context.view else f"{name} is not in the world" for name in names
+            self.explain_for(context, name) if name in context.view else f"{name} is absent" for name in names
         )
 
     def describe(self) -> str:
-        """Whom it is about, and what."""
-        joined = f" {'and' if self.rule == 'all' else 'or'} ".join(self.entities)
-        return f"{joined}: {self.describe_for()}"
+        """Describe entities and condition."""
+        names = f" {'and' if self.rule == 'all' else 'or'} ".join(self.entities)
+        return f"{names}: {self.describe_for()}"
 
     def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
-        """The quantity of each entity that is in the world."""
+        """Return the quantities of the present entities."""
         found = [(name, self.quantity(context, name)) for name in self.entities if name in context.view]
         return tuple(Measure(name, value, *self.threshold(), self.unit) for name, value in found if value is not None)
 
     def quantity(self, context: ConditionContext, entity: str) -> float | None:
-        """What it compares for this entity, which is in the world; NaN where that is undefined now, None if nothing."""
+        """Return the compared quantity of a present entity; NaN if it is undefined now, None without a quantity."""
         return None
 
     def threshold(self) -> tuple[model.Rule, float]:
-        """How the quantity is compared, and with what."""
+        """Return the rule and the limit of the comparison."""
         element: Any = self.element
         return element.rule, element.value
 
     @abstractmethod
     def holds_for(self, context: ConditionContext, entity: str) -> bool:
-        """True where the condition holds for this entity, which is in the world."""
+        """Whether a present entity fulfills the condition."""
 
     @abstractmethod
     def explain_for(self, context: ConditionContext, entity: str) -> str:
-        """The condition in words for this entity, with the values of now."""
+        """Describe the condition for an entity with its current values."""
 
     def describe_for(self) -> str:
-        """The condition in words, without values."""
+        """Describe the condition without values and entities."""
         return type(self.element).__name__
 
 
 class QuantityCondition(EntityCondition):
-    """A condition that compares a quantity of each entity with a limit."""
+    """Condition that compares a quantity of each entity with a limit."""
 
     def holds_for(self, context: ConditionContext, entity: str) -> bool:
-        """Compare it."""
+        """Compare the quantity with the limit."""
         rule, limit = self.threshold()
         return satisfies_rule(self.quantity(context, entity), rule, limit)
 
     def explain_for(self, context: ConditionContext, entity: str) -> str:
-        """The quantity, the limit, and how they compare; on a falling edge that is not what the rule asks for."""
+        """Describe quantity, limit and their relation, which is the complement of the rule on a falling edge."""
         rule, limit = self.threshold()
         quantity = self.quantity(context, entity)
         if quantity != quantity:
@@ -194,14 +191,14 @@ class QuantityCondition(EntityCondition):
         return f"{entity}: {self.what()} {quantity:.2f} {self.unit} {sign} {limit:g} {self.unit}"
 
     def describe_for(self) -> str:
-        """The quantity by its name, the rule and the limit."""
+        """Describe the name of the quantity, the rule and the limit."""
         rule, limit = self.threshold()
         return f"{self.what()} {describe_rule(rule)} {limit:g} {self.unit}"
 
     def what(self) -> str:
-        """What the quantity is called."""
+        """Return the name of the quantity."""
         return type(self.element).__name__
 
     @abstractmethod
     def quantity(self, context: ConditionContext, entity: str) -> float:
-        """What it compares for this entity, which is in the world; NaN where that is undefined now."""
+        """Return the compared quantity of a present entity; NaN if it is undefined now."""

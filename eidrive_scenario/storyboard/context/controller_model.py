@@ -1,4 +1,4 @@
-"""The seam of stand-ins: who drives a scripted actor in place of a controller of another tool."""
+"""Interface of controller models, which replace controllers of other tools."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from eidrive_scenario.storyboard.kinematics.actor import Actor, is_agent_control
 
 
 class ControllerModel(ABC):
-    """Plays the longitudinal part of a Controller that names no module of ours, where the caller asks for it.
+    """Longitudinal model of a Controller without the property `module=eidrive`, assigned by the caller.
 
-    It decides while the controller is active in the longitudinal domain; speed actions of that time set the speed that
-    it aims at.
+    It sets the speed of its actor while the controller is active in the longitudinal domain. Speed actions of that time
+    set its desired speed.
     """
 
     accepts_external_poses: ClassVar[bool] = False
-    """True for one that moves the actor to poses from outside (`Simulation.set_pose`)."""
+    """Whether it moves the actor to poses from outside (`Simulation.set_pose`)."""
 
     def __init__(self, controller: model.Controller, context: ControllerContext, actor: Actor) -> None:
         properties = controller.properties.property if controller.properties is not None else ()
@@ -32,7 +32,7 @@ class ControllerModel(ABC):
         self._active = False
 
     def step(self) -> None:
-        """Set the actor's speed for the step that begins now, if it is for the controller to decide."""
+        """Set the speed of the actor in the current step, if the controller is active."""
         if not self.actor.longitudinal:
             self._active = False
             return
@@ -41,54 +41,55 @@ class ControllerModel(ABC):
             self.on_activate()
         speed = self.compute_speed()
         if not isinstance(speed, SupportsFloat) or not math.isfinite(speed):
-            raise InvalidResult(self, "speed", f"returned {speed!r} (expected a finite number)")
+            raise InvalidResult(self, "compute_speed", f"returned {speed!r} (expected a finite number)")
         self.actor.motion.set_speed(speed)
 
     @abstractmethod
     def on_activate(self) -> None:
-        """The controller has just been activated."""
+        """Prepare the model when the controller is activated."""
 
     @abstractmethod
     def compute_speed(self) -> float:
-        """The speed of the step that begins now [m/s]."""
+        """Return the speed in the current step [m/s]."""
 
 
 def build_controller_models(
-    actors: Mapping[str, Actor], context: ControllerContext, wanted: Mapping[str, str], known: Registry
+    actors: Mapping[str, Actor], context: ControllerContext, assignments: Mapping[str, str], known: Registry
 ) -> list[ControllerModel]:
-    """One per actor whose controller's name is `wanted`; the values name stand-ins.
+    """Build one model per actor whose controller is a key of `assignments`; the values are registered names.
 
-    Raises SettingError for a stand-in that nobody registers, RegistryError for one that is none.
+    Raise SettingError if a model is not registered, RegistryError if it is not a ControllerModel.
     """
-    found = []
-    kinds = {name: known.load(controller_model, ControllerModel) for name, controller_model in wanted.items()}
+    built = []
+    models = {name: known.load(controller_model, ControllerModel) for name, controller_model in assignments.items()}
     for actor in actors.values():
         for controller in actor.controllers:
-            if controller.name in kinds:
-                made = construct(kinds[controller.name], controller, context, actor)
-                if not isinstance(made, ControllerModel):
-                    raise RegistryError(f"controllers {wanted[controller.name]!r} is not a subclass of ControllerModel")
-                found.append(made)
-    return found
+            if controller.name in models:
+                instance = construct(models[controller.name], controller, context, actor)
+                if not isinstance(instance, ControllerModel):
+                    name = assignments[controller.name]
+                    raise RegistryError(f"controllers {name!r} is not a subclass of ControllerModel")
+                built.append(instance)
+    return built
 
 
-def unassigned_controller_warnings(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[Diagnostic]:
-    """Warnings of controllers that name no module of ours and for which nothing stands in."""
+def unassigned_controller_warnings(actors: Mapping[str, Actor], assignments: Mapping[str, str]) -> list[Diagnostic]:
+    """Return warnings of controllers of other tools without a model, and of assignments without effect."""
     names = {controller.name for actor in actors.values() for controller in actor.controllers}
-    astray = sorted(name for name in wanted if name not in names)
-    hint = "give it the property module=eidrive, or let something stand in for it"
-    if astray:
-        hint += f"; the stand-in for {', '.join(map(repr, astray))} found no controller of that name"
-    alone = [
+    unmatched = sorted(name for name in assignments if name not in names)
+    hint = "add the property module=eidrive, or assign a controller model (--controller NAME=MODEL)"
+    if unmatched:
+        hint += f"; no controller is named {' or '.join(map(repr, unmatched))}"
+    unassigned = [
         Diagnostic(
-            f"the controller {controller.name!r} of {actor.name} is not known: {actor.name} keeps lane and speed",
+            f"actor {actor.name!r} keeps lane and speed: its controller {controller.name!r} is not executed",
             hint,
             controller.source,
             controller.line,
         )
         for actor in actors.values()
         for controller in actor.controllers
-        if not is_agent_controller(controller) and controller.name not in wanted
+        if not is_agent_controller(controller) and controller.name not in assignments
     ]
     ours = {
         controller.name
@@ -96,11 +97,16 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], wanted: Mapping[
         for controller in actor.controllers
         if is_agent_controller(controller)
     }
-    odd = [
-        Diagnostic(f"nothing stands in for {name!r}, which is a controller of ours") for name in wanted if name in ours
+    diagnostics = [
+        Diagnostic(
+            f"--controller: controller {name!r} belongs to a station",
+            "got a controller with module=eidrive; expected a controller of another tool",
+        )
+        for name in assignments
+        if name in ours
     ]
-    if not alone:
+    if not unassigned:
         known = names - ours
-        message = "the stand-in for {!r} found no controller of that name"
-        odd += [Diagnostic(message.format(name), suggestion(name, known)) for name in astray]
-    return [*odd, *alone]
+        message = "--controller: no controller is named {!r}"
+        diagnostics += [Diagnostic(message.format(name), suggestion(name, known)) for name in unmatched]
+    return [*diagnostics, *unassigned]

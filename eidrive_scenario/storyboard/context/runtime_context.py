@@ -1,4 +1,4 @@
-"""The stage: all that an action or a condition may see, and the commands to which actions write."""
+"""State of the storyboard at run time, which conditions read and actions request changes of."""
 
 from __future__ import annotations
 
@@ -26,18 +26,20 @@ from eidrive_scenario.world.view import WorldView
 
 
 class RuntimeContext:
-    """What actions and conditions see of the run at one instant.
+    """State of the run at one instant; implements the contexts in `protocols`.
 
-    view        the truth at this tick; before the first view (Init) it holds nobody
-    dt          length of the step that begins now [s]; 0 in Init
-    parameters, variables  by name, as text
-    monitors    by name
-    signals     the traffic signals and their controllers
-    appearances  of those actors that differ from the usual
-    environment  time of day, weather and road
-    traffic     background traffic
-    warnings    what is odd about the scenario and yet can be done
-    commands    to write to
+    The other members are for the storyboard and its tree: element states, holders of control domains, pending actions.
+
+    view         ground truth of this tick; it has no actors before the first view (Init)
+    dt           length of the current step [s]; 0 in Init
+    parameters, variables  values by name, as text
+    monitors     values by name
+    signals      traffic signals and their controllers
+    appearances  appearances of the actors that differ from the default
+    environment  time of day, weather and road condition
+    traffic      background traffic
+    warnings     warnings of the scenario
+    commands     commands of this tick
     """
 
     def __init__(
@@ -46,7 +48,7 @@ class RuntimeContext:
         self.scenario = scenario
         self.roads = roads
         self.step = dt
-        """The step of the run [s]."""
+        """Time step of the run [s]."""
         self.dt = 0.0
         self.seed = seed
         self.view = empty_view
@@ -57,9 +59,9 @@ class RuntimeContext:
         network = scenario.document.road_network
         self.signals = Signals(network.traffic_signals if network is not None else None, roads)
         self.warnings += self.signals.warnings
-        declared = scenario.document.monitor_declarations
+        declarations = scenario.document.monitor_declarations
         self.monitors: Mapping[str, bool] = (
-            {one.name: one.value for one in declared.monitor_declaration} if declared is not None else {}
+            {one.name: one.value for one in declarations.monitor_declaration} if declarations is not None else {}
         )
         self.appearances: Mapping[str, Appearance] = {}
         self.overrides: dict[str, dict[str, Override]] = {}
@@ -69,7 +71,7 @@ class RuntimeContext:
         self.external_poses: dict[str, ExternalPose] = {}
         """Poses that were set from outside and not applied so far, by entity."""
         self.requested_user_values: dict[str, model.Element] = {}
-        """The names of such values, and the first condition that asks for each."""
+        """First condition that requests each user-defined value, by the name of the value."""
         self.commands = Commands()
         self.actors: dict[str, Actor] = {
             name: Actor(name, entity, scenario.controllers.get(name, ()), roads)
@@ -83,9 +85,9 @@ class RuntimeContext:
             must_stop=self.signals.must_stop,
         )
         self.completes_this_step = False
-        """Whether the step that goes on brings an action to its goal."""
+        """Whether an action reaches its goal in the current step."""
         self.pending_actions: list[PendingAction] = []
-        """Whose actions have started at this instant for somebody who is not in the world so far."""
+        """Elements with actions that have started at this instant for an absent entity."""
         self.position_cache = PositionCache()
         self._holders: list[tuple[str, Domain, PreemptableAction, DomainHolder]] = []
 
@@ -117,28 +119,28 @@ class RuntimeContext:
                     actor.update_off_road(self.roads, view)
 
     def pose(self, name: str) -> Pose:
-        """Where an actor is now. Raises Absent if it is not in the world."""
-        return self._there(name).motion.pose
+        """Return the current pose of an actor. Raise EntityAbsentError if it is absent."""
+        return self._present_actor(name).motion.pose
 
     def location(self, name: str) -> LaneLocation | None:
-        """Its place on the road: the lane below it, None where no road is near. Raises Absent."""
-        actor = self._there(name)
+        """Return the lane location of an actor, None without a road nearby. Raise EntityAbsentError if it is absent."""
+        actor = self._present_actor(name)
         return None if self.roads is None else actor.location(self.roads, self.view.tick)
 
-    def _there(self, name: str) -> Actor:
-        """An actor in the world; whom an action deletes is there until the end of the step."""
+    def _present_actor(self, name: str) -> Actor:
+        """Return a present actor; an actor that is removed in this step is present until the end of the step."""
         actor = self.actors[name]
         if not actor.present and name not in self.view:
             raise EntityAbsentError(name)
         return actor
 
     def speed(self, name: str) -> float:
-        """Speed along the heading in this view [m/s]; of what was just placed, the speed that it was given."""
+        """Return the speed along the heading in this view [m/s]; of an actor outside of the view, its set speed."""
         row = self.view.rows.get(name)
         return self.view.states[row].speed if row is not None else self.actors[name].motion.speed
 
     def _center(self, name: str) -> CentralObject | None:
-        """Where an entity is and moves, for the traffic around it; None while it is not in the world."""
+        """Return pose and speed of an entity for the traffic around it; None while it is absent."""
         actor = self.actors.get(name)
         if actor is None or not actor.present:
             return None
@@ -150,7 +152,7 @@ class RuntimeContext:
         return CentralObject(state.x, state.y, state.yaw, state.speed)
 
     def add_actor(self, name: str, place: ResolvedPosition) -> None:
-        """Put an actor at a place; it enters the world if it was not there."""
+        """Teleport an actor to a position; an absent actor enters the world."""
         actor = self.actors[name]
         actor.motion.teleport(place)
         actor.invalidate_location()
@@ -159,33 +161,33 @@ class RuntimeContext:
             self.commands.spawns[name] = actor.motion.placement()
 
     def remove_actor(self, name: str) -> None:
-        """Take an actor out of the world; what it was doing ends."""
+        """Remove an actor from the world and end the actions that control it."""
         actor = self.actors[name]
         if actor.present:
             actor.present = False
             if self.commands.spawns.pop(name, None) is None:
                 self.commands.removals.add(name)
-        for held, _, occupant, holder in list(self._holders):
-            if held == name:
-                occupant.preempt(holder, f"{name} left the world")
+        for holder_actor, _, occupant, holder in list(self._holders):
+            if holder_actor == name:
+                occupant.preempt(holder, f"{name} is removed")
                 self.release_domains(holder)
 
     def catalog_entry(self, reference: model.CatalogReference | None, kind: type[E], within: model.Element) -> E:
-        """The entry that a catalog reference `within` an element means, with its parameters.
+        """Return the catalog entry that `within` refers to, with its parameters.
 
-        Raises ScenarioError if it is no `kind`, or if there is none.
+        Raise ScenarioError if it is missing or not of type `kind`.
         """
         if reference is None:
-            message = f"{type(within).__name__} has no {kind.__name__}"
+            message = f"{type(within).__name__}: {kind.__name__} is missing"
             raise ScenarioError(
-                Diagnostic(message, "give it in place or by a CatalogReference", within.source, within.line)
+                Diagnostic(message, "define it in place or by a CatalogReference", within.source, within.line)
             )
         entry = self.scenario.resolved(reference)
         if not isinstance(entry, kind):
             raise ScenarioError(
                 Diagnostic(
-                    f"{reference.catalog_name}/{reference.entry_name} is a {type(entry).__name__}",
-                    f"a {kind.__name__} belongs here",
+                    f"CatalogReference {reference.catalog_name}/{reference.entry_name} has the wrong type",
+                    f"got {type(entry).__name__}; expected {kind.__name__}",
                     reference.source,
                     reference.line,
                 )
@@ -267,29 +269,29 @@ class RuntimeContext:
             held.pop(override.control, None)
 
     def appearance(self, name: str) -> Appearance:
-        """How an actor looks."""
+        """Return the appearance of an actor."""
         return self.appearances.get(name) or Appearance()
 
     def set_appearance(self, name: str, appearance: Appearance) -> None:
-        """Change how an actor looks."""
+        """Set the appearance of an actor."""
         self.appearances = {**self.appearances, name: appearance}
 
     def acquire_domain(
         self, actor: str | None, domains: Domain, occupant: PreemptableAction, holder: DomainHolder
     ) -> None:
-        """A behaviour begins to control domains of an actor; older ones on these domains end.
+        """Let a behaviour acquire domains of an actor; the previous holders of these domains are preempted.
 
-        An older one of a selection of entities ends for all of them (ASAM OpenSCENARIO XML 1.3.1, 7.5.1).
+        A holder that acts on an entity selection is preempted for all members (ASAM OpenSCENARIO XML 1.3.1, 7.5.1).
         """
         if actor is None or not domains:
             return
-        for held, other_domains, other, behaviour in list(self._holders):
-            if held == actor and other_domains & domains and behaviour.resource == holder.resource:
-                for loser in other.linked_behaviours(behaviour):
-                    self.release_domains(loser)
-                    other.preempt(loser, f"{holder.name} took over")
+        for holder_actor, other_domains, other, behaviour in list(self._holders):
+            if holder_actor == actor and other_domains & domains and behaviour.resource == holder.resource:
+                for preempted in other.linked_behaviours(behaviour):
+                    self.release_domains(preempted)
+                    other.preempt(preempted, f"{holder.name} acquired its domain")
         self._holders.append((actor, domains, occupant, holder))
 
     def release_domains(self, holder: DomainHolder) -> None:
-        """A behaviour controls nothing any more."""
+        """Release all domains of a behaviour."""
         self._holders = [entry for entry in self._holders if entry[3] is not holder]

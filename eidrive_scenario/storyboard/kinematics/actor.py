@@ -1,4 +1,4 @@
-"""What the storyboard knows of one entity: who drives it, how it moves, and what it has done so far."""
+"""State of one entity: its controllers, its motion and its histories."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, T
 from eidrive_scenario.world.view import ActorState, WorldView
 
 STANDSTILL = 1e-3
-"""An actor slower than this stands [m/s]."""
+"""Maximum speed of a standing actor [m/s]."""
 
 Entity = model.Vehicle | model.Pedestrian | model.MiscObject
 
 
 def is_agent_controller(controller: model.Controller) -> bool:
-    """True for a controller that says `module=eidrive` in its properties."""
+    """True if the controller has the property `module=eidrive`."""
     properties = controller.properties.property if controller.properties is not None else ()
     return any(entry.name == "module" and entry.value == "eidrive" for entry in properties)
 
@@ -26,8 +26,12 @@ def is_agent_controller(controller: model.Controller) -> bool:
 class Actor:
     """One entity of the scenario.
 
-    Who drives: an eidrive controller from the start, until it is deactivated in either domain; the storyboard's
-    scripted motion in all other cases.
+    An eidrive controller drives it while the controller is active in both domains; otherwise its motion is scripted.
+
+    present    whether it is in the world; `RuntimeContext.add_actor` and `remove_actor` set it
+    traveled   distance covered without teleports [m]
+    standing_since, end_of_road_since, off_road_since  start of the state [s], None outside of it; `off_road_since` is
+               updated after `track_off_road` only
     """
 
     def __init__(
@@ -40,36 +44,34 @@ class Actor:
         self.name = name
         self.entity = entity
         self._controllers: tuple[model.Controller, ...] = ()
-        self._has_ours = False
+        self._has_agent_controller = False
         self.motion = Motion(roads)
         self.present = False
         for controller in controllers:
             self.assign(controller)
-        self._lateral = self._longitudinal = self._has_ours
+        self._lateral = self._longitudinal = self._has_agent_controller
         self._goal: Goal | None = None
         self._progress: TrajectoryProgress | None = None
         self._trailer: str | None = None
         self.traveled = 0.0
-        """Distance covered in the world, jumps left out [m]."""
         self.standing_since: float | None = None
         self.end_of_road_since: float | None = None
         self.off_road_since: float | None = None
-        """Kept up only where somebody wants it."""
         self._tracks_off_road = False
-        self._last: tuple[float, float] | None = None
-        self._seen: ActorState | None = None
-        self._found: LaneLocation | None = None
-        self._found_at = -1
+        self._last_position: tuple[float, float] | None = None
+        self._last_state: ActorState | None = None
+        self._location: LaneLocation | None = None
+        self._location_tick = -1
 
     @property
     def controllers(self) -> tuple[model.Controller, ...]:
-        """Those that were assigned to it."""
+        """Controllers that are assigned to it."""
         return self._controllers
 
     def assign(self, controller: model.Controller) -> None:
-        """Give it one more controller."""
+        """Assign one more controller."""
         self._controllers = (*self._controllers, controller)
-        self._has_ours = self._has_ours or is_agent_controller(controller)
+        self._has_agent_controller = self._has_agent_controller or is_agent_controller(controller)
 
     @property
     def lateral(self) -> bool:
@@ -115,31 +117,31 @@ class Actor:
 
     @property
     def trajectory(self) -> TrajectoryCurve | None:
-        """What it is following."""
+        """Trajectory that it follows; None without one."""
         return None if self._progress is None else self._progress.layout
 
     @property
     def driven(self) -> bool:
-        """True where its own controller drives it."""
-        return self._lateral and self._longitudinal and self._has_ours
+        """Whether its eidrive controller drives it."""
+        return self._lateral and self._longitudinal and self._has_agent_controller
 
     def limits(self) -> tuple[float, float, float]:
-        """Largest speed [m/s], acceleration and deceleration [m/s²]; infinite where the entity states none."""
+        """Return maximum speed [m/s], acceleration and deceleration [m/s²]; infinite without Performance."""
         if isinstance(self.entity, model.Vehicle):
             performance = self.entity.performance
             return performance.max_speed, performance.max_acceleration, performance.max_deceleration
         return math.inf, math.inf, math.inf
 
     def observe(self, view: WorldView, row: int) -> None:
-        """Keep the histories up to date with a new view."""
+        """Update the histories by a new view."""
         state = view.states[row]
-        if state is self._seen and not self.motion.teleported and not self.motion.end_of_road:
-            return  # it rests, and has done so before
-        self._seen = state
+        if state is self._last_state and not self.motion.teleported and not self.motion.end_of_road:
+            return  # a standing actor whose histories are up to date
+        self._last_state = state
         x, y, speed = state.x, state.y, state.speed
-        if self._last is not None and not self.motion.teleported:
-            self.traveled += math.hypot(x - self._last[0], y - self._last[1])
-        self._last = (x, y)
+        if self._last_position is not None and not self.motion.teleported:
+            self.traveled += math.hypot(x - self._last_position[0], y - self._last_position[1])
+        self._last_position = (x, y)
         self.motion.clear_teleported()
         if abs(speed) >= STANDSTILL:
             self.standing_since = None
@@ -162,7 +164,7 @@ class Actor:
         self._tracks_off_road = True
 
     def update_off_road(self, roads: RoadNetwork | None, view: WorldView) -> None:
-        """Keep up since when it is off the road with its reference point. Lanes `none` are no road."""
+        """Update `off_road_since` by the reference point. Lanes of type `none` are not part of the road."""
         here = None if roads is None else self.location(roads, view.tick)
         if roads is not None and here is not None and _on_road(roads, here):
             self.off_road_since = None
@@ -170,25 +172,25 @@ class Actor:
             self.off_road_since = view.time
 
     def enter_world(self) -> None:
-        """It enters the world: what has gone on there begins anew."""
+        """Enter the world; the durations of states restart."""
         self.present = True
         self.standing_since = self.off_road_since = self.end_of_road_since = None
 
     def location(self, roads: RoadNetwork, tick: int) -> LaneLocation | None:
-        """Its place on the road: the lane below it, None where no road is near. Looked up once per tick."""
-        if self._found_at != tick:
+        """Return its lane location, None without a road nearby. It is computed once per tick."""
+        if self._location_tick != tick:
             pose = self.motion.pose
-            self._found = roads.locate_at(pose.x, pose.y, self.motion.location or self._found)
-            self._found_at = tick
-        return self._found
+            self._location = roads.locate_at(pose.x, pose.y, self.motion.location or self._location)
+            self._location_tick = tick
+        return self._location
 
     def invalidate_location(self) -> None:
-        """It has just been moved: look its place up anew."""
-        self._found_at = -2
+        """Discard the lane location of this tick after a teleport."""
+        self._location_tick = -2
 
 
 def pose_of(view: WorldView, row: int) -> Pose:
-    """The pose of one row of a view."""
+    """Return the pose of one row of a view."""
     return Pose(*view.states[row][:6])
 
 

@@ -1,4 +1,4 @@
-"""Clothoids and splines of them, as points of a trajectory."""
+"""Clothoids and clothoid splines as sampled points."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 
 SPACING = 0.1
-"""Distance between the points at which curved shapes are laid out [m]."""
-MOST_POINTS = 20_000
-"""On curves of more than 2 km the points are further apart."""
+"""Distance between samples of curved shapes [m]."""
+MAX_POINTS = 20_000
+"""Maximum number of samples; on curves of more than 2 km their distance is larger."""
 
 Course = tuple[list[float], list[Pose], tuple[float, ...] | None]
-"""Points of a curve: their arc lengths [m], their poses, and the times at which they are passed [s], if there are."""
+"""Samples of a curve: arc lengths [m], poses, and times [s] or None."""
 
 
 def clothoid(shape: model.Clothoid, start: Pose) -> Course:
-    """A clothoid from its start on."""
+    """Return the samples of a clothoid from its start pose."""
     change = shape.curvature_prime if shape.curvature_prime is not None else shape.curvature_dot or 0.0
     s, poses = _spiral(start, shape.curvature, shape.curvature + change * shape.length, shape.length)
     times = None
     if shape.start_time is not None and shape.stop_time is not None:
-        times = _even(s, shape.start_time, shape.stop_time)
+        times = _linear_times(s, shape.start_time, shape.stop_time)
     return s, poses, times
 
 
 def clothoid_spline(
     shape: model.ClothoidSpline, resolve: Callable[[model.Position], Pose], here: Pose | None
 ) -> Course:
-    """Clothoids one after the other, from `here` on where the first one does not say where it begins."""
+    """Return the samples of consecutive clothoids; `here` is the start if the first segment has no position."""
     s: list[float] = [0.0]
     poses: list[Pose] = []
     for segment in shape.clothoid_spline_segment:
@@ -41,16 +41,16 @@ def clothoid_spline(
         if here is None:
             here = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         here = here._replace(h=here.h + (segment.h_offset or 0.0))
-        along, line = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length)
+        distances, samples = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length)
         base = s[-1]
-        s += [base + distance for distance in along]
-        poses += line
-        here = line[-1]
+        s += [base + distance for distance in distances]
+        poses += samples
+        here = samples[-1]
     return s[1:], poses, _spline_times(shape, s[1:])
 
 
 def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[float, ...] | None:
-    """Times at the points: constant speed between the segments that say when they begin; the first one says 0."""
+    """Return the times at the samples [s]: constant speed between segments with a start time; the first starts at 0."""
     if shape.time_end is None:
         return None
     known, begin = {0.0: 0.0}, 0.0
@@ -63,8 +63,8 @@ def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[floa
 
 
 def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list[float], list[Pose]]:
-    """Points of a curve whose curvature goes linearly from `first` to `last`; midpoint rule on short steps."""
-    count = min(max(1, math.ceil(length / SPACING)), MOST_POINTS)
+    """Sample a curve whose curvature changes linearly from `first` to `last` [1/m], by the midpoint rule."""
+    count = min(max(1, math.ceil(length / SPACING)), MAX_POINTS)
     step = length / count
     s, poses, x, y = [0.0], [start], start.x, start.y
     for number in range(count):
@@ -78,6 +78,6 @@ def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list
     return s, poses
 
 
-def _even(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:
+def _linear_times(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:
     length = s[-1] if s[-1] > 0.0 else 1.0
     return tuple(first + (last - first) * distance / length for distance in s)

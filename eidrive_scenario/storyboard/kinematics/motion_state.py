@@ -1,4 +1,4 @@
-"""State of a scripted actor: pose, speed, and its place on the road."""
+"""State of a scripted actor: pose, speed, lane location and route."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from eidrive_scenario.roads import BranchSelector, LaneLocation, Pose, RoadNetwo
 from eidrive_scenario.tolerances import EPSILON
 
 APART = 0.01
-"""A place on the road stands for a pose if it is not further away than this, seen from above [m]."""
+"""Maximum horizontal distance between a pose and its lane location [m]."""
 
 
 class ResolvedPosition(NamedTuple):
-    """Where to put an actor: the pose, and the lane it stands on (None: on none, it moves freely)."""
+    """Result of resolving a Position: the pose, and the lane location (None for free motion outside of lanes)."""
 
     pose: Pose
     location: LaneLocation | None = None
 
 
 class MotionState:
-    """State of one scripted actor, read-only from outside."""
+    """State of one scripted actor. Attributes are read-only; `Motion` changes them."""
 
     def __init__(self, roads: RoadNetwork | None) -> None:
         self.roads = roads
@@ -77,19 +77,19 @@ class MotionState:
 
     @property
     def direction(self) -> int:
-        """+1 if it points along the driving direction of its lane, else -1."""
+        """+1 if the actor points along the driving direction of its lane, otherwise -1."""
         return 1 if math.cos(self._heading) >= 0.0 else -1
 
     def pose_on(self, here: LaneLocation, heading: float) -> Pose:
-        """The pose at a place of the road with an angle to the driving direction there."""
+        """Return the pose at a lane location with an angle to the driving direction [rad]."""
         assert self.roads is not None
         pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
         turn = heading if self.roads.driving_direction(here.road, here.lane) > 0 else heading + math.pi
         x, y, z, h, p, r = pose.turned(turn)
         return Pose(x, y, z, wrap_angle(h), p, r)
 
-    def _adopt(self, location: LaneLocation | None) -> None:
-        """Refer to a place on the road from now on, if that is where the actor stands (and not beyond a road's end)."""
+    def _set_location(self, location: LaneLocation | None) -> None:
+        """Set the lane location if it is at the pose of the actor, and not beyond the end of a road."""
         self._location, self._lift = None, 0.0
         if location is None or self.roads is None:
             return

@@ -1,4 +1,4 @@
-"""Rational B-splines (NURBS) in six dimensions: a place and a direction to look at."""
+"""Rational B-splines (NURBS) of poses: three coordinates and three angles."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from eidrive_scenario.roads import Pose
 class Nurbs:
     """A rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 4).
 
-    order    of the spline: its degree and 1
-    knots    one per control point, and `order` more
-    control  poses of the control points, with their weights; angles are blended as coordinates are
+    order    degree + 1
+    knots    one per control point, plus `order`
+    control  poses and weights of the control points; angles are interpolated like coordinates
     """
 
     order: int
@@ -25,28 +25,28 @@ class Nurbs:
     control: Sequence[tuple[Pose, float]]
 
     def sampled(self, count: int) -> list[Pose]:
-        """Its poses at `count` even steps of the parameter, `count` + 1 in all."""
-        coordinates = _unwound([pose for pose, _ in self.control])
+        """Return the poses at `count` + 1 equidistant parameters."""
+        coordinates = _unwrapped([pose for pose, _ in self.control])
         poses = []
         for number in range(count + 1):
-            shares = self._shares(number / count)
-            total = sum(share * weight for share, (_, weight) in zip(shares, self.control, strict=True))
-            rational = [share * weight / total for share, (_, weight) in zip(shares, self.control, strict=True)]
+            basis = self._basis(number / count)
+            total = sum(value * weight for value, (_, weight) in zip(basis, self.control, strict=True))
+            rational = [value * weight / total for value, (_, weight) in zip(basis, self.control, strict=True)]
             poses.append(
                 Pose(*(sum(b * row[axis] for b, row in zip(rational, coordinates, strict=True)) for axis in range(6)))
             )
         return poses
 
     def peaks(self, count: int) -> list[int]:
-        """By control point, in which of `count` even steps its basis function is largest: the first of equals."""
-        rows = [self._shares(number / count) for number in range(count + 1)]
+        """Return per control point the number of the step, of `count`, with the largest basis function."""
+        rows = [self._basis(number / count) for number in range(count + 1)]
         return [max(range(count + 1), key=lambda number: rows[number][index]) for index in range(len(self.control))]
 
-    def _shares(self, along: float) -> list[float]:
-        """The basis functions at a share of the curve's range of the parameter."""
+    def _basis(self, fraction: float) -> list[float]:
+        """Return the basis functions at a fraction of the parameter range."""
         degree, knots, count = self.order - 1, self.knots, len(self.control)
         low, high = knots[degree], knots[count]
-        u = low + (high - low) * along
+        u = low + (high - low) * fraction
         span = count - 1 if u >= high else min(max(bisect_right(knots, u) - 1, degree), count - 1)
         values = [0.0] * (len(knots) - 1)
         values[span] = 1.0
@@ -61,16 +61,16 @@ class Nurbs:
 
 
 def along_the_curve(poses: Sequence[Pose]) -> list[Pose]:
-    """The same places, looking along the curve."""
-    last, turned = len(poses) - 1, []
+    """Return the same positions with headings along the curve."""
+    last, aligned = len(poses) - 1, []
     for number, pose in enumerate(poses):
         a, b = poses[max(0, number - 1)], poses[min(last, number + 1)]
-        turned.append(pose._replace(h=math.atan2(b.y - a.y, b.x - a.x), p=0.0, r=0.0))
-    return turned
+        aligned.append(pose._replace(h=math.atan2(b.y - a.y, b.x - a.x), p=0.0, r=0.0))
+    return aligned
 
 
-def _unwound(poses: Sequence[Pose]) -> list[Pose]:
-    """The same poses, without whole turns between the angles of one and the next."""
+def _unwrapped(poses: Sequence[Pose]) -> list[Pose]:
+    """Return the same poses with unwrapped angles: consecutive ones differ by less than π."""
     found = [poses[0]]
     for pose in poses[1:]:
         before = found[-1]

@@ -1,4 +1,4 @@
-"""Ways that nobody has planned: at each fork one of the branches, all of them as likely."""
+"""Random routes: at each junction one branch, uniformly distributed."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from eidrive_scenario.roads import Branch, BranchSelector, LaneKey, LaneLocation
 
 
 def uniform_branch_selector(generator: np.random.Generator) -> BranchSelector:
-    """Chooses anew at each fork."""
+    """Return a selector that draws a branch at each junction."""
 
-    def choose(branches: Sequence[Branch]) -> Branch:
+    def select_branch(branches: Sequence[Branch]) -> Branch:
         return branches[int(generator.integers(len(branches)))]
 
-    return choose
+    return select_branch
 
 
-def random_route(roads: RoadNetwork, start: LaneLocation, length: float, choose: BranchSelector) -> Route:
-    """A way from a place on, at least `length` meters long unless the road ends before."""
+def random_route(roads: RoadNetwork, start: LaneLocation, length: float, select_branch: BranchSelector) -> Route:
+    """Return a route from a location, at least `length` [m] long unless the road ends before."""
     road = roads.road(start.road)
     direction = roads.driving_direction(start.road, start.lane)
     key = LaneKey(start.road, road.section_at(start.s).index, start.lane)
     section = road.section_at(start.s)
-    left = length - ((section.end - start.s) if direction > 0 else (start.s - section.s))
+    remaining = length - ((section.end - start.s) if direction > 0 else (start.s - section.s))
     lanes = [key]
-    while left > 0.0:
+    while remaining > 0.0:
         branches = roads.movement.branches(key, direction)
         if not branches:
             break
-        branch = branches[0] if len(branches) == 1 else choose(branches)
+        branch = branches[0] if len(branches) == 1 else select_branch(branches)
         if branch.lane in lanes[-2:]:
             break
         key, direction = branch.lane, branch.direction
         lanes.append(key)
-        left -= roads.road(key.road).sections[key.section].length
+        remaining -= roads.road(key.road).sections[key.section].length
     road = roads.road(key.road)
     section = road.sections[key.section]
     end = section.end if direction > 0 else section.s

@@ -1,4 +1,4 @@
-"""Routes of the standard as routes over the lanes."""
+"""Conversion of routes of the standard into routes over lanes."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from eidrive_scenario.roads import (
 )
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
-HERE = 0.01
-"""Who is this near to the first waypoint of a closed route is on it [m]."""
+AT_WAYPOINT = 0.01
+"""Maximum distance at which an actor is at the first waypoint of a closed route [m]."""
 
 
 def build_route(
@@ -33,10 +33,11 @@ def build_route(
     seed: int = 0,
     again: bool = False,
 ) -> Route:
-    """The way through the waypoints of a route, from `start` if given. Raises ScenarioError.
+    """Return the route through the waypoints, from `start` if given. Raise ScenarioError if there is none.
 
-    Each waypoint's strategy chooses the way to it; of the random one the seed and the route's name decide. With `again`
-    a closed route comes back to its first waypoint; from `start` a way leads there, and the closed route is its lap.
+    The strategy of each waypoint determines the route to it; the random strategy depends on the seed and the name of
+    the route. With `again` a closed route returns to its first waypoint. From `start` a route leads to that waypoint,
+    and the closed route is its lap.
     """
     if roads is None:
         raise ScenarioError(Diagnostic(f"route {route.name!r} needs a road network", "", route.source, route.line))
@@ -45,20 +46,22 @@ def build_route(
         here = resolve(waypoint.position).location
         if here is None:
             raise ScenarioError(
-                Diagnostic("the waypoint is not on a road", "move it onto a lane", waypoint.source, waypoint.line)
+                Diagnostic(
+                    "Waypoint: the position is not on a road", "move it onto a lane", waypoint.source, waypoint.line
+                )
             )
         places.append(here)
     costs = [_cost(route, number, roads, seed) for number in range(len(places))]
     try:
-        return _through(places, roads, costs, start, closed=again and route.closed)
+        return _connect_waypoints(places, roads, costs, start, closed=again and route.closed)
     except RouteError as error:
-        what = "round the closed" if again and route.closed else "along the"
-        message = f"no way leads {what} route {route.name!r}: {error.diagnostics[0].message}"
-        hint = "change its waypoints" + (', or say closed="false"' if again and route.closed else "")
+        kind = "closed route" if again and route.closed else "route"
+        message = f"{kind} {route.name!r} is not drivable: {error.diagnostics[0].message}"
+        hint = "change its waypoints" + (', or set closed="false"' if again and route.closed else "")
         raise ScenarioError(Diagnostic(message, hint, route.source, route.line)) from error
 
 
-def _through(
+def _connect_waypoints(
     places: Sequence[LaneLocation],
     roads: RoadNetwork,
     costs: Sequence[Cost | None],
@@ -71,13 +74,13 @@ def _through(
             return roads.route(start, places[-1], places[:-1], costs)
         return roads.route(places[0], places[-1], places[1:-1], costs[1:])
     lap = replace(roads.route(places[0], places[0], places[1:], [*costs[1:], costs[0]]), closed=True)
-    if start is None or (start[:2] == places[0][:2] and abs(start.s - places[0].s) < HERE):
+    if start is None or (start[:2] == places[0][:2] and abs(start.s - places[0].s) < AT_WAYPOINT):
         return lap
     return replace(roads.route(start, places[0], costs=costs[:1]), lap=lap)
 
 
 def _cost(route: model.Route, number: int, roads: RoadNetwork, seed: int) -> Cost | None:
-    """What counts on the way to a waypoint; None is the length."""
+    """Return the cost function of the route to a waypoint; None for the length."""
     strategy = route.waypoint[number].route_strategy
     if strategy is model.RouteStrategy.FASTEST:
         return fastest(roads)

@@ -1,4 +1,4 @@
-"""Lane changes that a route asks for: before the end of a road, into a lane that leads to the route's next road."""
+"""Lane changes that a route requires: before the end of a road, to a lane that leads to its next road."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, Route
 from eidrive_scenario.roads.geometry.poses import lane_t
 from eidrive_scenario.roads.routing.route import LANE_CHANGE_LENGTH, smoothstep
 
-SHORTEST = 1.0
-"""On less than this nobody changes lanes [m]."""
+MIN_LANE_CHANGE_LENGTH = 1.0
+"""Minimum length of a lane change [m]."""
 
 
 class LaneChange(NamedTuple):
-    """From lane to lane within one lane section: where it begins, over how many meters, and the offset that stays."""
+    """Lane change within one lane section.
+
+    s       start [m]
+    span    length [m]
+    offset  offset from the lane center that is kept [m]
+    """
 
     road: str
     section: int
@@ -25,29 +30,29 @@ class LaneChange(NamedTuple):
 
 
 class RouteLanes:
-    """What an actor does across its lane to stay on its route."""
+    """Lateral motion of an actor that keeps it on its route."""
 
     def __init__(self, roads: RoadNetwork) -> None:
         self._roads = roads
-        self._asked: tuple[Route, int, str, int] | None = None
+        self._queried: tuple[Route, int, str, int] | None = None
         self._leading: list[frozenset[int]] = []
         self._change: LaneChange | None = None
 
     def forget(self) -> None:
-        """Somebody else moves the actor across its lane."""
+        """Discard the current lane change, as another source moves the actor laterally."""
         self._change = None
 
     def step(self, here: LaneLocation, distance: float, route: Route, visit: int) -> tuple[int, float, bool] | None:
-        """The lane to count from, the offset to have in it after `distance` meters, and whether that is all.
+        """Return lane, offset from its center after `distance` [m], and whether the lane change is complete.
 
-        None where the lane is to be kept. The actor moves with the traffic, on the route's road number `visit`.
+        Return None if the lane is kept. The actor moves in driving direction, on road number `visit` of the route.
         """
         road = self._roads.roads[here.road]
         section = road.section_at(here.s)
         way = self._roads.driving_direction(here.road, here.lane)
         change = self._change
         if change is None or (change.road, change.section) != (here.road, section.index):
-            change = self._change = self._needed(here, section.index, way, route, visit)
+            change = self._change = self._required_change(here, section.index, way, route, visit)
             if change is None:
                 return None
         s = min(max(here.s + way * distance, section.s), section.end)
@@ -57,34 +62,36 @@ class RouteLanes:
         done = part >= 1.0
         if done:
             self._change = None
-        aside = change.offset + smoothstep(part) * (after - before)
-        return (change.after, aside + before - after, done) if part > 0.5 else (change.before, aside, done)
+        offset = change.offset + smoothstep(part) * (after - before)
+        return (change.after, offset + before - after, done) if part > 0.5 else (change.before, offset, done)
 
-    def _needed(self, here: LaneLocation, section: int, way: int, route: Route, visit: int) -> LaneChange | None:
-        asked = (route, visit, here.road, way)
-        if self._asked is None or self._asked[0] is not route or self._asked[1:] != asked[1:]:
-            self._asked, self._leading = asked, self._lanes_to_next(here.road, way, route, visit)
+    def _required_change(
+        self, here: LaneLocation, section: int, way: int, route: Route, visit: int
+    ) -> LaneChange | None:
+        query = (route, visit, here.road, way)
+        if self._queried is None or self._queried[0] is not route or self._queried[1:] != query[1:]:
+            self._queried, self._leading = query, self._lanes_to_next(here.road, way, route, visit)
         leading = self._leading[section] if section < len(self._leading) else frozenset()
         if not leading or here.lane in leading:
             return None
         road = self._roads.roads[here.road]
-        stretch = road.sections[section]
+        lane_section = road.sections[section]
         nearest = min(leading, key=lambda lane: abs(lane - here.lane))
-        rest = stretch.end - here.s if way > 0 else here.s - stretch.s
-        beyond = road.length - here.s if way > 0 else here.s
+        rest = lane_section.end - here.s if way > 0 else here.s - lane_section.s
+        rest_of_road = road.length - here.s if way > 0 else here.s
         wanted = LANE_CHANGE_LENGTH * abs(nearest - here.lane)
-        if beyond > wanted and (beyond == rest or self._goes_on(here, section, way)):
+        if rest_of_road > wanted and (rest_of_road == rest or self._has_successor(here, section, way)):
             return None
-        if rest < SHORTEST:
+        if rest < MIN_LANE_CHANGE_LENGTH:
             return None
         return LaneChange(here.road, section, here.lane, nearest, here.s, min(wanted, rest), here.offset)
 
-    def _goes_on(self, here: LaneLocation, section: int, way: int) -> bool:
+    def _has_successor(self, here: LaneLocation, section: int, way: int) -> bool:
         key = LaneKey(here.road, section, here.lane)
         return any(other.road == here.road for other, _ in self._roads.links.beyond(key, way))
 
     def _lanes_to_next(self, road_id: str, way: int, route: Route, visit: int) -> list[frozenset[int]]:
-        """For each lane section of a road, the lanes from which links lead to the next road of the route."""
+        """Return for each lane section of a road the lanes that are linked to the next road of the route."""
         road, following = self._roads.roads[road_id], route.passes(visit + 1)
         if following is None or route.passes(visit) != road_id:
             return []

@@ -1,4 +1,4 @@
-"""Trailers: what is hitched to a vehicle rolls after its hitch."""
+"""Kinematics of trailers that are connected to a towing vehicle."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 
 AT_PLACE = 0.5
-"""A vehicle that is further from its known place on the road does not follow the road [m]."""
+"""Maximum distance between a vehicle and its lane location if it follows the road [m]."""
 
 
 def declared_trailer(entity: model.Element) -> str | None:
-    """The name of what an entity draws from the start, None where it draws nothing."""
+    """Return the name of the trailer that an entity has from the start; None without one."""
     if not isinstance(entity, model.Vehicle) or entity.trailer is None:
         return None
     if entity.trailer.trailer is not None:
@@ -25,7 +25,7 @@ def declared_trailer(entity: model.Element) -> str | None:
 
 
 def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
-    """Drawing and drawn actors, from the front of each train to its end; each is drawn by one, the first that does."""
+    """Yield towing vehicles and their trailers, from front to end of each train; a trailer has one towing vehicle."""
     drawn = {actor.trailer for actor in actors.values() if actor.trailer is not None}
     if not drawn:
         return
@@ -42,7 +42,7 @@ def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
 
 
 def check_acyclic(actors: Mapping[str, Actor]) -> None:
-    """Raises ScenarioError for those that draw themselves, directly or over others."""
+    """Raise ScenarioError if an entity is its own trailer, directly or through others."""
     diagnostics = []
     for name, actor in actors.items():
         train: list[str] = []
@@ -51,35 +51,36 @@ def check_acyclic(actors: Mapping[str, Actor]) -> None:
             actor = actors[actor.trailer]
         if name in train:
             where = actors[name].entity
-            diagnostics.append(Diagnostic(f"{name!r} is a trailer of itself", "uncouple one", where.source, where.line))
+            message = f"entity {name!r} is its own trailer"
+            diagnostics.append(Diagnostic(message, "remove a connection", where.source, where.line))
     if diagnostics:
         raise ScenarioError(diagnostics)
 
 
 def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:
-    """Where the back one stands once the front one is at its place.
+    """Return the pose of a trailer behind its towing vehicle.
 
-    The coupler is at the hitch, and the trailer's axle follows the hitch like a wheel on a rod, as a single-track model
-    without slip has it: at the reference point, with several axles where `bar` ends. `straight` puts it in line. Where
-    one of them is on a slope or bank, the back one lies in the road's surface.
+    The coupler is at the hitch. The axle of the trailer follows the hitch as in a single-track model without slip: it
+    is at the reference point, with several axles at the end of `bar`. `straight` aligns the trailer with the vehicle.
+    If one of them is on a slope or bank, the trailer lies in the surface of the road.
     """
     pose = front.motion.pose
     hitch, reach = _hitch(front), _coupler(back)
     x, y = pose.x + hitch * math.cos(pose.h), pose.y + hitch * math.sin(pose.h)
     before = back.motion.pose
-    behind = bar(back.entity, reach) - reach
-    rolling_x, rolling_y = before.x, before.y
-    if behind:
-        rolling_x, rolling_y = before.x - behind * math.cos(before.h), before.y - behind * math.sin(before.h)
-    heading = pose.h if straight else math.atan2(y - rolling_y, x - rolling_x)
+    axle_offset = bar(back.entity, reach) - reach
+    axle_x, axle_y = before.x, before.y
+    if axle_offset:
+        axle_x, axle_y = before.x - axle_offset * math.cos(before.h), before.y - axle_offset * math.sin(before.h)
+    heading = pose.h if straight else math.atan2(y - axle_y, x - axle_x)
     x, y = x - reach * math.cos(heading), y - reach * math.sin(heading)
     if pose.p == pose.r == 0.0 and before.p == before.r == 0.0:
         return Pose(x, y, pose.z, heading, 0.0, 0.0)
-    return _in_the_surface(front, x, y, heading)
+    return _pose_on_surface(front, x, y, heading)
 
 
-def _in_the_surface(front: Actor, x: float, y: float, heading: float) -> Pose:
-    """Return the pose on the road below, as high above it as the front one is; without a road, in the plane of that."""
+def _pose_on_surface(front: Actor, x: float, y: float, heading: float) -> Pose:
+    """Return the pose at the same height above the road as the vehicle; without a road in the plane of the vehicle."""
     roads, here, pose = front.motion.roads, front.motion.location, front.motion.pose
     if roads is not None and here is not None:
         below, there = roads.lane_pose_at(*here[:4]), roads.locate_at(x, y, here)
@@ -92,10 +93,10 @@ def _in_the_surface(front: Actor, x: float, y: float, heading: float) -> Pose:
 
 
 def bar(entity: model.Element, reach: float) -> float:
-    """How far behind its coupler a trailer rolls as on a single axle [m]; with one, `reach`, at the reference point.
+    """Return the distance between coupler and equivalent single axle [m]: with one axle `reach`.
 
-    The coupler lets it turn, so that the side forces of its fixed axles, of slips in proportion to how each moves
-    sideways, have no moment about the coupler: at distances d behind it, that is Σd² / Σd.
+    The lateral forces of the fixed axles are proportional to their slip angles. They have no moment about the coupler,
+    as the trailer turns freely. Axles at distances d axle_offset the coupler are thus equivalent to one at Σd² / Σd.
     """
     if not isinstance(entity, model.Vehicle) or not entity.axles.additional_axle:
         return reach

@@ -1,4 +1,4 @@
-"""Trajectories in the world: any shape of the standard as a curve by arc length, with times where it has them."""
+"""Trajectories: all shapes of the standard as curves by arc length, with times if they are given."""
 
 from __future__ import annotations
 
@@ -15,27 +15,29 @@ from numpy.typing import NDArray
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.kinematics.clothoids import MOST_POINTS, SPACING, Course, clothoid, clothoid_spline
+from eidrive_scenario.storyboard.kinematics.clothoids import MAX_POINTS, SPACING, Course, clothoid, clothoid_spline
 from eidrive_scenario.storyboard.kinematics.nurbs import Nurbs, along_the_curve
 
 ROUNDING = 2.0
-"""How far from a corner of a polyline the heading begins to turn [m]."""
+"""Maximum distance from a corner of a polyline at which the heading turns [m]."""
 
 SAME_PLACE = 1e-3
-"""Two passes of a trajectory by a point that are as near as this are by the same place [m]."""
+"""Tolerance of distances at which a trajectory passes a point several times [m]."""
 
 Resolve = Callable[[model.Position], Pose]
 
 
 @dataclass(frozen=True)
 class TrajectoryCurve:
-    """A trajectory as points with headings, by arc length.
+    """Trajectory as sampled poses by arc length.
 
-    s         arc length of each point [m];  poses  of each point
-    times     at which the stations are passed [s], None for a trajectory without times
-    given     True where the file gives headings
-    stations  arc length of the points that have times [m]; empty: all have
-    tangents  direction of the curve at each point [rad]; empty: it is straight between points
+    s         arc length of each sample [m]
+    poses     pose of each sample
+    times     times at the stations [s], None for a trajectory without times
+    closed    whether the end continues at the start
+    given     whether the file specifies headings
+    stations  arc lengths that have times [m]; empty: all samples
+    tangents  direction of the curve at each sample [rad]; empty: straight segments between samples
     """
 
     s: tuple[float, ...]
@@ -53,7 +55,7 @@ class TrajectoryCurve:
 
     @property
     def length(self) -> float:
-        """Arc length of the whole [m]."""
+        """Total arc length [m]."""
         return self.s[-1]
 
     @property
@@ -67,19 +69,19 @@ class TrajectoryCurve:
         return self.times[-1] if self.times is not None else 0.0
 
     def at(self, s: float) -> Pose:
-        """The pose at arc length s; beyond the ends that of the end, on a closed one further round."""
-        index, share = self._between(self.s, self._round(s))
+        """Return the pose at arc length s [m]. Beyond an end it is that of the end; a closed trajectory is periodic."""
+        index, share = self._interval(self.s, self._wrapped(s))
         return _blend(self.poses[index], self.poses[index + 1], share)
 
     def tangent(self, s: float) -> float:
-        """Return the direction of the curve at arc length s [rad], whichever way its poses look."""
-        index, share = self._between(self.s, self._round(s))
+        """Return the direction of the curve at arc length s [rad], independent of the headings of its poses."""
+        index, share = self._interval(self.s, self._wrapped(s))
         if not self.tangents:
             return self._directions[index]
         return self.tangents[index] + share * wrap_angle(self.tangents[index + 1] - self.tangents[index])
 
     def extended(self, s: float) -> Pose:
-        """Return the pose at arc length s; beyond the ends of an open trajectory straight on along its tangent."""
+        """Return the pose at arc length s [m]; an open trajectory is extended along its tangents."""
         pose = self.at(s)
         beyond = 0.0 if self.closed else s - min(max(s, 0.0), self.length)
         if beyond == 0.0:
@@ -87,16 +89,16 @@ class TrajectoryCurve:
         along = self.tangent(s)
         return pose._replace(x=pose.x + beyond * math.cos(along), y=pose.y + beyond * math.sin(along))
 
-    def _round(self, s: float) -> float:
+    def _wrapped(self, s: float) -> float:
         return s % self.length if self.closed and self.length > 0.0 and not 0.0 <= s <= self.length else s
 
     @cached_property
     def _directions(self) -> tuple[float, ...]:
-        """Direction of each straight piece [rad]; one of no length has that of the next, else of the one before."""
-        _, ways, lengths = self._stretches
+        """Direction of each segment [rad]; one of no length has that of the next, otherwise of the previous segment."""
+        _, vectors, lengths = self._segments
         found: list[float | None] = [
             math.atan2(y, x) if length > 0.0 else None
-            for (x, y), length in zip(ways.tolist(), lengths.tolist(), strict=True)
+            for (x, y), length in zip(vectors.tolist(), lengths.tolist(), strict=True)
         ]
         for order in (range(len(found) - 2, -1, -1), range(1, len(found))):
             for index in order:
@@ -105,10 +107,10 @@ class TrajectoryCurve:
         return tuple(pose.h if h is None else h for h, pose in zip(found, self.poses, strict=False))
 
     def at_time(self, time: float, speeds: Sequence[float] | None = None) -> float:
-        """Arc length at a time [m]: between two points at constant speed, or as the `speeds` at the points ask."""
+        """Return the arc length at a time [m]: at constant speed between points, or by the `speeds` at the points."""
         if self.times is None:
             return 0.0
-        index, share = self._between(self.times, time)
+        index, share = self._interval(self.times, time)
         s = self.timed
         way = s[index + 1] - s[index]
         if speeds is None:
@@ -117,21 +119,22 @@ class TrajectoryCurve:
         return s[index] + share * (speeds[index] * span * (1.0 - share) + share * way)
 
     def time_at(self, s: float) -> float:
-        """The time at an arc length [s]; 0 without times."""
+        """Return the time at an arc length [s]; 0 without times."""
         if self.times is None:
             return 0.0
-        index, share = self._between(self.timed, s)
+        index, share = self._interval(self.timed, s)
         return self.times[index] + share * (self.times[index + 1] - self.times[index])
 
     def speeds_from(self, start: float) -> tuple[float, ...]:
-        """Speeds at the points [m/s] if they change linearly over time from `start`, and the times are to be kept.
+        """Return the speeds at the points [m/s] that keep the times and change linearly over time from `start`.
 
-        Where the next speed would be negative the stretch is driven at its mean speed instead.
+        A segment after which the speed would be negative has its mean speed instead.
         """
         assert self.times is not None
         speeds, speed = [], start
-        for span, way in zip(map(_gap, pairwise(self.times)), map(_gap, pairwise(self.timed)), strict=True):
-            mean = way / span if span > 0.0 else speed
+        spans, lengths = np.diff(self.times).tolist(), np.diff(self.timed).tolist()
+        for span, length in zip(spans, lengths, strict=True):
+            mean = length / span if span > 0.0 else speed
             if 2.0 * mean - speed < -1e-6:
                 speed = mean
             speeds.append(speed)
@@ -139,53 +142,53 @@ class TrajectoryCurve:
         return (*speeds, speed)
 
     def project(self, x: float, y: float, ahead_of: float | None = None) -> tuple[float, float]:
-        """Arc length of the place that is nearest to a point, and how far to the left of it the point lies [m].
+        """Project a point onto the trajectory: return its arc length and its lateral offset, left positive [m].
 
-        An open trajectory goes straight on beyond its ends. Where it comes by several times, the first time after
-        `ahead_of` is meant.
+        An open trajectory is extended along its tangents. If it passes the point several times, the first time after
+        `ahead_of` counts.
         """
-        corners, ways, lengths = self._stretches
-        to = np.array([x, y]) - corners
-        along = np.einsum("ni,ni->n", to, ways)
-        held = np.clip(along, 0.0, lengths)
+        vertices, vectors, lengths = self._segments
+        to = np.array([x, y]) - vertices
+        along = np.einsum("ni,ni->n", to, vectors)
+        clipped = np.clip(along, 0.0, lengths)
         if not self.closed:
-            held[0], held[-1] = min(along[0], held[0]), max(along[-1], held[-1])
-        apart = to - held[:, None] * ways
-        square = np.einsum("ni,ni->n", apart, apart)
+            clipped[0], clipped[-1] = min(along[0], clipped[0]), max(along[-1], clipped[-1])
+        perpendicular = to - clipped[:, None] * vectors
+        square = np.einsum("ni,ni->n", perpendicular, perpendicular)
         nearest = int(np.argmin(square))
         if ahead_of is not None:
-            passes = np.flatnonzero(np.sqrt(square) <= math.sqrt(square[nearest]) + SAME_PLACE)
-            later = [n for n in passes.tolist() if self.s[n] + held[n] >= ahead_of - SAME_PLACE]
+            candidates = np.flatnonzero(np.sqrt(square) <= math.sqrt(square[nearest]) + SAME_PLACE)
+            later = [n for n in candidates.tolist() if self.s[n] + clipped[n] >= ahead_of - SAME_PLACE]
             nearest = later[0] if later else nearest
-        (ahead, left), (dx, dy) = ways[nearest].tolist(), to[nearest].tolist()
-        return self.s[nearest] + float(held[nearest]), ahead * dy - left * dx
+        (ahead, left), (dx, dy) = vectors[nearest].tolist(), to[nearest].tolist()
+        return self.s[nearest] + float(clipped[nearest]), ahead * dy - left * dx
 
     @cached_property
-    def _stretches(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """The straight pieces between points: (N, 2) where they begin, (N, 2) unit vectors along, (N,) lengths [m]."""
+    def _segments(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Segments between samples: start points (N, 2), unit vectors (N, 2), lengths (N,) [m]."""
         points = np.array([(pose.x, pose.y) for pose in self.poses])
-        ways = np.diff(points, axis=0)
-        lengths = np.hypot(ways[:, 0], ways[:, 1])
+        vectors = np.diff(points, axis=0)
+        lengths = np.hypot(vectors[:, 0], vectors[:, 1])
         headings = np.array([pose.h for pose in self.poses[:-1]])
-        standing = lengths < 1e-9
-        ways[standing] = np.stack([np.cos(headings), np.sin(headings)], axis=1)[standing]
-        lengths[standing] = 1.0
-        units = ways / lengths[:, None]
-        lengths[standing] = 0.0
+        degenerate = lengths < 1e-9
+        vectors[degenerate] = np.stack([np.cos(headings), np.sin(headings)], axis=1)[degenerate]
+        lengths[degenerate] = 1.0
+        units = vectors / lengths[:, None]
+        lengths[degenerate] = 0.0
         return points[:-1], units, lengths
 
     @staticmethod
-    def _between(grid: Sequence[float], value: float) -> tuple[int, float]:
+    def _interval(grid: Sequence[float], value: float) -> tuple[int, float]:
         index = min(max(bisect_right(grid, value) - 1, 0), len(grid) - 2)
         span = grid[index + 1] - grid[index]
         return index, min(1.0, max(0.0, (value - grid[index]) / span)) if span > 0.0 else 1.0
 
 
 class TrajectoryProgress:
-    """How far an actor is along the trajectory that it follows.
+    """Progress of an actor along the trajectory that it follows.
 
-    layout  the trajectory
-    way     +1 where the actor's own forward direction leads towards the end, -1 where it drives tail first
+    layout  trajectory
+    way     +1 if the actor drives forwards, -1 if it drives backwards
     """
 
     def __init__(self, layout: TrajectoryCurve, s: float) -> None:
@@ -203,52 +206,52 @@ class TrajectoryProgress:
 
 
 def sample_trajectory(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None) -> TrajectoryCurve:
-    """A trajectory in the world. `resolve` gives the pose that a position means now.
+    """Sample a trajectory in world coordinates. `resolve` returns the current pose of a position.
 
-    A clothoid spline that does not say where it starts begins at `start`.
+    A clothoid spline without a start position begins at `start`.
     """
     shape = trajectory.shape.chosen()
     if isinstance(shape, model.Polyline):
         return _polyline(shape, trajectory.closed, resolve)
     if isinstance(shape, model.Clothoid):
-        return _passed(clothoid(shape, resolve(shape.position)), trajectory.closed)
+        return _curve_of(clothoid(shape, resolve(shape.position)), trajectory.closed)
     if isinstance(shape, model.ClothoidSpline):
-        return _passed(clothoid_spline(shape, resolve, start), trajectory.closed)
+        return _curve_of(clothoid_spline(shape, resolve, start), trajectory.closed)
     assert isinstance(shape, model.Nurbs)
     return _nurbs(shape, trajectory.closed, resolve)
 
 
-def _passed(course: Course, closed: bool) -> TrajectoryCurve:
+def _curve_of(course: Course, closed: bool) -> TrajectoryCurve:
     s, poses, times = course
     return TrajectoryCurve(tuple(s), tuple(poses), times, closed, tangents=tuple(pose.h for pose in poses))
 
 
 def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> TrajectoryCurve:
-    corners = [resolve(vertex.position) for vertex in shape.vertex]
+    vertices = [resolve(vertex.position) for vertex in shape.vertex]
     times = [vertex.time for vertex in shape.vertex]
-    if closed and math.hypot(corners[0].x - corners[-1].x, corners[0].y - corners[-1].y) > 1e-3:
-        corners.append(corners[0])
+    if closed and math.hypot(vertices[0].x - vertices[-1].x, vertices[0].y - vertices[-1].y) > 1e-3:
+        vertices.append(vertices[0])
         times.append(None)
-    clock = _times(times)
+    point_times = _times(times)
     if any(has_heading(vertex.position) for vertex in shape.vertex):
         s = [0.0]
-        for a, b in pairwise(corners):
+        for a, b in pairwise(vertices):
             s.append(s[-1] + math.hypot(b.x - a.x, b.y - a.y))
-        return TrajectoryCurve(tuple(s), tuple(corners), clock, closed, given=True)
-    return _along_corners(corners, clock, closed)
+        return TrajectoryCurve(tuple(s), tuple(vertices), point_times, closed, given=True)
+    return _rounded_polyline(vertices, point_times, closed)
 
 
-def _along_corners(corners: Sequence[Pose], times: tuple[float, ...] | None, closed: bool) -> TrajectoryCurve:
-    """A polyline whose heading is that of its lines, and turns evenly within ROUNDING of a corner or half the line."""
-    spans = [math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(corners)]
+def _rounded_polyline(vertices: Sequence[Pose], times: tuple[float, ...] | None, closed: bool) -> TrajectoryCurve:
+    """Return a polyline with tangential headings, which turn linearly within ROUNDING of a corner, or half a line."""
+    spans = [math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(vertices)]
     lines = [
         math.atan2(b.y - a.y, b.x - a.x) if span > 0.0 else a.h
-        for (a, b), span in zip(pairwise(corners), spans, strict=True)
+        for (a, b), span in zip(pairwise(vertices), spans, strict=True)
     ]
-    around = wrap_angle(lines[0] - lines[-1]) if closed else 0.0
-    turns = [around, *(wrap_angle(b - a) for a, b in pairwise(lines)), around]
-    s, poses, stations = [0.0], [corners[0]._replace(h=lines[0] - 0.5 * turns[0])], [0.0]
-    for index, ((a, b), span, line) in enumerate(zip(pairwise(corners), spans, lines, strict=True)):
+    closing_turn = wrap_angle(lines[0] - lines[-1]) if closed else 0.0
+    turns = [closing_turn, *(wrap_angle(b - a) for a, b in pairwise(lines)), closing_turn]
+    s, poses, stations = [0.0], [vertices[0]._replace(h=lines[0] - 0.5 * turns[0])], [0.0]
+    for index, ((a, b), span, line) in enumerate(zip(pairwise(vertices), spans, lines, strict=True)):
         inset = min(ROUNDING / span, 0.5) if span > 0.0 else 0.5
         if index > 0:
             s.append(stations[-1])
@@ -261,18 +264,18 @@ def _along_corners(corners: Sequence[Pose], times: tuple[float, ...] | None, clo
 
 
 def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurve:
-    """A rational B-spline; it looks where its control points do, if they say (1.3.1, 6.9), else along the curve.
+    """Return a rational B-spline with the headings of its control points (1.3.1, 6.9), or tangential without any.
 
-    The curve passes through its first and last control points only, and the standard does not say where on it the time
-    of another one holds. As in esmini (its NurbsShape) that is where its basis function is largest, on as many even
-    steps of the parameter as the control polygon has meters; between, the parameter grows evenly with time. Which of
-    the two steps around the peak counts its traces alone tell: the one before.
+    The curve passes through its first and last control points only. The standard does not define where on the curve
+    the time of another control point holds. As in esmini (NurbsShape) it holds where the basis function is largest, on
+    as many equidistant parameters as the control polygon has meters. Between, the parameter is linear in time. Of the
+    two parameters at the peak the lower one counts, as traces of esmini show.
     """
     weights = [1.0 if point.weight is None else point.weight for point in shape.control_point]
     control = [(resolve(point.position), weight) for point, weight in zip(shape.control_point, weights, strict=True)]
     curve = Nurbs(shape.order, [knot.value for knot in shape.knot], control)
-    rough = sum(math.hypot(b.x - a.x, b.y - a.y) for (a, _), (b, _) in pairwise(control))
-    count = min(max(2, math.ceil(rough / SPACING)), MOST_POINTS)
+    polygon_length = sum(math.hypot(b.x - a.x, b.y - a.y) for (a, _), (b, _) in pairwise(control))
+    count = min(max(2, math.ceil(polygon_length / SPACING)), MAX_POINTS)
     poses = curve.sampled(count)
     given = any(has_heading(point.position) for point in shape.control_point)
     smooth = along_the_curve(poses)
@@ -283,14 +286,14 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     times = _times([point.time for point in shape.control_point])
     if times is None:
         return TrajectoryCurve(tuple(s), tuple(poses), None, closed, given, tangents=tangents)
-    meters = 1 + int(rough)
+    meters = 1 + int(polygon_length)
     stations = [math.floor((number + 1) / count * meters) / meters * count for number in curve.peaks(count)]
-    clock = np.interp(np.arange(count + 1), stations, times)
-    return TrajectoryCurve(tuple(s), tuple(poses), tuple(clock.tolist()), closed, given, tangents=tangents)
+    point_times = np.interp(np.arange(count + 1), stations, times)
+    return TrajectoryCurve(tuple(s), tuple(poses), tuple(point_times.tolist()), closed, given, tangents=tangents)
 
 
 def has_heading(position: model.Position) -> bool:
-    """True where a position says which way to point."""
+    """True if a position specifies a heading."""
     frame = position.chosen()
     if isinstance(frame, model.WorldPosition):
         return frame.h is not None
@@ -299,7 +302,7 @@ def has_heading(position: model.Position) -> bool:
 
 
 def _blend(a: Pose, b: Pose, share: float) -> Pose:
-    """Between two poses, angles the short way round."""
+    """Interpolate two poses; angles take the shorter way."""
     return Pose(
         a.x + share * (b.x - a.x),
         a.y + share * (b.y - a.y),
@@ -310,10 +313,6 @@ def _blend(a: Pose, b: Pose, share: float) -> Pose:
     )
 
 
-def _gap(ends: tuple[float, float]) -> float:
-    return ends[1] - ends[0]
-
-
-def _times(clock: Sequence[float | None]) -> tuple[float, ...] | None:
-    known = [time for time in clock if time is not None]
-    return tuple(known) if len(known) == len(clock) and known[-1] > known[0] else None
+def _times(point_times: Sequence[float | None]) -> tuple[float, ...] | None:
+    given_times = [time for time in point_times if time is not None]
+    return tuple(given_times) if len(given_times) == len(point_times) and given_times[-1] > given_times[0] else None

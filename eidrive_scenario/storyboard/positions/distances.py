@@ -1,4 +1,4 @@
-"""Distances between entities and to positions, as conditions and actions of the standard measure them."""
+"""Distances between entities and to positions as defined by the standard for conditions and actions."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
 
 Box = tuple[float, float, float, float, float, float, float]
-"""x y z of the center, length, width, height [m], yaw [rad]"""
+"""x, y, z of the center, length, width, height [m], yaw [rad]."""
 
-INSTANT = 1e-3
-"""A time in which nobody's motion along a road changes [s]."""
+TIME_DELTA = 1e-3
+"""Time step of the finite difference of a distance [s]."""
 
-CHAINS: dict[model.RoutingAlgorithm | None, Chain] = {
+ROUTE_CRITERIA: dict[model.RoutingAlgorithm | None, Chain] = {
     model.RoutingAlgorithm.FASTEST: "fastest",
     model.RoutingAlgorithm.LEAST_INTERSECTIONS: "leastIntersections",
 }
-"""The ways that an algorithm chooses, where it is not the shortest."""
+"""Criterion of the route by algorithm; the default is the shortest route."""
 
 
 def entity_box(context: ConditionContext, name: str) -> Box:
-    """The bounding box of an actor where it stands now."""
+    """Return the bounding box of an actor at its current pose."""
     pose = context.pose(name)
     bounds = context.actors[name].entity.bounding_box
     center, size = bounds.center, bounds.dimensions
@@ -42,14 +42,14 @@ def entity_box(context: ConditionContext, name: str) -> Box:
 
 
 def resolve_distance_type(kind: model.RelativeDistanceType | None) -> str:
-    """longitudinal, lateral or euclidianDistance, which is what a missing word means."""
+    """Return longitudinal, lateral or euclidianDistance, the default."""
     if kind is None or kind is model.RelativeDistanceType.CARTESIAN_DISTANCE:
         return "euclidianDistance"
     return str(kind.value)
 
 
 def resolve_coordinate_system(system: model.CoordinateSystem | None) -> str:
-    """entity (also where none is said), lane, road, trajectory or world."""
+    """Return entity (the default), lane, road, trajectory or world."""
     return "entity" if system is None else str(system.value)
 
 
@@ -63,35 +63,35 @@ def distance(
     freespace: bool,
     algorithm: model.RoutingAlgorithm | None = None,
 ) -> float:
-    """How far `b` (an actor or a place) is from actor `a` [m]; NaN where the frame gives none between them.
+    """Return the distance from actor `a` to `b`, an actor or a position [m]; NaN if the frame defines none.
 
-    The straight distance is that in space. Longitudinal distances are positive ahead, lateral ones to the left, both as
-    `a` looks; free space is at least 0 in amount, and 0 where the two overlap along that axis. In the frames of lane
-    and road the algorithm says which way of several is measured. In that of the trajectory `a` looks along the one that
-    it follows; without one ahead.
+    The Euclidean distance is three-dimensional. Longitudinal distances are positive ahead of `a`, lateral ones to its
+    left. Free space is 0 if both overlap along the axis. In the frames of lane and road the algorithm selects the route
+    to measure along. In that of the trajectory the axis of `a` is the trajectory that it follows; without one its
+    heading.
     """
     if kind == "euclidianDistance":
-        return _straight(context, a, b, freespace)
+        return _euclidean(context, a, b, freespace)
     here = ResolvedPosition(context.pose(a), context.location(a) if frame in ("lane", "road") else None)
     along, across = _offsets(context, a, here, b, frame, algorithm)
     value = along if kind == "longitudinal" else across
     if not freespace or math.isnan(value):
         return value
-    return _between(context, a, b, frame, kind, value)
+    return _free_space(context, a, b, frame, kind, value)
 
 
 def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
-    """Return +1.0 where actor `b` points the way that `a` does, -1.0 where it comes towards it or away from it.
+    """Return +1.0 if actor `b` points in the direction of `a`, -1.0 for the opposite direction.
 
-    In the frames of lane and road that is along the road between them, else by their headings.
+    The frames of lane and road compare directions along the road between both, other frames their headings.
     """
     turn = context.pose(b).h - context.pose(a).h
     if frame in ("lane", "road") and context.roads is not None:
         here, there = context.location(a), context.location(b)
-        runs = None if here is None or there is None else context.roads.orientation(here, there)
-        if runs is not None and here is not None and there is not None:
-            lines = [context.roads.road_pose_at(place.road, place.s).h for place in (here, there)]
-            turn += lines[0] - lines[1] + (0.0 if runs > 0 else math.pi)
+        relative_direction = None if here is None or there is None else context.roads.orientation(here, there)
+        if relative_direction is not None and here is not None and there is not None:
+            headings = [context.roads.road_pose_at(place.road, place.s).h for place in (here, there)]
+            turn += headings[0] - headings[1] + (0.0 if relative_direction > 0 else math.pi)
     return 1.0 if math.cos(turn) >= 0.0 else -1.0
 
 
@@ -104,22 +104,22 @@ def closing_speed(
     kind: str,
     algorithm: model.RoutingAlgorithm | None = None,
 ) -> float:
-    """How fast actor `a` and `b` come nearer [m/s], by the frame and kind in which their distance is measured.
+    """Return the closing speed of actor `a` and `b` [m/s] in the frame and kind of their distance.
 
-    NaN where the frame gives no distance. Both keep their velocities of this view, along roads and trajectories too; a
-    place does not move.
+    Return NaN if the frame defines no distance. Both move at their current velocities, also along roads and
+    trajectories; a position does not move.
     """
     mine, theirs = _velocity(context, a), _velocity(context, b) if isinstance(b, str) else (0.0, 0.0, 0.0)
-    here, there = ResolvedPosition(context.pose(a), context.location(a)), _place(context, b)
+    here, there = ResolvedPosition(context.pose(a), context.location(a)), _resolved(context, b)
     if kind == "euclidianDistance":
-        apart = math.dist(here.pose[:3], there.pose[:3])
-        ways = zip(here.pose[:3], there.pose[:3], mine, theirs, strict=True)
-        return sum((b - a) * (v - w) for a, b, v, w in ways) / apart if apart > 0.0 else 0.0
+        gap = math.dist(here.pose[:3], there.pose[:3])
+        axes = zip(here.pose[:3], there.pose[:3], mine, theirs, strict=True)
+        return sum((b - a) * (v - w) for a, b, v, w in axes) / gap if gap > 0.0 else 0.0
     axis = 0 if kind == "longitudinal" else 1
     now = _offsets(context, a, here, there, frame, algorithm)[axis]
-    moved = _moved(context, here, mine), _moved(context, there, theirs)
+    moved = _predicted(context, here, mine), _predicted(context, there, theirs)
     then = _offsets(context, a, *moved, frame, algorithm)[axis]
-    return math.copysign(1.0, now) * (now - then) / INSTANT
+    return math.copysign(1.0, now) * (now - then) / TIME_DELTA
 
 
 def _velocity(context: ConditionContext, name: str) -> tuple[float, float, float]:
@@ -127,20 +127,20 @@ def _velocity(context: ConditionContext, name: str) -> tuple[float, float, float
     return x, y, z
 
 
-def _moved(
+def _predicted(
     context: ConditionContext, place: ResolvedPosition, velocity: tuple[float, float, float]
 ) -> ResolvedPosition:
-    """Where somebody is an instant later."""
-    x, y = place.pose.x + velocity[0] * INSTANT, place.pose.y + velocity[1] * INSTANT
+    """Return the position after TIME_DELTA at this velocity."""
+    x, y = place.pose.x + velocity[0] * TIME_DELTA, place.pose.y + velocity[1] * TIME_DELTA
     location = context.roads.locate_at(x, y, place.location) if context.roads is not None else None
     return ResolvedPosition(place.pose._replace(x=x, y=y), location)
 
 
-def _place(context: ConditionContext, target: str | ResolvedPosition) -> ResolvedPosition:
+def _resolved(context: ConditionContext, target: str | ResolvedPosition) -> ResolvedPosition:
     return ResolvedPosition(_pose(context, target), _location(context, target))
 
 
-def _straight(context: ConditionContext, a: str, b: str | ResolvedPosition, freespace: bool) -> float:
+def _euclidean(context: ConditionContext, a: str, b: str | ResolvedPosition, freespace: bool) -> float:
     if not freespace:
         return math.dist(context.pose(a)[:3], _pose(context, b)[:3])
     if isinstance(b, str):
@@ -157,7 +157,7 @@ def _offsets(
     frame: str,
     algorithm: model.RoutingAlgorithm | None,
 ) -> tuple[float, float]:
-    """How far `b` is ahead and to the left of actor `a`, where that stands at `mine` [m]."""
+    """Return the longitudinal and the lateral offset of `b` from actor `a` at `mine` [m]."""
     here, there = mine.pose, _pose(context, b)
     if frame in ("lane", "road") and context.roads is not None:
         start, end = mine.location, _location(context, b)
@@ -167,7 +167,7 @@ def _offsets(
             route = context.actors[a].motion.route
             found = None if route is None else context.roads.distance(start, end, route=route)
         else:
-            found = context.roads.distance(start, end, CHAINS.get(algorithm, "shortest"))
+            found = context.roads.distance(start, end, ROUTE_CRITERIA.get(algorithm, "shortest"))
         if found is None:
             return math.nan, math.nan
         lane = context.roads.pose(start)
@@ -177,16 +177,16 @@ def _offsets(
         return there.x - here.x, there.y - here.y
     progress = context.actors[a].progress if frame == "trajectory" else None
     if progress is not None:
-        return _along(progress, progress.at(context.view.tick), here, there)
+        return _along_trajectory(progress, progress.at(context.view.tick), here, there)
     dx, dy = there.x - here.x, there.y - here.y
     cos, sin = math.cos(here.h), math.sin(here.h)
     return dx * cos + dy * sin, dy * cos - dx * sin
 
 
-def _along(progress: TrajectoryProgress, station: float, here: Pose, there: Pose) -> tuple[float, float]:
-    """How much further along a trajectory and to its left a place is; the shorter way round on a closed one.
+def _along_trajectory(progress: TrajectoryProgress, station: float, here: Pose, there: Pose) -> tuple[float, float]:
+    """Return the offsets along a trajectory and to its left [m]; on a closed one the shorter of both directions.
 
-    `here` is at the actor's own station or next to it: the trajectory may come by the same place again.
+    `here` is at the station of the actor or beside it, as the trajectory may pass the same point several times.
     """
     trajectory = progress.layout
     origin, tangent = trajectory.extended(station), trajectory.tangent(station)
@@ -199,15 +199,15 @@ def _along(progress: TrajectoryProgress, station: float, here: Pose, there: Pose
     return along * progress.way, (other_t - t) * progress.way
 
 
-def _between(
+def _free_space(
     context: ConditionContext, a: str, b: str | ResolvedPosition, frame: str, kind: str, value: float
 ) -> float:
-    """The gap along one axis: reference points `value` apart, less how far each box reaches towards the other."""
-    axis = _axis(context, a, frame)
-    mine = _reach(context, a, axis, frame, kind)
+    """Return the free space along one axis [m]: the distance `value` of the reference points without both extents."""
+    axis = _axis_heading(context, a, frame)
+    mine = _extent(context, a, axis, frame, kind)
     if isinstance(b, str):
-        like = axis if frame in ("entity", "world") else _axis(context, b, frame, like=axis)
-        theirs = _reach(context, b, like, frame, kind)
+        reference = axis if frame in ("entity", "world") else _axis_heading(context, b, frame, reference=axis)
+        theirs = _extent(context, b, reference, frame, kind)
     else:
         theirs = (0.0, 0.0)
     if value + theirs[0] > mine[1]:
@@ -217,8 +217,8 @@ def _between(
     return 0.0
 
 
-def _axis(context: ConditionContext, name: str, frame: str, like: float | None = None) -> float:
-    """Heading of the longitudinal axis at an actor; turned round where it would point against `like`."""
+def _axis_heading(context: ConditionContext, name: str, frame: str, reference: float | None = None) -> float:
+    """Return the heading of the longitudinal axis at an actor [rad]; reversed if it points against `reference`."""
     if frame == "world":
         return 0.0
     heading = context.pose(name).h
@@ -227,17 +227,17 @@ def _axis(context: ConditionContext, name: str, frame: str, like: float | None =
         if here is not None:
             lane = context.roads.pose(here).h
             heading = lane if math.cos(lane - heading) >= 0.0 else lane + math.pi
-    if like is not None and math.cos(heading - like) < 0.0:
+    if reference is not None and math.cos(heading - reference) < 0.0:
         heading += math.pi
     return heading
 
 
-def _reach(context: ConditionContext, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
-    """How far the box of an actor reaches from its reference point along an axis or the road: least and most [m]."""
+def _extent(context: ConditionContext, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
+    """Return minimum and maximum of the box of an actor along an axis or the road, from its reference point [m]."""
     if frame in ("lane", "road") and context.roads is not None:
         here = context.location(name)
         if here is not None and context.roads.curvature(here.road, here.s) != 0.0:
-            return _reach_along(context, context.roads, name, here, axis, kind)
+            return _extent_on_bend(context, context.roads, name, here, axis, kind)
     bounds = context.actors[name].entity.bounding_box
     turn = context.pose(name).h - axis
     cos, sin = math.cos(turn), math.sin(turn)
@@ -250,21 +250,21 @@ def _reach(context: ConditionContext, name: str, axis: float, frame: str, kind: 
     return center - half, center + half
 
 
-def _reach_along(
+def _extent_on_bend(
     context: ConditionContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
 ) -> tuple[float, float]:
-    """The reach along a road that bends: from corner to corner of the box in road coordinates."""
+    """Return the extent along a curved road, from the corners of the box in road coordinates [m]."""
     x, y, _, length, width, _, yaw = entity_box(context, name)
     cos, sin = math.cos(yaw), math.sin(yaw)
     sign = 1.0 if math.cos(roads.pose(here).h - axis) >= 0.0 else -1.0
-    reached = []
+    extents = []
     for along, across in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
         dx, dy = along * length, across * width
         corner = roads.locate_at(x + dx * cos - dy * sin, y + dx * sin + dy * cos, here)
         found = None if corner is None else roads.distance(here, corner)
         if found is not None:
-            reached.append(sign * found[0 if kind == "longitudinal" else 1])
-    return min(reached, default=0.0), max(reached, default=0.0)
+            extents.append(sign * found[0 if kind == "longitudinal" else 1])
+    return min(extents, default=0.0), max(extents, default=0.0)
 
 
 def _pose(context: ConditionContext, target: str | ResolvedPosition) -> Pose:

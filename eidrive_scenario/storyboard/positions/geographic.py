@@ -1,4 +1,4 @@
-"""GeoPosition: places on the globe, by the road network's geoReference."""
+"""Geographic positions, by the geoReference of the road network."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.orientations import oriented
 from eidrive_scenario.storyboard.positions.position_errors import roads_of
 
-FAR = 1e4
-"""Above and below all roads [m]."""
-APART = 0.5
-"""Roads whose surfaces differ by less are on one level [m]."""
+HEIGHT_LIMIT = 1e4
+"""Height above and below all roads [m]."""
+LEVEL_SEPARATION = 0.5
+"""Maximum difference in height of roads on one level [m]."""
 
 
 def geo_position(frame: model.GeoPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
-    """Resolve a GeoPosition by the road network's projection.
+    """Resolve a GeoPosition by the projection of the road network.
 
-    Relative angles, and missing ones, refer to the lane there.
+    Relative and missing angles refer to the lane at the position.
     """
     roads = roads_of(frame, context)
     x, y = plane_coordinates(frame, roads, context)
@@ -33,46 +33,47 @@ def geo_position(frame: model.GeoPosition, context: ConditionContext, actor: str
 
 
 def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, context: ConditionContext) -> tuple[float, float]:
-    """x and y [m] of a GeoPosition. Raises ScenarioError if the road network does not say where it lies."""
+    """Return x and y of a GeoPosition [m]. Raise ScenarioError if the road network has no geoReference."""
     latitude, longitude = _angles(frame, context)
     try:
         return roads.geographic(latitude, longitude)
     except InputError as error:
         reason = error.diagnostics[0]
-        told = Diagnostic(f"GeoPosition has no place: {reason.message}", reason.hint, frame.source, frame.line)
-        raise ScenarioError(told) from error
+        message = Diagnostic(f"GeoPosition: not resolvable: {reason.message}", reason.hint, frame.source, frame.line)
+        raise ScenarioError(message) from error
 
 
 def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: float) -> float | None:
-    """z of the road that verticalRoadSelection means, counted from the lowest, 0 [m]; None where no road is.
+    """Return z of the road selected by verticalRoadSelection, counted from 0, the lowest [m]; None without a road.
 
-    Raises ScenarioError for a level that is not there.
+    Raise ScenarioError if the level does not exist.
     """
-    low, high = (_surface(roads, x, y, end) for end in (-FAR, FAR))
+    low, high = (_surface(roads, x, y, end) for end in (-HEIGHT_LIMIT, HEIGHT_LIMIT))
     if low is None or high is None:
         return None
     levels = [low]
-    for step in range(1, math.ceil((high - low) / APART) + 1):
-        found = _surface(roads, x, y, low + step * APART)
-        if found is not None and found > levels[-1] + APART:
+    for step in range(1, math.ceil((high - low) / LEVEL_SEPARATION) + 1):
+        found = _surface(roads, x, y, low + step * LEVEL_SEPARATION)
+        if found is not None and found > levels[-1] + LEVEL_SEPARATION:
             levels.append(found)
-    wanted = frame.vertical_road_selection or 0
-    if not 0 <= wanted < len(levels):
-        told = f"GeoPosition asks for road level {wanted}, and there are {len(levels)}"
-        raise ScenarioError(Diagnostic(told, "levels count from the lowest, 0", frame.source, frame.line))
-    return levels[wanted]
+    level = frame.vertical_road_selection or 0
+    if not 0 <= level < len(levels):
+        message = "GeoPosition: the selected road level does not exist"
+        hint = f"got {level}; expected 0 to {len(levels) - 1}, counted from the lowest"
+        raise ScenarioError(Diagnostic(message, hint, frame.source, frame.line))
+    return levels[level]
 
 
 def _surface(roads: RoadNetwork, x: float, y: float, z: float) -> float | None:
-    """Height of the road nearest to a height [m]."""
+    """Return the height of the road that is nearest to a height [m]; None without a road."""
     here = roads.locate([x], [y], [z]).location(0)
     return None if here is None else roads.pose(here).z
 
 
 def _angles(frame: model.GeoPosition, context: ConditionContext) -> tuple[float, float]:
-    """Latitude and longitude [rad]: since 1.2 in degrees, before that in radians.
+    """Return latitude and longitude [rad]: since 1.2 given in degrees, before in radians.
 
-    Older values beyond what radians can be are degrees that somebody wrote in their place.
+    Older values beyond the range of radians are read as degrees, with a warning.
     """
     if frame.latitude_deg is not None and frame.longitude_deg is not None:
         latitude, longitude = frame.latitude_deg, frame.longitude_deg
@@ -81,16 +82,16 @@ def _angles(frame: model.GeoPosition, context: ConditionContext) -> tuple[float,
         latitude, longitude = frame.latitude, frame.longitude
         in_degrees = abs(latitude) > math.pi / 2.0 or abs(longitude) > math.pi
         if in_degrees:
-            told = (
-                f"GeoPosition has latitude {latitude:g}, longitude {longitude:g}: taken as degrees, as radians end at π"
-            )
-            context.warn(Diagnostic(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
+            message = f"GeoPosition: latitude {latitude:g}, longitude {longitude:g} are read as degrees, not radians"
+            context.warn(Diagnostic(message, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
     else:
         hint = "give latitudeDeg and longitudeDeg"
-        raise ScenarioError(Diagnostic("GeoPosition lacks latitude or longitude", hint, frame.source, frame.line))
+        raise ScenarioError(Diagnostic("GeoPosition: latitude or longitude is missing", hint, frame.source, frame.line))
     if in_degrees:
         latitude, longitude = math.radians(latitude), math.radians(longitude)
     if abs(latitude) > math.pi / 2.0 or abs(longitude) > 2.0 * math.pi:
-        told = f"GeoPosition has latitude {math.degrees(latitude):g}°, longitude {math.degrees(longitude):g}°"
-        raise ScenarioError(Diagnostic(told, "latitudes end at ±90°", frame.source, frame.line))
+        message = f"GeoPosition: invalid latitude {math.degrees(latitude):g}° or longitude {math.degrees(longitude):g}°"
+        raise ScenarioError(
+            Diagnostic(message, "expected latitudes within ±90°, longitudes within ±360°", frame.source, frame.line)
+        )
     return latitude, longitude

@@ -1,4 +1,4 @@
-"""Orientations of positions: absolute, or relative to the pose at which a position lies."""
+"""Orientations of positions: absolute, or relative to a base pose."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from eidrive_scenario.roads import Pose
 
 
 def oriented(orientation: model.Orientation | None, base: Pose) -> Pose:
-    """Return `base` with an orientation; without pitch and roll it lies in the surface of the base."""
+    """Return `base` with an orientation; missing pitch and roll follow the surface at the base."""
     h, p, r = angles(orientation, base)
     level = base.turned(wrap_angle(h - base.h))
     if orientation is None:
@@ -21,7 +21,7 @@ def oriented(orientation: model.Orientation | None, base: Pose) -> Pose:
 
 
 def angles(orientation: model.Orientation | None, base: Pose) -> tuple[float, float, float]:
-    """Heading, pitch and roll; relative ones are added to the base's, missing ones are 0."""
+    """Return heading, pitch and roll [rad]; relative ones are added to those of the base, missing ones are 0."""
     if orientation is None:
         return base.h, base.p, base.r
     h, p, r = orientation.h or 0.0, orientation.p or 0.0, orientation.r or 0.0

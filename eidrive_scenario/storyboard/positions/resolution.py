@@ -1,4 +1,4 @@
-"""Positions of the standard, in all their frames, as places in the world."""
+"""Resolution of all position types of the standard."""
 
 from __future__ import annotations
 
@@ -32,55 +32,55 @@ from eidrive_scenario.storyboard.positions.world_positions import (
     world_position,
 )
 
-FIXED = (model.WorldPosition, model.RoadPosition, model.LanePosition, model.GeoPosition)
-"""Positions that mean the same place all the time."""
-NESTING = (model.RoutePosition, model.TrajectoryPosition)
-"""Positions along a route or trajectory, whose own points are positions."""
+STATIC = (model.WorldPosition, model.RoadPosition, model.LanePosition, model.GeoPosition)
+"""Types of static positions."""
+NESTED = (model.RoutePosition, model.TrajectoryPosition)
+"""Types of positions along a route or trajectory, whose points are positions."""
 MAX_DEPTH = 10
-"""Maximum number of such positions within each other."""
+"""Maximum depth of nested positions."""
 MAX_POSITIONS = 2000
-"""Maximum number of such positions that one position leads through."""
+"""Maximum number of nested positions within one position."""
 
 
 def resolve_position(position: model.Position, context: ConditionContext, actor: str | None = None) -> ResolvedPosition:
-    """The place that a position means now. `actor` is the entity that goes there; its route counts for some positions.
+    """Resolve a position at this instant. `actor` is the entity that moves there; some positions depend on its route.
 
-    Raises ScenarioError if the road network does not have it, Absent if it refers to an entity that is not in the
-    world.
+    Raise ScenarioError if the position does not exist in the road network, EntityAbsentError if it refers to an absent
+    entity.
     """
     cache = context.position_cache
-    held = cache.static.get(id(position))
-    if held is not None and held[0] is position:
-        return held[1]
+    cached = cache.static.get(id(position))
+    if cached is not None and cached[0] is position:
+        return cached[1]
     frame = position.chosen()
-    nesting = isinstance(frame, NESTING)
+    is_nested = isinstance(frame, NESTED)
     try:
-        if nesting:
+        if is_nested:
             _enter(frame, cache)
-        place = FRAMES[type(frame)](frame, context, actor)
+        place = RESOLVERS[type(frame)](frame, context, actor)
     except PositionError as error:
         raise position_error(
-            frame, f"means no place: {error.diagnostics[0].message}", error.diagnostics[0].hint
+            frame, f"not resolvable: {error.diagnostics[0].message}", error.diagnostics[0].hint
         ) from error
     finally:
-        if nesting:
+        if is_nested:
             cache.depth -= 1
-    if _stands_still(frame, context):
+    if _is_static(frame, context):
         cache.static[id(position)] = (position, place)
     return place
 
 
 def _enter(frame: model.Element, cache: PositionCache) -> None:
-    """Count a position along a curve whose own points are positions. Raise ScenarioError if they multiply."""
+    """Count a nested position. Raise ScenarioError if there are too many."""
     cache.nested = cache.nested + 1 if cache.depth else 0
     cache.depth += 1
     if cache.depth > MAX_DEPTH or cache.nested > MAX_POSITIONS:
-        what = f"lies on curves of positions on curves, more than {MAX_DEPTH} deep or {MAX_POSITIONS} in total"
-        raise position_error(frame, what, "name the places by roads and lanes")
+        message = f"nested too deeply (maximum depth {MAX_DEPTH}, maximum number {MAX_POSITIONS})"
+        raise position_error(frame, message, "use RoadPosition or LanePosition")
 
 
 def referenced_entities(position: model.Position) -> tuple[str, ...]:
-    """The entities that a position refers to."""
+    """Return the names of the entities that a position refers to."""
     return tuple(name for below in position.walk() if (name := getattr(below, "entity_ref", None)) is not None)
 
 
@@ -93,10 +93,12 @@ def _route(frame: model.RoutePosition, context: ConditionContext, actor: str | N
         here = road_origin(within, context)
         return in_lane(roads, here.road, here.lane, here.s, here.offset, frame.orientation)
     if not isinstance(within, model.PositionInRoadCoordinates | model.PositionInLaneCoordinates):
-        raise position_error(frame, f"says {type(within).__name__}, which is not known here")
+        raise position_error(frame, f"unsupported coordinates {type(within).__name__}")
     here = path.location_at(within.path_s)
     if not -1e-3 <= within.path_s <= path.length + 1e-3:
-        raise position_error(frame, f"leads {within.path_s:g} m along a route of {path.length:.1f} m")
+        raise position_error(
+            frame, "pathS is outside of the route", f"got {within.path_s:g} m; expected 0 to {path.length:.1f} m"
+        )
     if isinstance(within, model.PositionInRoadCoordinates):
         return in_road(roads, here.road, here.s, within.t, frame.orientation, here.lane)
     lane = lane_id(frame, within.lane_id)
@@ -104,7 +106,7 @@ def _route(frame: model.RoutePosition, context: ConditionContext, actor: str | N
 
 
 def _trajectory(frame: model.TrajectoryPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
-    """s and t along and beside the curve; a relative heading counts from its tangent (1.3.1, TrajectoryPosition)."""
+    """Resolve a position at s and t of a curve; relative headings refer to its tangent (1.3.1, TrajectoryPosition)."""
     layout = trajectory_of(frame, context, actor)
     at, tangent = layout.at(frame.s), layout.tangent(frame.s)
     offset = frame.t or 0.0
@@ -116,26 +118,26 @@ def _trajectory(frame: model.TrajectoryPosition, context: ConditionContext, acto
 def trajectory_of(
     frame: model.TrajectoryPosition, context: ConditionContext, actor: str | None = None
 ) -> TrajectoryCurve:
-    """Return the trajectory along which a position counts, as it lies now."""
-    trajectory = _trajectory_in(frame, context)
+    """Return the trajectory of a position, with its points resolved at this instant."""
+    trajectory = _trajectory_element(frame, context)
     return sample_trajectory(trajectory, lambda position: resolve_position(position, context, actor).pose)
 
 
-def _trajectory_in(frame: model.TrajectoryPosition, context: ConditionContext) -> model.Trajectory:
+def _trajectory_element(frame: model.TrajectoryPosition, context: ConditionContext) -> model.Trajectory:
     if frame.trajectory_ref.trajectory is not None:
         return frame.trajectory_ref.trajectory
     return context.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory, frame)
 
 
-def _stands_still(frame: model.Element, context: ConditionContext) -> bool:
-    """Whether a position means the same place all the time."""
+def _is_static(frame: model.Element, context: ConditionContext) -> bool:
+    """Whether a position is static."""
     if not isinstance(frame, model.TrajectoryPosition):
-        return isinstance(frame, FIXED)
-    inner = (one for one in _trajectory_in(frame, context).walk() if isinstance(one, model.Position))
-    return all(_stands_still(one.chosen(), context) for one in inner)
+        return isinstance(frame, STATIC)
+    inner = (one for one in _trajectory_element(frame, context).walk() if isinstance(one, model.Position))
+    return all(_is_static(one.chosen(), context) for one in inner)
 
 
-FRAMES: dict[type[model.Element], Callable[[Any, ConditionContext, str | None], ResolvedPosition]] = {
+RESOLVERS: dict[type[model.Element], Callable[[Any, ConditionContext, str | None], ResolvedPosition]] = {
     model.WorldPosition: world_position,
     model.RelativeWorldPosition: relative_world_position,
     model.RelativeObjectPosition: relative_object_position,

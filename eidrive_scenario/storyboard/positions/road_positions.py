@@ -16,30 +16,30 @@ from eidrive_scenario.storyboard.positions.position_errors import position_error
 def road_position(frame: model.RoadPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """Resolve a RoadPosition. Raise ScenarioError if the road does not exist."""
     roads = roads_of(frame, context)
-    return in_road(roads, frame.road_id, _on_road(frame, context, roads), frame.t, frame.orientation)
+    return in_road(roads, frame.road_id, _s_on_road(frame, context, roads), frame.t, frame.orientation)
 
 
 def relative_road_position(
     frame: model.RelativeRoadPosition, context: ConditionContext, actor: str | None
 ) -> ResolvedPosition:
-    """Resolve a position that lies `ds` along the reference line from an entity and `dt` to its left."""
+    """Resolve a position at `ds` along the reference line from an entity, and `dt` to its left."""
     roads, origin = roads_of(frame, context), road_origin(frame, context)
     here = along_reference(roads, origin, frame.ds, context.actors[frame.entity_ref].motion.route)
     if here is None:
-        raise position_error(frame, f"leads {frame.ds:g} m from {frame.entity_ref}, beyond the end of the road")
+        raise position_error(frame, f"beyond the end of the road: {frame.ds:g} m from entity {frame.entity_ref!r}")
     return in_road(roads, here.road, here.s, here.t + frame.dt, frame.orientation)
 
 
 def lane_position(frame: model.LanePosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """Resolve a LanePosition. Raise ScenarioError if the road or lane does not exist there."""
     roads = roads_of(frame, context)
-    s = _on_road(frame, context, roads)
+    s = _s_on_road(frame, context, roads)
     lane = lane_id(frame, frame.lane_id)
-    known = roads.lane_ids(frame.road_id, s)
-    if lane not in known and lane != 0:
-        shown = ", ".join(str(number) for number in known)
+    lanes = roads.lane_ids(frame.road_id, s)
+    if lane not in lanes and lane != 0:
+        names = ", ".join(str(number) for number in lanes)
         raise position_error(
-            frame, f"names lane {lane} of road {frame.road_id!r} at s = {s:g}", f"its lanes there: {shown}"
+            frame, f"unknown lane {lane} of road {frame.road_id!r} at s = {s:g}", f"expected one of {names}"
         )
     return in_lane(roads, frame.road_id, lane, s, frame.offset or 0.0, frame.orientation)
 
@@ -49,7 +49,7 @@ def relative_lane_position(
 ) -> ResolvedPosition:
     """Resolve a position relative to the lane of an entity.
 
-    `ds` runs along the reference line, `dsLane` along the lane as the entity faces; lanes count to its left.
+    `ds` counts along the reference line, `dsLane` along the lane in the direction of the entity, lanes to its left.
     """
     roads, origin = roads_of(frame, context), road_origin(frame, context)
     route = context.actors[frame.entity_ref].motion.route
@@ -59,13 +59,11 @@ def relative_lane_position(
     else:
         there = along_reference(roads, origin, frame.ds or 0.0, route)
     if there is None:
-        raise position_error(frame, f"lies beyond the end of the road of {frame.entity_ref}")
+        raise position_error(frame, f"beyond the end of the road of entity {frame.entity_ref!r}")
     sign = ahead * roads.driving_direction(there.road, there.lane)
     lane = count_lanes(there.lane, frame.d_lane * sign)
     if lane not in roads.lane_ids(there.road, there.s):
-        raise position_error(
-            frame, f"names lane {lane} of road {there.road!r}, which it does not have at s = {there.s:.1f}"
-        )
+        raise position_error(frame, f"unknown lane {lane} of road {there.road!r} at s = {there.s:.1f}")
     place = in_lane(roads, there.road, lane, there.s, frame.offset or 0.0, frame.orientation)
     if frame.orientation is None and ahead < 0:
         return place._replace(pose=place.pose.turned(math.pi))
@@ -75,9 +73,9 @@ def relative_lane_position(
 def along_reference(
     roads: RoadNetwork, here: LaneLocation, ds: float, route: Route | None = None
 ) -> LaneLocation | None:
-    """The place `ds` meters further along the reference line, in the same or the connected lane, at the same offset.
+    """Return the location at `ds` [m] along the reference line, in the same or the connected lane, at the same offset.
 
-    At forks the route decides. A lane that the road does not have at its end is replaced by that at the same t.
+    The route selects the branch at junctions. A lane that ends before its road is replaced by the lane at the same t.
     """
     road = roads.roads[here.road]
     s = here.s + ds
@@ -91,7 +89,7 @@ def along_reference(
 
 
 def count_lanes(lane: int, steps: int) -> int:
-    """The lane `steps` to the left (towards larger ids) of a lane; lane 0 is no lane and does not count."""
+    """Return the lane `steps` to the left of a lane, towards larger ids; lane 0 does not count."""
     target = lane + steps
     if steps and (target == 0 or (target > 0) != (lane > 0)):
         target += 1 if steps > 0 else -1
@@ -99,7 +97,7 @@ def count_lanes(lane: int, steps: int) -> int:
 
 
 def facing(context: ConditionContext, name: str, here: LaneLocation) -> int:
-    """+1 where an actor points along the driving direction of its lane, -1 where against it."""
+    """Return +1 if an actor points along the driving direction of its lane, otherwise -1."""
     if context.roads is None:
         return 1
     lane = context.roads.lane_pose_at(here.road, here.lane, here.s, here.offset).h
@@ -110,7 +108,7 @@ def facing(context: ConditionContext, name: str, here: LaneLocation) -> int:
 def in_lane(
     roads: RoadNetwork, road: str, lane: int, s: float, offset: float, orientation: model.Orientation | None
 ) -> ResolvedPosition:
-    """Return the place at lane coordinates; an orientation counts from the lane."""
+    """Resolve lane coordinates; a relative orientation refers to the lane."""
     here = roads.location(road, lane, s, offset)
     return ResolvedPosition(oriented(orientation, roads.pose(here)), here)
 
@@ -118,9 +116,9 @@ def in_lane(
 def in_road(
     roads: RoadNetwork, road: str, s: float, t: float, orientation: model.Orientation | None, lane: int | None = None
 ) -> ResolvedPosition:
-    """Return the place at road coordinates, related to `lane` or else to the lane there.
+    """Resolve road coordinates, referred to `lane`, by default to the lane at this position.
 
-    An orientation counts from the reference line; without one the place points along the lane's driving direction.
+    A relative orientation refers to the reference line. Without an orientation the heading is the driving direction.
     """
     here = roads.road_location(road, s, t)
     if lane is not None:
@@ -130,24 +128,24 @@ def in_road(
     return ResolvedPosition(oriented(orientation, surface if along else surface.turned(math.pi)), here)
 
 
-def _on_road(frame: model.RoadPosition | model.LanePosition, context: ConditionContext, roads: RoadNetwork) -> float:
-    """The position's s; one that lies beyond an end of its road means that end, with a warning."""
+def _s_on_road(frame: model.RoadPosition | model.LanePosition, context: ConditionContext, roads: RoadNetwork) -> float:
+    """Return s of a position, limited to its road; a warning reports a value beyond an end of the road."""
     road, s = frame.road_id, frame.s
     if road not in roads.roads:
-        shown = ", ".join(sorted(roads.roads)[:12])
-        raise position_error(frame, f"names road {road!r}, which the road network does not have", f"it has {shown}")
+        names = ", ".join(sorted(roads.roads)[:12])
+        raise position_error(frame, f"unknown road {road!r}", f"expected one of {names}")
     length = roads.roads[road].length
     on_road = min(max(s, 0.0), length)
     if abs(on_road - s) > 1e-3:
-        message = f"{type(frame).__name__} says s = {s:g} on road {road!r}: its end is meant"
-        diagnostic = Diagnostic(message, f"that road is {length:.2f} m long", frame.source, frame.line)
-        context.warn(diagnostic)
+        message = f"{type(frame).__name__}: moved to the end of road {road!r}"
+        hint = f"got s = {s:g}; expected 0 to {length:.2f}"
+        context.warn(Diagnostic(message, hint, frame.source, frame.line))
     return on_road
 
 
 def lane_id(frame: model.Element, text: str) -> int:
-    """Return a lane id as a number. Raise ScenarioError if it is none."""
+    """Return a lane id as an integer. Raise ScenarioError if it is none."""
     try:
         return int(text)
     except ValueError:
-        raise position_error(frame, f"says laneId {text!r}", "give a whole number") from None
+        raise position_error(frame, "invalid laneId", f"got {text!r}; expected an integer") from None

@@ -1,1 +1,1 @@
-"""State of the storyboard that actions and conditions share."""
+"""State of the storyboard that conditions read and actions request changes of."""

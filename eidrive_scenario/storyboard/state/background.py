@@ -1,4 +1,4 @@
-"""The stage's side of background traffic: cars that no element of the storyboard names."""
+"""Port of the storyboard to background traffic: vehicles that are no entities of the scenario."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from eidrive_scenario.world.view import WorldView
 
 
 class BackgroundTrafficPort:
-    """Background traffic of one run; without an instance there is none, and it costs nothing.
+    """Background traffic of one run. It is created with its first instance.
 
-    center     where an entity is and moves, None while it is not in the world
-    taken      names that no car may have
-    must_stop  whether the traffic light of an id tells traffic to stop
+    center     returns pose and speed of an entity, None while it is absent
+    taken      names that no vehicle may have
+    must_stop  returns whether the state of a traffic signal, by id, requires vehicles to stop
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class BackgroundTrafficPort:
 
     @cached_property
     def traffic(self) -> BackgroundTraffic:
-        """The traffic itself; only where there are roads."""
+        """Background traffic of the run; requires a road network."""
         assert self._roads is not None
         self._started = True
         return BackgroundTraffic(
@@ -48,20 +48,20 @@ class BackgroundTrafficPort:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All cars that are there."""
+        """Names of all vehicles of background traffic."""
         return self.traffic.names if self._started else ()
 
     def start(self, instance: TrafficGenerator) -> None:
-        """An instance begins: its first cars enter in this tick, or in the first one where it begins in Init."""
+        """Start an instance. Its first vehicles enter in this tick; in the first tick if it starts in Init."""
         self.traffic.start(instance)
 
     def stop(self, name: str | None) -> None:
-        """End all instances of this name, or all of them."""
+        """Stop all instances of this name; all instances without a name."""
         if self._started:
             self.traffic.stop(name)
 
     def step(self, view: WorldView, dt: float, commands: Commands) -> None:
-        """Add to the commands what the traffic does in the step that begins with this view."""
+        """Add spawns, removals and placements of the step that begins with this view to the commands."""
         if not self._started:
             return
         changes = self.traffic.step(view, dt)

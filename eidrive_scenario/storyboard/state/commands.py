@@ -1,4 +1,4 @@
-"""What the storyboard asks of the world, the stations and the channel for the next step."""
+"""Commands of the storyboard to the world, the stations and the channel for the next step."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from eidrive_scenario.world.environment import Environment
 
 @dataclass(frozen=True)
 class CustomCommand:
-    """A CustomCommandAction that started: its type, its text, and where the file says so.
+    """Started CustomCommandAction: its type, its content, and its line in the file.
 
-    `scope` holds the parameters that are visible there, if the text refers to any.
+    `scope` holds the parameters that are visible at that line; None if the content refers to none.
     """
 
     type: str
@@ -28,20 +28,20 @@ class CustomCommand:
 
 @dataclass
 class Commands:
-    """What one tick of the storyboard asks for. Actions write it, the simulation reads it.
+    """Commands of one tick of the storyboard. The context writes them, the simulation executes them.
 
     placements   next pose of every scripted actor
-    goals        what driven actors shall do; an actor without an entry follows its own settings
-    additions    actors that enter the world, and where
-    bodies       of those that enter and are no entities of the scenario: background traffic
-    removals     actors that leave it
+    goals        requests to driven actors; an actor without an entry follows its own settings
+    spawns       placements of the actors that enter the world
+    actor_specs  bodies of entering actors whose body does not follow from an entity, such as background traffic
+    removals     actors that leave the world
     driven       actors whose own controller is active, lateral and longitudinal
-    overrides    controls held per actor, all that are in force
+    overrides    controls that are held, by actor
     custom       CustomCommandActions that started in this tick
-    environment  what began to hold in this tick, None where nothing changed
-    signals      what every traffic signal shows, by its id
-    monitors     the values of all monitors
-    appearances  how those actors look that differ from the usual
+    environment  environment that was set in this tick, None without a change
+    signals      state of every traffic signal, by id
+    monitors     values of all monitors
+    appearances  appearances of the actors that differ from the default
     """
 
     placements: dict[str, Placement] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""The domains of an actor that actions control."""
+"""Control domains of an actor (ASAM OpenSCENARIO XML 1.3.1, 7.5.1)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Flag, auto
 
 
 class Domain(Flag):
-    """What of an actor an action controls. Of two actions on one domain the younger ends the older."""
+    """Domains of an actor that an action controls. An action that acquires a domain ends its previous holder."""
 
     NONE = 0
     LONGITUDINAL = auto()

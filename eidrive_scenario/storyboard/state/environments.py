@@ -1,4 +1,4 @@
-"""From the standard's Environment to what holds: what an action leaves out stays as it was."""
+"""Update of the environment by an EnvironmentAction; values that the action omits are kept."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from eidrive_scenario.world.environment import Environment
 
 
 def merge_environment(before: Environment, given: model.Environment, now: float) -> Environment:
-    """What holds after an EnvironmentAction at `now` [s]. A time of day that it gives starts the clock anew."""
+    """Return the environment after an EnvironmentAction at `now` [s]. A given time of day restarts the clock."""
     after = replace(before, name=given.name)
     if given.time_of_day is not None:
         after = replace(
@@ -30,27 +30,27 @@ def merge_environment(before: Environment, given: model.Environment, now: float)
 
 
 def _weather(weather: model.Weather) -> dict[str, Any]:
-    """What a Weather says, and nothing of what it does not say."""
-    said: dict[str, Any] = {"temperature": weather.temperature, "pressure": weather.atmospheric_pressure}
+    """Return the values that a Weather specifies, by the field names of Environment."""
+    values: dict[str, Any] = {"temperature": weather.temperature, "pressure": weather.atmospheric_pressure}
     clouds = weather.fractional_cloud_cover or weather.cloud_state
     if clouds is not None:
-        said["clouds"] = clouds.value
+        values["clouds"] = clouds.value
     if weather.sun is not None:
         sun = weather.sun
-        said |= {"sun_azimuth": sun.azimuth, "sun_elevation": sun.elevation}
-        said["illuminance"] = sun.illuminance if sun.illuminance is not None else sun.intensity
+        values |= {"sun_azimuth": sun.azimuth, "sun_elevation": sun.elevation}
+        values["illuminance"] = sun.illuminance if sun.illuminance is not None else sun.intensity
     if weather.fog is not None:
-        said["fog_range"] = weather.fog.visual_range
-    found = {name: value for name, value in said.items() if value is not None}
+        values["fog_range"] = weather.fog.visual_range
+    given_values = {name: value for name, value in values.items() if value is not None}
     if weather.precipitation is not None:
         rain = weather.precipitation
-        found |= {
+        given_values |= {
             "precipitation": rain.precipitation_type.value,
             "precipitation_intensity": rain.precipitation_intensity,
             "precipitation_share": rain.intensity,
         }
     if weather.wind is not None:
-        found |= {"wind_direction": weather.wind.direction, "wind_speed": weather.wind.speed}
+        given_values |= {"wind_direction": weather.wind.direction, "wind_speed": weather.wind.speed}
     if weather.dome_image is not None:
-        found["dome_image"] = weather.dome_image.dome_file.filepath
-    return found
+        given_values["dome_image"] = weather.dome_image.dome_file.filepath
+    return given_values

@@ -24,15 +24,17 @@ class ExternalPose(NamedTuple):
 def user_value_warnings(
     requested: Mapping[str, Element], given: Collection[str], settings: Collection[str]
 ) -> Iterator[str]:
-    """Yield a warning for each value that a condition requests in vain, and for each setting that none requests.
+    """Yield a warning for each requested value without a setting, and for each setting that no condition reads.
 
-    requested  the element that requested each value first, by the name of the value
-    given      names of the values that the run has;  settings  names of those that its settings gave
+    requested  first element that requests each value, by the name of the value
+    given      names of the values that are set in the run
+    settings   names of the values that the settings of the run set
     """
-    for name, by in requested.items():
+    for name, element in requested.items():
         if name not in given:
-            where = f"{by.source}:{by.line}"
-            yield f"{where}: nobody gave the user-defined value {name!r}; use --user-value or set_user_value"
+            where = f"{element.source}:{element.line}"
+            effect = f"UserDefinedValueCondition {name!r} is never fulfilled: no value is set"
+            yield f"{where}: {effect}; use --user-value {name}=VALUE or set_user_value"
     for name in settings:
         if name not in requested:
-            yield f"no UserDefinedValueCondition asks for {name!r}; {suggestion(name, requested)}"
+            yield f"--user-value {name}: no UserDefinedValueCondition reads the value; {suggestion(name, requested)}"

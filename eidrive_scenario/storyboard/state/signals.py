@@ -1,4 +1,4 @@
-"""Traffic signals: what each of them shows."""
+"""States of the traffic signals of a run."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from eidrive_scenario.roads.model.signal_states import DEFAULT_LAMPS, lamp_color
 from eidrive_scenario.storyboard.state.signal_cycles import SignalCycle, cycle_errors, cycle_warnings, signal_cycles
 
 SAME_PLACE = 2.0
-"""ScenarioRunner's `pos=x,y` means the signal that is at most this far from the point [m]."""
+"""Maximum distance between a signal and the point of ScenarioRunner's `pos=x,y` [m]."""
 
 
 class Signals:
-    """All traffic signals of a run; one that nobody has set shows nothing.
+    """Traffic signals of a run. A signal has no state until an action or a phase sets it.
 
-    problems, warnings  what makes no sense in the declarations of controllers, and what is odd there
+    cycles    cycles of the signal controllers, by name
+    errors    errors in the declarations of controllers
+    warnings  warnings of these declarations
     """
 
     def __init__(self, declared: model.TrafficSignals | None, roads: RoadNetwork | None) -> None:
@@ -33,79 +35,82 @@ class Signals:
         self.warnings = () if self.errors else tuple(cycle_warnings(self.cycles))
         self._states: dict[str, str] = {}
         self._running: dict[str, int | None] = {}
-        self._spelled: dict[str, str] = {}
+        self._ids: dict[str, str] = {}
         self.states: Mapping[str, str] = MappingProxyType(self._states)
-        """What each signal shows, by id: the same object until something changes."""
+        """State of each signal by id: the same object until a state changes."""
 
     def state(self, name: str) -> str | None:
-        """What a signal shows; None if nobody has set it."""
+        """Return the state of a signal; None before it is set."""
         return self._states.get(self.identify(name))
 
     def must_stop(self, name: str) -> bool:
-        """Whether a signal tells traffic to stop."""
+        """Whether the state of a signal requires vehicles to stop."""
         state = self.state(name)
         return state is not None and must_stop(state, self._colors.get(name) or DEFAULT_LAMPS)
 
     def set_state(self, name: str, state: str) -> None:
-        """Let a signal show a state, until its controller's next phase begins or somebody sets it again."""
-        self._show({self.identify(name): state})
+        """Set the state of a signal; the next phase of its controller or another action replaces it."""
+        self._set_states({self.identify(name): state})
 
     def phase(self, controller: str) -> str | None:
-        """The name of the phase in which a controller is."""
+        """Return the name of the active phase of a controller; None without one."""
         number = self._running.get(controller)
         return None if number is None else self.cycles[controller].phases[number].name
 
     def set_phase(self, controller: str, phase: str, time: float) -> None:
-        """Let a phase of a controller begin now; its cycle goes on from there."""
+        """Start a phase of a controller at `time` [s]; its cycle continues from this phase."""
         self.cycles[controller].set_phase(phase, time)
         self._running.pop(controller, None)
         self.advance(time)
 
     def advance(self, time: float) -> None:
-        """Go over to the phases of this time [s]; what a phase sets, it sets when it begins."""
+        """Activate the phases of this time [s]. A phase sets the states of its signals when it starts."""
         for name, cycle in self.cycles.items():
             number = cycle.phase_at(time)
             if name not in self._running or self._running[name] != number:
                 self._running[name] = number
                 if number is not None:
-                    self._show(self._shown_in(cycle, cycle.phases[number]))
+                    self._set_states(self._phase_states(cycle, cycle.phases[number]))
 
     def identify(self, name: str) -> str:
-        """The id of the signal that a name means: an id, or ScenarioRunner's `id=…` and `pos=x,y`."""
-        if name not in self._spelled:
-            self._spelled[name] = self._meant(name)
-        return self._spelled[name]
+        """Return the id of the signal with this name: an id, or ScenarioRunner's `id=…` or `pos=x,y`."""
+        if name not in self._ids:
+            self._ids[name] = self._resolve_name(name)
+        return self._ids[name]
 
     def unknown(self, name: str, element: model.Element) -> Diagnostic | None:
-        """What is odd about the name of a signal; its state is kept by that name all the same."""
+        """Return a warning if the road network has no signal of this name; its state is stored nevertheless."""
         if self.identify(name) in self._colors:
             return None
         hint = suggestion(name, self._colors) if self._colors else "the road network has no signals"
-        message = f"the road network has no signal {name!r}: its state is kept, and nowhere to be seen"
+        message = f"{type(element).__name__}: the road network has no signal {name!r}; its state has no effect"
         return Diagnostic(message, hint, element.source, element.line)
 
-    def _shown_in(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
-        """A phase's states by signal; a group's is that of each of its signals, and of its own name without any."""
-        group = phase.traffic_signal_group_state or phase.traffice_signal_group_state
-        shown = dict.fromkeys(cycle.signals or (cycle.name,), group.state) if group is not None else {}
-        return shown | {self.identify(one.traffic_signal_id): one.state for one in phase.traffic_signal_state}
+    def _phase_states(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
+        """Return the states of a phase by signal. A group state holds for each signal of the group.
 
-    def _show(self, states: Mapping[str, str]) -> None:
+        Without signals it holds for the name of the controller.
+        """
+        group = phase.traffic_signal_group_state or phase.traffice_signal_group_state
+        states = dict.fromkeys(cycle.signals or (cycle.name,), group.state) if group is not None else {}
+        return states | {self.identify(one.traffic_signal_id): one.state for one in phase.traffic_signal_state}
+
+    def _set_states(self, states: Mapping[str, str]) -> None:
         if any(self._states.get(name) != state for name, state in states.items()):
             self._states = {**self._states, **states}
             self.states = MappingProxyType(self._states)
 
-    def _meant(self, name: str) -> str:
+    def _resolve_name(self, name: str) -> str:
         spelling, _, rest = name.partition("=")
         match spelling.strip().lower():
             case "id" if rest.strip():
                 return rest.strip()
             case "pos" if rest.strip():
-                return self._at(rest) or name
+                return self._nearest_signal(rest) or name
         return name
 
-    def _at(self, text: str) -> str | None:
-        """The nearest signal to a place in CARLA's left-handed coordinates, whose y points to the right."""
+    def _nearest_signal(self, text: str) -> str | None:
+        """Return the id of the nearest signal to a point in CARLA's left-handed coordinates (y to the right)."""
         try:
             x, y = (float(part) for part in text.split(",")[:2])
         except ValueError:

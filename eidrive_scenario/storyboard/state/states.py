@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class ElementState(Enum):
-    """Where an element is in its life."""
+    """State of an element."""
 
     STANDBY = "standbyState"
     RUNNING = "runningState"
@@ -15,7 +15,7 @@ class ElementState(Enum):
 
 
 class ElementTransition(Enum):
-    """How it came there; visible to conditions in the step in which it happens and until the next evaluation."""
+    """Transition of an element. Conditions observe it in its step, and until their next evaluation."""
 
     START = "startTransition"
     END = "endTransition"
@@ -25,16 +25,16 @@ class ElementTransition(Enum):
 
 @dataclass(frozen=True)
 class StateChange:
-    """One element changed its state at `time` [s]."""
+    """Change of the state of one element at `time` [s]."""
 
     time: float
     element: str
-    """Its name; `path` gives those above it too, with slashes."""
+    """Name of the element; `path` has the names of its parents too, separated by slashes."""
     path: str
     kind: str
-    """storyboard, story, act, maneuverGroup, maneuver, event or action."""
+    """Type of the element: storyboard, story, act, maneuverGroup, maneuver, event or action."""
     before: ElementState
     transition: ElementTransition | None
     after: ElementState
     why: str = ""
-    """What fired, in words, where a trigger did."""
+    """Description of the reason, such as the fulfilled trigger; empty without one."""

@@ -24,13 +24,14 @@ from eidrive_scenario.storyboard.state.element_states import ElementRecord
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition
 from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
 
-EMPTY = "it has no start trigger"
+NO_TRIGGER = "it has no start trigger"
+"""Reason for the start of an element without a start trigger."""
 
 
 class StoryElement(Composite):
-    """An element with children: it starts by its trigger or with its parent, and ends when all its children have.
+    """Element with children. It starts by its trigger or with its parent, and ends when all its children are complete.
 
-    `limit` is the maximumExecutionCount: having ended before it is reached, the element stands by again.
+    `limit` is the maximumExecutionCount: an element that ends before it is reached returns to standbyState.
     """
 
     kind = ""
@@ -53,33 +54,33 @@ class StoryElement(Composite):
         self.limit = limit
         self.executions = 0
         self._tried_at: int | None = None
-        """The tick in which it last started or was skipped."""
+        """Last tick in which it started or was skipped."""
         self.record: ElementRecord = context.progress.register(self.kind, path)
 
     @property
     def state(self) -> ElementState | None:
-        """None while those above it do not run."""
+        """State of the element; None before its parent starts."""
         return self.record.state
 
     def enter_standby(self) -> None:
-        """Wait for the start trigger; the parent has begun to run. What may never be executed is complete."""
+        """Enter standbyState as the parent starts. An element with maximumExecutionCount 0 is complete."""
         self.executions = 0
-        self._arm()
+        self._reset_triggers()
         if self.limit < 1:
-            self._change(ElementTransition.SKIP, ElementState.COMPLETE, "its maximumExecutionCount is 0")
+            self._change(ElementTransition.SKIP, ElementState.COMPLETE, "maximumExecutionCount is 0")
 
     def evaluate_triggers(self) -> None:
-        """First phase of a turn: stop, start, and let the children do the same.
+        """Stop and start this element and its children by their triggers.
 
-        A stop trigger is asked from the tick after the start on, that of the storyboard from the first tick.
+        A stop trigger is evaluated from the tick after the start on, that of the storyboard from the first tick on.
         """
         record = self.record
         if record.state is ElementState.COMPLETE:
             return
-        tried = self._tried_at == self.context.progress.tick
+        has_changed = self._tried_at == self.context.progress.tick
         if (
             record.state is ElementState.RUNNING
-            and not tried
+            and not has_changed
             and self.stop_leaf is not None
             and self.stop_leaf.is_fired()
         ):
@@ -87,17 +88,17 @@ class StoryElement(Composite):
             return
         if (
             record.state is ElementState.STANDBY
-            and not tried
+            and not has_changed
             and (self.start_leaf is None or self.start_leaf.is_fired())
         ):
-            self.start(EMPTY if self.start_leaf is None else self.start_leaf.trigger.why)
+            self.start(NO_TRIGGER if self.start_leaf is None else self.start_leaf.trigger.why)
         if record.state is ElementState.RUNNING:
             for element in self.elements:
                 if element.record.state is not ElementState.COMPLETE:
                     element.evaluate_triggers()
 
     def start(self, why: str = "") -> None:
-        """standby -> running; the children stand by, or start where they have no trigger."""
+        """Enter runningState; the children enter standbyState."""
         self._tried_at = self.context.progress.tick
         self.executions += 1
         self._change(ElementTransition.START, ElementState.RUNNING, why)
@@ -105,7 +106,7 @@ class StoryElement(Composite):
             element.enter_standby()
 
     def stop_element(self, why: str = "") -> None:
-        """Stop at once, with all that is below."""
+        """Stop this element and its children."""
         for element in self.elements:
             if element.state in (ElementState.STANDBY, ElementState.RUNNING):
                 element.stop_element(why)
@@ -113,22 +114,22 @@ class StoryElement(Composite):
         self.stop(Status.INVALID)
 
     def end(self) -> None:
-        """running -> complete, or standby where it may be executed again."""
+        """Enter completeState, or standbyState if executions are left."""
         if self.executions < self.limit:
             self._change(ElementTransition.END, ElementState.STANDBY)
-            self._arm()
+            self._reset_triggers()
         else:
             self._change(ElementTransition.END, ElementState.COMPLETE)
 
     def complete_finished(self) -> None:
-        """What the last step brought to its goal ends."""
+        """End the actions that reached their goals in the last step, and completed parents."""
         if self.state is ElementState.RUNNING:
             for element in self.elements:
                 element.complete_finished()
             self.complete_if_done()
 
     def update_children(self) -> None:
-        """Second phase of a turn: the running children decide; all of them complete, so is this one."""
+        """Update the running children; end if all of them are complete."""
         self.status = Status.RUNNING
         if self.record.state is ElementState.RUNNING:
             for element in self.elements:
@@ -139,12 +140,12 @@ class StoryElement(Composite):
             self.status = Status.SUCCESS
 
     def tick(self) -> Iterator[Behaviour]:
-        """`update_children` as py_trees asks for it."""
+        """Update the children; the interface of py_trees."""
         self.update_children()
         yield self
 
     def complete_if_done(self) -> None:
-        """End if all children are complete; what has none has no end of its own, and runs until it is stopped."""
+        """End if all children are complete; an element without children runs until it is stopped."""
         if self.record.state is not ElementState.RUNNING or not self.elements:
             return
         for element in self.elements:
@@ -152,7 +153,7 @@ class StoryElement(Composite):
                 return
         self.end()
 
-    def _arm(self) -> None:
+    def _reset_triggers(self) -> None:
         for leaf in (self.start_leaf, self.stop_leaf):
             if leaf is not None:
                 leaf.stop(Status.INVALID)
@@ -163,12 +164,12 @@ class StoryElement(Composite):
 
 
 class StoryboardElement(StoryElement):
-    """The root. It ends by its stop trigger; the stories' end is its own only where it has none."""
+    """Root of the tree. It ends by its stop trigger; without one with its last story."""
 
     kind = "storyboard"
 
     def tick_tree(self, init: Behaviour | None = None) -> None:
-        """One tick of the whole tree, and of the actions that Init left running."""
+        """Tick the tree, and the actions of Init that are running."""
         progress = self.context.progress
         if self.state is None:
             self.enter_standby()
@@ -188,31 +189,31 @@ class StoryboardElement(StoryElement):
                 init = None
             self.update_children()
             if seen == len(progress.changes):
-                waiting, self.context.pending_actions = self.context.pending_actions, []
-                for action in waiting:
+                pending, self.context.pending_actions = self.context.pending_actions, []
+                for action in pending:
                     action.abort()
 
     def complete_if_done(self) -> None:
-        """End with the last story, if nothing else would end the storyboard."""
+        """End with the last story if the storyboard has no stop trigger."""
         if self.stop_leaf is None:
             super().complete_if_done()
 
 
 class StoryNode(StoryElement):
-    """A Story."""
+    """Story of the standard."""
 
     kind = "story"
 
 
 @dataclass
 class TriggeringEntities:
-    """Those who fulfilled the start trigger of an act: actors in its groups that select them (1.3.1, 7.3.1)."""
+    """Entities that fulfilled the start trigger of an act; groups may select them as actors (1.3.1, 7.3.1)."""
 
     names: tuple[str, ...] = ()
 
 
 class ActElement(StoryElement):
-    """An Act."""
+    """Act of the standard."""
 
     kind = "act"
 
@@ -230,19 +231,19 @@ class ActElement(StoryElement):
         self._triggering = triggering or TriggeringEntities()
 
     def start(self, why: str = "") -> None:
-        """standby -> running; whoever triggered it acts in it."""
+        """Enter runningState and store the triggering entities."""
         if self.start_leaf is not None:
             self._triggering.names = self.start_leaf.trigger.triggering
         super().start(why)
 
 
 class ManeuverGroupElement(StoryElement):
-    """A ManeuverGroup: actors for the maneuvers below."""
+    """ManeuverGroup of the standard: actors of its maneuvers."""
 
     kind = "maneuverGroup"
 
 
 class ManeuverElement(StoryElement):
-    """A Maneuver: events that know each other's priorities."""
+    """Maneuver of the standard: events with priorities."""
 
     kind = "maneuver"

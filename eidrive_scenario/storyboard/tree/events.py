@@ -1,4 +1,4 @@
-"""Events and their actions: priorities, actors, and who holds which domain."""
+"""Events and actions: priorities, actors and control domains."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
 
 
 class EventElement(StoryElement):
-    """An Event: actions that start together by its trigger.
+    """Event: actions that start together by its trigger.
 
-    Its priority says what becomes of the running events of the same maneuver: `override` (before 1.2 `overwrite`)
-    stops them, however many executions they have left, `skip` lets them run and skips this one, which counts as one of
-    its executions, `parallel` lets all run (ASAM OpenSCENARIO XML 1.3.1, 8.4.2).
+    Its priority determines the effect on running events of the same maneuver (ASAM OpenSCENARIO XML 1.3.1, 8.4.2):
+
+    - `override` (before 1.2 `overwrite`) stops them, regardless of their remaining executions.
+    - `skip` skips this event, which counts as one of its executions.
+    - `parallel` has no effect on them.
     """
 
     kind = "event"
@@ -38,10 +40,10 @@ class EventElement(StoryElement):
         super().__init__(context, path, actions, start=start, limit=limit)
         self.priority = priority
         self._running: dict[EventElement, None] = {}
-        """The running events of the maneuver, in the order in which they started."""
+        """Running events of the maneuver, in order of their starts."""
 
     def start(self, why: str = "") -> None:
-        """Start by priority."""
+        """Start or skip the event by its priority."""
         self._tried_at = self.context.progress.tick
         alone = self.priority == "parallel"
         running = [] if alone else list(self._running)
@@ -51,8 +53,8 @@ class EventElement(StoryElement):
             self._change(ElementTransition.SKIP, after, f"{running[0].name} is running")
             return
         if self.priority in ("override", "overwrite"):
-            for rival in running:
-                rival.stop_element(f"{self.name} overrides it")
+            for event in running:
+                event.stop_element(f"overridden by {self.name}")
         self.executions += 1
         self._change(ElementTransition.START, ElementState.RUNNING, why)
         for action in sorted(self.elements, key=_takes_time):
@@ -67,16 +69,16 @@ class EventElement(StoryElement):
 
     @staticmethod
     def resolve_priorities(events: Iterable[EventElement]) -> None:
-        """Let the priorities of these events count against each other."""
+        """Let the priorities of these events apply to each other."""
         running: dict[EventElement, None] = {}
         for event in events:
             event._running = running
 
 
 class ActionElement(StoryElement):
-    """An Action: one behaviour per actor. `make(actor)` builds them, as the actors may be known only at the start.
+    """Action: one behaviour per actor. `make(actor)` builds them, as triggering entities are known at the start only.
 
-    `selections` are the groups among the actors: of these it loses its domains together.
+    `selections` are the entity selections among the actors, whose members lose their domains together.
     """
 
     kind = "action"
@@ -95,40 +97,40 @@ class ActionElement(StoryElement):
         self._make = make
         self._selections = selections
         self.triggering = triggering
-        """Who acts beside the actors."""
-        self._made: dict[str | None, list[ActionBehaviour]] = {}
+        """Triggering entities that are additional actors."""
+        self._behaviours: dict[str | None, list[ActionBehaviour]] = {}
         self.actors = tuple(actors)
         self.running: list[ActionBehaviour] = []
-        self._there: list[ActionBehaviour] = []
-        """Those that the step which goes on brings to their goal; they hold their domains until they are there."""
-        self._waiting: dict[DomainHolder, tuple[ActionBehaviour, EntityAbsentError]] = {}
-        """Those that start at this instant, but for somebody who is not in the world, and may be when all is done."""
+        self._completing: list[ActionBehaviour] = []
+        """Behaviours that reach their goals in the current step; they hold their domains until its end."""
+        self._awaiting: dict[DomainHolder, tuple[ActionBehaviour, EntityAbsentError]] = {}
+        """Behaviours that start at this instant and await an entity that may enter the world at this instant."""
         self._decided_at: int | None = None
         for actor in self.actors:
             self.add_children(list(self.behaviours(actor)))
 
     def behaviours(self, actor: str | None) -> list[ActionBehaviour]:
-        """The behaviours for one actor."""
-        if actor not in self._made:
-            self._made[actor] = self._make(actor)
-        return self._made[actor]
+        """Return the behaviours of one actor."""
+        if actor not in self._behaviours:
+            self._behaviours[actor] = self._make(actor)
+        return self._behaviours[actor]
 
     def start(self, why: str = "") -> None:
-        """standby -> running, for the actors of the group and those whom it selects."""
+        """Enter runningState with the actors of the group and the triggering entities."""
         actors = self.actors
         if self.triggering is not None:
             actors = tuple(dict.fromkeys([*actors, *self.triggering.names]))
         self.running = [behaviour for actor in actors for behaviour in self.behaviours(actor)]
         self.enter_standby()
         self._tried_at, self._decided_at = self.context.progress.tick, None
-        self._there, self._waiting = [], {}
+        self._completing, self._awaiting = [], {}
         self.executions += 1
         self._change(ElementTransition.START, ElementState.RUNNING, why)
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
             self.context.acquire_domain(behaviour.actor_name, behaviour.controls, self, behaviour)
             if behaviour.immediate:
-                self._let_decide(behaviour)
+                self._update_behaviour(behaviour)
         for behaviour in [behaviour for behaviour in self.running if behaviour.status is Status.SUCCESS]:
             self.running.remove(behaviour)
             self.context.release_domains(behaviour)
@@ -136,30 +138,30 @@ class ActionElement(StoryElement):
             self._change(ElementTransition.END, ElementState.COMPLETE)
 
     def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
-        """That one, and those of the entities with which its actor forms a selection among the actors."""
-        names = {held.actor_name for held in self.running if held is behaviour}
+        """Return the behaviours of the actor and of the entity selections that contain it."""
+        names = {other.actor_name for other in self.running if other is behaviour}
         for members in self._selections:
             if not names.isdisjoint(members):
                 names |= set(members)
-        return [held for held in self.running if held.actor_name in names]
+        return [other for other in self.running if other.actor_name in names]
 
     @property
     def takes_time(self) -> bool:
-        """Whether any of its behaviours lasts longer than the instant at which it starts."""
-        return not all(held.at_once for actor in self.actors for held in self.behaviours(actor))
+        """Whether one of its behaviours does not end at its start."""
+        return not all(other.at_once for actor in self.actors for other in self.behaviours(actor))
 
     def preempt(self, behaviour: DomainHolder, why: str) -> None:
-        """A younger action took the domain of this behaviour. One that takes no time has its effect before that."""
+        """Stop a behaviour whose domain another action acquired. A behaviour that takes no time is executed before."""
         done = False
-        for held in self.running:
-            if held is behaviour:
-                if held.at_once and self._decided_at is None and self._tried_at == self.context.progress.tick:
-                    self._let_decide(held)
-                    done = held.status is Status.SUCCESS
-                held.stop(Status.INVALID)
+        for other in self.running:
+            if other is behaviour:
+                if other.at_once and self._decided_at is None and self._tried_at == self.context.progress.tick:
+                    self._update_behaviour(other)
+                    done = other.status is Status.SUCCESS
+                other.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
-        self._there = [other for other in self._there if other is not behaviour]
-        self._waiting.pop(behaviour, None)
+        self._completing = [other for other in self._completing if other is not behaviour]
+        self._awaiting.pop(behaviour, None)
         if not self.running and self.state is ElementState.RUNNING:
             if done:
                 self._change(ElementTransition.END, ElementState.COMPLETE)
@@ -167,69 +169,69 @@ class ActionElement(StoryElement):
                 self._change(ElementTransition.STOP, ElementState.COMPLETE, why)
 
     def stop_element(self, why: str = "") -> None:
-        """Stop all its behaviours."""
+        """Stop all behaviours."""
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
             self.context.release_domains(behaviour)
-        self.running, self._there, self._waiting = [], [], {}
+        self.running, self._completing, self._awaiting = [], [], {}
         self._change(ElementTransition.STOP, ElementState.COMPLETE, why)
         self.status = Status.INVALID
 
     def complete_finished(self) -> None:
-        """The behaviours that the last step brought to their goal are done; the last one, and so is the action."""
+        """End the behaviours that reached their goals in the last step; end the action with the last one."""
         if self.state is ElementState.RUNNING:
-            there, self._there = self._there, []
-            self._let_go(there)
+            completing, self._completing = self._completing, []
+            self._end_behaviours(completing)
 
     def update_children(self) -> None:
-        """The behaviours decide, once per tick; what they bring about shows at the end of the step: there they end."""
+        """Update the behaviours once per tick; those that reach their goals end at the end of the step."""
         self.status = Status.RUNNING
         now = self.context.progress.tick
         if self._decided_at != now:
             self._decided_at = now
-            self._decide(self.running)
-        elif self._waiting:
-            self._decide([behaviour for behaviour, _ in self._waiting.values()])
+            self._update_all(self.running)
+        elif self._awaiting:
+            self._update_all([behaviour for behaviour, _ in self._awaiting.values()])
         if self.state is ElementState.COMPLETE:
             self.status = Status.SUCCESS
 
-    def _decide(self, behaviours: Sequence[ActionBehaviour]) -> None:
+    def _update_all(self, behaviours: Sequence[ActionBehaviour]) -> None:
         done: list[ActionBehaviour] = []
         for behaviour in tuple(behaviours):
-            self._let_decide(behaviour)
+            self._update_behaviour(behaviour)
             if behaviour.status in (Status.SUCCESS, Status.FAILURE):
-                (done if behaviour.immediate else self._there).append(behaviour)
-        self.context.completes_this_step = self.context.completes_this_step or bool(self._there)
-        self._let_go(done)
+                (done if behaviour.immediate else self._completing).append(behaviour)
+        self.context.completes_this_step = self.context.completes_this_step or bool(self._completing)
+        self._end_behaviours(done)
 
-    def _let_decide(self, behaviour: ActionBehaviour) -> None:
-        self._waiting.pop(behaviour, None)
+    def _update_behaviour(self, behaviour: ActionBehaviour) -> None:
+        self._awaiting.pop(behaviour, None)
         try:
             if behaviour.status is not Status.RUNNING and behaviour.is_actor_missing:
                 raise EntityAbsentError(behaviour.actor_name)
             behaviour.tick_once()
             if behaviour.third_party or behaviour.status is Status.INVALID:
                 behaviour.check_decision()
-        except EntityAbsentError as who:
+        except EntityAbsentError as absent:
             if self._tried_at == self.context.progress.tick:
                 behaviour.stop(Status.INVALID)
-                self._waiting[behaviour] = behaviour, who
+                self._awaiting[behaviour] = behaviour, absent
                 self.context.pending_actions.append(self)
             else:
-                self._abort_behaviour(behaviour, who)
+                self._abort_behaviour(behaviour, absent)
 
     def abort(self) -> None:
-        """Stop what waited in vain for somebody to enter the world at this instant."""
-        waiting, self._waiting = self._waiting, {}
-        for behaviour, who in waiting.values():
-            self._abort_behaviour(behaviour, who)
+        """Stop the behaviours whose entity has not entered the world at this instant."""
+        awaiting, self._awaiting = self._awaiting, {}
+        for behaviour, absent in awaiting.values():
+            self._abort_behaviour(behaviour, absent)
 
     def _abort_behaviour(self, behaviour: ActionBehaviour, absent: EntityAbsentError) -> None:
         why = behaviour.abort(absent)
         self.context.release_domains(behaviour)
         self.preempt(behaviour, why)
 
-    def _let_go(self, done: Sequence[ActionBehaviour]) -> None:
+    def _end_behaviours(self, done: Sequence[ActionBehaviour]) -> None:
         for behaviour in done:
             self.running.remove(behaviour)
             self.context.release_domains(behaviour)
@@ -238,5 +240,5 @@ class ActionElement(StoryElement):
 
 
 def _takes_time(action: StoryElement) -> bool:
-    """Sort key: actions of one event start together, and those that take no time have their effect first."""
+    """Sort key: of the actions of one event, those that take no time are executed first."""
     return isinstance(action, ActionElement) and action.takes_time

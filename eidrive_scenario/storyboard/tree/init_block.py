@@ -1,4 +1,4 @@
-"""The actions of Init: what holds before the first view, and what goes on from there."""
+"""Actions of Init: executed before the first view, and continued from there."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 
 
 class InitBlock(Composite):
-    """The actions of Init. Those that need time go on until they end or a younger action takes their domain."""
+    """Actions of Init. Those that take time run until they end or another action acquires their domain."""
 
     def __init__(self, context: RuntimeContext, behaviours: Sequence[ActionBehaviour]) -> None:
         super().__init__("Init", list(behaviours))
@@ -24,21 +24,23 @@ class InitBlock(Composite):
         self.running: list[ActionBehaviour] = list(behaviours)
 
     def start(self) -> None:
-        """Do what holds before the first view, in the order of the file.
+        """Execute the actions before the first view, in the order of the file.
 
-        An action whose position refers to an entity that is placed further below waits for it. Raises ScenarioError
-        where entities refer to each other in a circle.
+        An action that refers to an entity that a later action places is executed after it. Raise ScenarioError for
+        cyclic references.
         """
-        waiting = list(self.running)
-        while waiting:
-            late = [behaviour for behaviour in waiting if not self._started(behaviour)]
-            if len(late) == len(waiting):
-                raise late[0].error("refers to an entity that nobody places", "place that entity in Init")
-            waiting = late
+        pending = list(self.running)
+        while pending:
+            blocked = [behaviour for behaviour in pending if not self._start_behaviour(behaviour)]
+            if len(blocked) == len(pending):
+                raise blocked[0].error(
+                    "the position refers to an entity without a position", "place that entity in Init"
+                )
+            pending = blocked
         for behaviour in self.running:
-            behaviour.settle()
+            behaviour.finish_init()
 
-    def _started(self, behaviour: ActionBehaviour) -> bool:
+    def _start_behaviour(self, behaviour: ActionBehaviour) -> bool:
         try:
             behaviour.tick_once()
             if behaviour.third_party or behaviour.status is Status.INVALID:
@@ -53,31 +55,31 @@ class InitBlock(Composite):
         return True
 
     def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
-        """Those of one action: of a selection, else the one alone."""
+        """Return the behaviours of the same action, several for an entity selection."""
         actions = [other.action for other in self.running if other is behaviour]
         return [other for other in self.running if any(other.action is action for action in actions)]
 
     def preempt(self, behaviour: DomainHolder, why: str) -> None:
-        """A younger action took the domain."""
-        for held in self.running:
-            if held is behaviour:
-                held.stop(Status.INVALID)
+        """Stop a behaviour whose domain another action acquired."""
+        for other in self.running:
+            if other is behaviour:
+                other.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
 
     def tick(self) -> Iterator[Behaviour]:
-        """`tick_once` as py_trees asks for it."""
+        """Tick once; the interface of py_trees."""
         self.tick_once()
         yield self
 
     def tick_once(self) -> None:
-        """Let the running ones decide on the next step."""
+        """Update the running behaviours."""
         for behaviour in tuple(self.running):
             try:
                 behaviour.tick_once()
                 if behaviour.third_party or behaviour.status is Status.INVALID:
                     behaviour.check_decision()
-            except EntityAbsentError as who:
-                behaviour.abort(who)
+            except EntityAbsentError as absent:
+                behaviour.abort(absent)
             if behaviour.status is not Status.RUNNING:
                 self.running.remove(behaviour)
                 self.context.release_domains(behaviour)

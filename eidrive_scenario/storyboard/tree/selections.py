@@ -1,4 +1,4 @@
-"""Groups of entities: EntitySelections, wherever the standard lets a name of an entity stand."""
+"""Entity selections, which may replace the name of an entity."""
 
 from __future__ import annotations
 
@@ -15,92 +15,92 @@ from eidrive_scenario.storyboard.context.protocols import ConditionContext
 E = TypeVar("E", bound=model.Element)
 
 REFERENCES = ("entity_ref", "master_entity_ref", "trailer_ref")
-"""Attributes that name an entity."""
+"""Attributes that refer to an entity."""
 
 EMPTY_MEMBER = ""
-"""What stands in a list of entities for a group without members: an empty list would mean all entities."""
+"""Entry of a list of entities for a selection without members, as an empty list refers to all entities."""
 
 TYPES: Mapping[type[model.Element], str] = {
     model.Vehicle: "vehicle",
     model.Pedestrian: "pedestrian",
     model.MiscObject: "miscellaneous",
 }
-"""What a class is called where entities are selected by type; what another tool defines is `external`."""
+"""Object type of each class; external objects have the type `external`."""
 
 
 class Selections:
-    """The groups of one scenario."""
+    """Entity selections of one scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._entities = scenario.entities
         self._external = scenario.external
         entities = scenario.document.entities
-        declared = entities.entity_selection if entities is not None else ()
-        self._groups = {one.name: one for one in declared if one.name not in scenario.entities}
+        declarations = entities.entity_selection if entities is not None else ()
+        self._groups = {one.name: one for one in declarations if one.name not in scenario.entities}
 
     def members(self, name: str) -> list[str]:
-        """The entity of this name, or the members of the group, each once. Raises ScenarioError for a circle."""
+        """Return the entity of this name, or the members of the selection. Raise ScenarioError for a cycle."""
         return list(dict.fromkeys(self._members(name, ())))
 
     def alternatives(self, element: E) -> list[E]:
-        """The element once for each way to put members in place of the groups that it names; itself if it names none.
+        """Return the element once per combination of members of the selections that it refers to.
 
-        A list of entities (of a RelativeClearanceCondition) takes all members of a group.
+        A list of entities (of a RelativeClearanceCondition) contains all members of a selection.
         """
-        element = self._with_lists(element)
-        groups = sorted(self._named_in(element))
+        element = self._with_expanded_lists(element)
+        groups = sorted(self._named_groups(element))
         choices = product(*(self.members(group) for group in groups))
-        return [_renamed(element, dict(zip(groups, chosen, strict=True))) for chosen in choices]
+        return [_with_names(element, dict(zip(groups, chosen, strict=True))) for chosen in choices]
 
     def single(self, element: E) -> E:
-        """The element with a member in place of each group that it names. Raises ScenarioError unless there is one."""
+        """Return the element with the member of each selection. Raise ScenarioError unless each has one member."""
         found = self.alternatives(element)
         if len(found) == 1:
             return found[0]
-        group = sorted(self._named_in(element))[0]
+        group = sorted(self._named_groups(element))[0]
         raise ScenarioError(
             Diagnostic(
-                f"{type(element).__name__} names the selection {group!r} of {len(self.members(group))} entities",
-                "one entity has to stand there",
+                f"{type(element).__name__} refers to selection {group!r}",
+                f"got a selection of {len(self.members(group))} entities; expected one entity",
                 element.source,
                 element.line,
             )
         )
 
-    def _members(self, name: str, above: tuple[str, ...]) -> Iterator[str]:
+    def _members(self, name: str, parents: tuple[str, ...]) -> Iterator[str]:
         group = self._groups.get(name)
         if group is None:
             yield name
             return
-        if name in above:
-            told = f"the selection {name!r} is a member of itself"
-            raise ScenarioError(Diagnostic(told, "take it out", group.source, group.line))
+        if name in parents:
+            text = f"selection {name!r} is a member of itself"
+            raise ScenarioError(Diagnostic(text, "remove it from its members", group.source, group.line))
         for ref in group.members.entity_ref:
-            yield from self._members(ref.entity_ref, (*above, name))
+            yield from self._members(ref.entity_ref, (*parents, name))
         for entry in group.members.by_type:
-            yield from self._of_type(entry.object_type.value)
+            yield from self._entities_of_type(entry.object_type.value)
 
-    def _of_type(self, kind: str) -> Iterator[str]:
+    def _entities_of_type(self, kind: str) -> Iterator[str]:
         for name, entity in self._entities.items():
             if ("external" if name in self._external else TYPES[type(entity)]) == kind:
                 yield name
 
-    def _named_in(self, element: model.Element) -> set[str]:
+    def _named_groups(self, element: model.Element) -> set[str]:
         if not self._groups:
             return set()
-        named = (getattr(below, name, None) for below in element.walk() for name in REFERENCES)
+        named = (getattr(child, name, None) for child in element.walk() for name in REFERENCES)
         return {name for name in named if isinstance(name, str) and name in self._groups}
 
-    def _with_lists(self, element: E) -> E:
-        """The element with groups in its own lists of entities replaced by their members; empty ones mean nobody."""
+    def _with_expanded_lists(self, element: E) -> E:
+        """Return the element with selections in its lists of entities replaced by their members."""
         if not self._groups:
             return element
-        listed = getattr(element, "entity_ref", None)
-        if not isinstance(listed, tuple):
+        references = getattr(element, "entity_ref", None)
+        if not isinstance(references, tuple):
             return element
         refs = [
             replace(ref, entity_ref=member)
-            for ref in listed
+            for ref in references
             for member in self.members(ref.entity_ref) or [EMPTY_MEMBER]
         ]
         changes: dict[str, Any] = {"entity_ref": tuple(dict.fromkeys(refs))}
@@ -108,7 +108,7 @@ class Selections:
 
 
 class AnyMemberCondition(EntityCondition):
-    """A condition that names a group: it holds for an entity if it holds towards any member, one condition each."""
+    """Condition that refers to a selection: it is fulfilled if it is fulfilled for any member."""
 
     def __init__(
         self, element: model.Element, entities: Sequence[str], rule: str, conditions: Sequence[EntityCondition]
@@ -117,45 +117,45 @@ class AnyMemberCondition(EntityCondition):
         self.conditions = tuple(conditions)
 
     def bind(self, context: ConditionContext) -> None:
-        """Bind them all."""
+        """Bind the conditions of all members."""
         for condition in self.conditions:
             condition.bind(context)
 
     def holds_for(self, context: ConditionContext, entity: str) -> bool:
-        """Ask all, so that their histories stay whole."""
+        """Whether it is fulfilled for any member. All are evaluated, so that their histories are complete."""
         return any([condition.holds_for(context, entity) for condition in self.conditions])
 
     def explain_for(self, context: ConditionContext, entity: str) -> str:
-        """What is true of the first member towards which it holds, or of all."""
-        holding = [condition for condition in self.conditions if condition.holds_for(context, entity)]
-        told = [condition.explain_for(context, entity) for condition in holding[:1] or self.conditions]
-        return " or ".join(told) or f"{entity}: {self.describe_for()}"
+        """Describe the values for the first member that fulfills it; without one, for all members."""
+        fulfilled = [condition for condition in self.conditions if condition.holds_for(context, entity)]
+        text = [condition.explain_for(context, entity) for condition in fulfilled[:1] or self.conditions]
+        return " or ".join(text) or f"{entity}: {self.describe_for()}"
 
     def describe_for(self) -> str:
-        """Each of them."""
-        told = [condition.describe_for() for condition in self.conditions]
-        return " or ".join(told) or f"{super().describe_for()} towards a selection without members"
+        """Describe the conditions of all members."""
+        text = [condition.describe_for() for condition in self.conditions]
+        return " or ".join(text) or f"{super().describe_for()} for a selection without members"
 
     def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
-        """Those of all."""
+        """Return the quantities of all members."""
         return tuple(measure for condition in self.conditions for measure in condition.measures(context))
 
 
-def _renamed(element: E, names: Mapping[str, str]) -> E:
-    """A copy with entities by other names; the element itself where nothing changes."""
+def _with_names(element: E, names: Mapping[str, str]) -> E:
+    """Return a copy with other names of entities; the element itself without a change."""
     if not names:
         return element
     changes: dict[str, Any] = {}
     for field in fields(element):
         value = getattr(element, field.name)
         if isinstance(value, model.Element):
-            after: Any = _renamed(value, names)
+            changed: Any = _with_names(value, names)
         elif isinstance(value, tuple):
-            after = tuple(_renamed(one, names) if isinstance(one, model.Element) else one for one in value)
+            changed = tuple(_with_names(one, names) if isinstance(one, model.Element) else one for one in value)
         elif field.name in REFERENCES and value in names:
-            after = names[value]
+            changed = names[value]
         else:
             continue
-        if after != value:
-            changes[field.name] = after
+        if changed != value:
+            changes[field.name] = changed
     return replace(element, **changes) if changes else element

@@ -1,4 +1,4 @@
-"""Triggers: groups of conditions joined by OR, the conditions of a group by AND; edges and delays."""
+"""Triggers: disjunction of condition groups, conjunction of the conditions of a group; edges and delays."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from eidrive_scenario.tolerances import EPSILON
 
 
 class ConditionEvaluator:
-    """A condition with its edge and delay.
+    """Evaluation of a condition with its edge and delay.
 
-    An edge needs a value before it: the first evaluation yields none. It lasts for the rest of its tick, so that it
-    meets what else comes true at that instant. With a delay, the answer at t is the edge's result at t - delay; before
-    the first evaluation it is false.
+    An edge requires a previous value, so that the first evaluation has none. It lasts until the end of its tick, so
+    that it coincides with other conditions that are fulfilled at that instant. With a delay, the result at t is that of
+    the edge at t - delay; before the first evaluation it is false.
     """
 
     def __init__(self, condition: Condition, *, name: str = "", edge: str = "none", delay: float = 0.0) -> None:
@@ -30,62 +30,62 @@ class ConditionEvaluator:
         self.edge = edge
         self.delay = delay
         self.evaluations = 0
-        """How often the condition was asked."""
+        """Number of evaluations of the condition."""
         self.reset()
 
     def reset(self) -> None:
-        """Forget all evaluations."""
+        """Discard all evaluations."""
         self.value: bool | None = None
-        """What the condition was when it was last asked, without edge and delay; None before the first time."""
+        """Last value of the condition without edge and delay; None before the first evaluation."""
         self.result = False
-        """What it counted as then."""
+        """Last result with edge and delay."""
         self.triggering: tuple[str, ...] = ()
-        """The entities that made it so: those that fulfilled it or, where it counts as it ends, had fulfilled it."""
+        """Entities of the last result: those that fulfill the condition; on a falling edge, those that did before."""
         self._fulfilled: tuple[str, ...] = ()
-        self._asked_at: int | None = None
-        self._pulse = False
+        self._evaluated_at: int | None = None
+        self._edge_in_tick = False
         self._recorded = False
         self._history: deque[tuple[float, bool, str, tuple[str, ...]]] = deque()
         self._delayed: tuple[bool, str] = (False, "")
 
     def evaluate(self, context: RuntimeContext) -> bool:
-        """Ask the condition and answer with edge and delay; again in one tick only where it may have changed since."""
-        again = self._asked_at == context.progress.tick
-        if again and not self.condition.instant:
+        """Evaluate the condition with edge and delay; repeatedly within a tick only if its value can change."""
+        is_repeated = self._evaluated_at == context.progress.tick
+        if is_repeated and not self.condition.instant:
             return self.result
-        self._asked_at = context.progress.tick
+        self._evaluated_at = context.progress.tick
         self.evaluations += 1
         held: object = self.condition.holds(context)
-        result = self._edge(held if held is True or held is False else truth(self.condition, held))
-        if again and self.edge != "none" and self._pulse:
+        result = self._apply_edge(held if held is True or held is False else truth(self.condition, held))
+        if is_repeated and self.edge != "none" and self._edge_in_tick:
             return self.result
-        self._pulse = result
+        self._edge_in_tick = result
         before, self._fulfilled = self._fulfilled, getattr(self.condition, "fulfilled", ())
-        who = self._fulfilled if self.value else before
+        entities = self._fulfilled if self.value else before
         if self.delay <= 0.0:
-            self.result, self.triggering = result, who
+            self.result, self.triggering = result, entities
         else:
-            self.result = self._late(context, result, who)
+            self.result = self._apply_delay(context, result, entities)
         return self.result
 
-    def _late(self, context: RuntimeContext, result: bool, who: tuple[str, ...]) -> bool:
-        """Return the result of the delay ago; each true one is kept with the values of its own instant."""
+    def _apply_delay(self, context: RuntimeContext, result: bool, entities: tuple[str, ...]) -> bool:
+        """Return the delayed result; true ones are stored with the explanation at their instant."""
         if result or self._recorded:
             self._recorded = result
-            self._history.append((context.time, result, self._words(context) if result else "", who))
+            self._history.append((context.time, result, self._explain(context) if result else "", entities))
         while self._history and self._history[0][0] <= context.time - self.delay + EPSILON:
             _, value, text, self.triggering = self._history.popleft()
             self._delayed = (value, text)
         return self._delayed[0]
 
-    def _words(self, context: RuntimeContext) -> str:
-        """Return the condition with its values of now."""
+    def _explain(self, context: RuntimeContext) -> str:
+        """Return the explanation of the condition with its current values."""
         text: object = self.condition.explain(context)
         if not isinstance(text, str):
-            raise InvalidResult(self.condition, "explain", f"returned {text!r} (expected a text)")
+            raise InvalidResult(self.condition, "explain", f"returned {text!r} (expected str)")
         return text if self.value or self.edge == "none" else f"{text} (falling edge)"
 
-    def _edge(self, value: bool) -> bool:
+    def _apply_edge(self, value: bool) -> bool:
         before, self.value = self.value, value
         if self.edge == "none":
             return value
@@ -94,74 +94,74 @@ class ConditionEvaluator:
         return self.edge == "risingOrFalling" or (self.edge == "rising") == value
 
     def why(self, context: RuntimeContext) -> str:
-        """What made it true, in words, with the values of that instant; to be asked where it just was true."""
+        """Describe the true condition with the values at its instant; valid after a true result."""
         if self.delay <= 0.0:
-            return self._words(context)
+            return self._explain(context)
         return f"{self._delayed[1]}, {self.delay:g} s ago"
 
     def describe(self) -> str:
-        """The condition in words."""
+        """Describe the condition with edge and delay."""
         edge = {"none": "", "rising": " becomes true", "falling": " becomes false", "risingOrFalling": " changes"}
-        late = f", {self.delay:g} s later" if self.delay > 0.0 else ""
-        return f"{self.condition.describe()}{edge[self.edge]}{late}"
+        delay = f", {self.delay:g} s later" if self.delay > 0.0 else ""
+        return f"{self.condition.describe()}{edge[self.edge]}{delay}"
 
 
 @dataclass(frozen=True)
 class ConditionGroup:
-    """An AND over conditions at one instant."""
+    """Conjunction of conditions at one instant."""
 
     monitors: tuple[ConditionEvaluator, ...]
 
     def evaluate(self, context: RuntimeContext) -> bool:
-        """True where all are; each is asked every time, as edges and delays live on what they saw before."""
+        """Whether all conditions are true. Each is evaluated, as edges and delays depend on earlier values."""
         results = [monitor.evaluate(context) for monitor in self.monitors]
         return bool(results) and all(results)
 
 
 class TriggerObserver(Protocol):
-    """Looks on as one trigger is asked."""
+    """Observer of the evaluations of one trigger."""
 
     def on_evaluated(self, context: RuntimeContext) -> None:
-        """The trigger has been asked."""
+        """Observe an evaluation of the trigger."""
 
 
 class Trigger:
-    """An OR over condition groups."""
+    """Disjunction of condition groups."""
 
     def __init__(self, groups: Sequence[ConditionGroup]) -> None:
         self.groups = tuple(groups)
         self.why = ""
-        self.witness: TriggerObserver | None = None
+        self.observer: TriggerObserver | None = None
         self.triggering: tuple[str, ...] = ()
-        """The entities that fulfilled the conditions of the groups that fired."""
+        """Entities that fulfilled the conditions of the groups that fired."""
 
     def __bool__(self) -> bool:
         return bool(self.groups)
 
     def evaluate(self, context: RuntimeContext) -> bool:
-        """True where it fires; `why` then says what did it."""
+        """Whether the trigger fires; `why` then describes the reason."""
         fired = [group for group in self.groups if group.evaluate(context)]
         if fired:
             self.why = " and ".join(monitor.why(context) for monitor in fired[0].monitors)
             names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
             self.triggering = tuple(dict.fromkeys(names))
-        if self.witness is not None:
-            self.witness.on_evaluated(context)
+        if self.observer is not None:
+            self.observer.on_evaluated(context)
         return bool(fired)
 
     def reset(self) -> None:
-        """Forget all evaluations, as before the first."""
+        """Discard all evaluations."""
         for group in self.groups:
             for monitor in group.monitors:
                 monitor.reset()
 
     def describe(self) -> str:
-        """The trigger in words."""
+        """Describe the trigger."""
         return " or ".join(" and ".join(m.describe() for m in group.monitors) for group in self.groups)
 
 
 class WaitForTrigger(py_trees.behaviour.Behaviour):
-    """The leaf at which a trigger meets the tree: runs until it fires."""
+    """Leaf of the tree that runs until its trigger fires."""
 
     def __init__(self, name: str, trigger: Trigger, context: RuntimeContext) -> None:
         super().__init__(name)
@@ -169,16 +169,16 @@ class WaitForTrigger(py_trees.behaviour.Behaviour):
         self.context = context
 
     def initialise(self) -> None:
-        """Forget what was seen in an earlier life."""
+        """Reset the trigger before another execution."""
         if self.status is Status.INVALID:
             self.trigger.reset()
 
     def update(self) -> Status:
-        """Ask the trigger."""
+        """Evaluate the trigger."""
         return Status.SUCCESS if self.trigger.evaluate(self.context) else Status.RUNNING
 
     def is_fired(self) -> bool:
-        """What `tick_once` does, without its ceremony: triggers are asked in every tick of a run."""
+        """Tick without the generator of `tick_once`, as triggers are evaluated in every tick; True if it fires."""
         self.initialise()
         self.status = self.update()
         return self.status is Status.SUCCESS

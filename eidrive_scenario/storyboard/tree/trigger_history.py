@@ -1,4 +1,4 @@
-"""What a trigger saw over a run, condition by condition: so that one can say afterwards why it fired, or why not."""
+"""History of a trigger over a run by condition, which explains why it fired, or why it did not."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator, Conditi
 
 @dataclass
 class TrueIntervals:
-    """Spans of time in which something went on: how many, and the first and the last of them [s]."""
+    """Number of time intervals in which a value was true, with the first and the last of them [s]."""
 
     count: int = 0
     first: tuple[float, float] = (math.nan, math.nan)
     last: tuple[float, float] = (math.nan, math.nan)
     _open: bool = False
 
-    def record(self, going_on: bool, time: float) -> None:
-        """It goes on at this time, or it does not."""
-        if going_on:
+    def record(self, is_true: bool, time: float) -> None:
+        """Record the value at a time [s]."""
+        if is_true:
             begin = self.last[0] if self._open else time
             self.last = (begin, time)
             if not self._open:
                 self.count += 1
             if self.count == 1:
                 self.first = self.last
-        self._open = going_on
+        self._open = is_true
 
 
 @dataclass
 class ClosestMiss:
-    """The quantity of one entity when it was nearest to being right, and when that was [s]."""
+    """Quantity of one entity with the smallest distance to fulfillment, and its time [s]."""
 
     measure: Measure
     time: float
@@ -43,12 +43,13 @@ class ClosestMiss:
 
 @dataclass
 class ConditionHistory:
-    """One condition of a trigger over a run.
+    """History of one condition of a trigger over a run.
 
-    true     when it was true, edge and delay left aside
-    edges    when its edge was seen, the delay left aside
-    counted  when it counted as true
-    nearest  by entity, what it compared when that was nearest to being right
+    asked    number of evaluations, from `first_asked` to `last_asked` [s]
+    true     intervals in which it was true, without edge and delay
+    edges    intervals of its edge, without delay
+    counted  intervals in which it was true with edge and delay
+    nearest  closest misses, by entity
     """
 
     monitor: ConditionEvaluator
@@ -62,12 +63,12 @@ class ConditionHistory:
     undefined: set[str] = field(default_factory=set)
     """Entities whose quantity was undefined or infinite at some evaluation."""
     words: str = ""
-    """The condition with its values at the last evaluation, where it compares no number."""
+    """Explanation at the last evaluation if the condition compares no quantity."""
     _before: bool | None = None
     _evaluations: int = 0
 
     def record(self, context: RuntimeContext) -> None:
-        """The condition has just been asked, unless it was not asked anew."""
+        """Record the last evaluation, unless it is recorded already."""
         if self.monitor.evaluations == self._evaluations:
             return
         self._evaluations = self.monitor.evaluations
@@ -78,8 +79,8 @@ class ConditionHistory:
         self.last_asked = time
         self.true.record(value, time)
         changed = self._before is not None and self._before != value
-        wanted = self.monitor.edge == "risingOrFalling" or (self.monitor.edge == "rising") == value
-        self.edges.record(changed and wanted, time)
+        is_edge = self.monitor.edge == "risingOrFalling" or (self.monitor.edge == "rising") == value
+        self.edges.record(changed and is_edge, time)
         self.counted.record(self.monitor.result, time)
         self._before = value
         measures = self.monitor.condition.measures(context)
@@ -93,13 +94,13 @@ class ConditionHistory:
         if not math.isfinite(gap):
             self.undefined.add(measure.of)
             return
-        known = self.nearest.get(measure.of)
-        if known is None or gap < known.gap:
+        closest = self.nearest.get(measure.of)
+        if closest is None or gap < closest.gap:
             self.nearest[measure.of] = ClosestMiss(measure, time, gap)
 
 
 def gap_of(measure: Measure) -> float:
-    """How far a quantity is from what its rule asks for; negative where it is fulfilled and more, NaN if undefined."""
+    """Return the distance of a quantity to fulfillment of its rule; negative beyond it, NaN if undefined."""
     match measure.rule:
         case Rule.GREATER_THAN | Rule.GREATER_OR_EQUAL:
             return measure.limit - measure.value
@@ -112,10 +113,11 @@ def gap_of(measure: Measure) -> float:
 
 @dataclass
 class GroupHistory:
-    """One condition group over a run.
+    """History of one condition group over a run.
 
-    held  when all its conditions counted as true
-    most  how many of them did at once at most, when first, and which were missing then
+    held     intervals in which all conditions were true
+    most     maximum number of conditions that were true at once, first at `most_at` [s]
+    missing  conditions that were false at that time
     """
 
     conditions: tuple[ConditionHistory, ...]
@@ -125,7 +127,7 @@ class GroupHistory:
     missing: tuple[ConditionHistory, ...] = ()
 
     def record(self, context: RuntimeContext) -> None:
-        """The group has just been asked."""
+        """Record an evaluation of the group."""
         for condition in self.conditions:
             condition.record(context)
         missing = tuple(condition for condition in self.conditions if not condition.monitor.result)
@@ -136,21 +138,21 @@ class GroupHistory:
 
 
 class TriggerHistory:
-    """A witness of one trigger."""
+    """Observer that records the history of one trigger."""
 
     def __init__(self, trigger: Trigger) -> None:
         self.trigger = trigger
         self.groups = tuple(_history(group) for group in trigger.groups)
-        trigger.witness = self
+        trigger.observer = self
 
     def on_evaluated(self, context: RuntimeContext) -> None:
-        """Note what each condition was."""
+        """Record the values of all conditions."""
         for group in self.groups:
             group.record(context)
 
     @property
     def asked(self) -> int:
-        """How often the trigger was asked."""
+        """Number of evaluations of the trigger."""
         return max((condition.asked for group in self.groups for condition in group.conditions), default=0)
 
 

@@ -11,25 +11,26 @@ from eidrive_scenario.storyboard.state.states import ElementTransition
 from eidrive_scenario.storyboard.tree.elements import ActElement, StoryElement
 from eidrive_scenario.storyboard.tree.events import EventElement
 
-_SHOWN = 5
-"""Elements that are named; of more, the number is given."""
+_MAX_REPORTED = 5
+"""Maximum number of elements that are reported individually."""
 
 
 def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> list[Diagnostic]:
-    """Return a warning for each act that never started, and for each event that never did in an act that started.
+    """Return a warning for each act that never started, and for each event that never started in a started act.
 
-    What may never be executed, as its maximumExecutionCount is 0, is left out.
+    Elements with maximumExecutionCount 0 are not reported.
 
-    root   the storyboard after the run
-    time   at which the run ended [s], and `end` the reason
+    root   storyboard after the run
+    time   time of the end of the run [s]
+    end    reason for the end of the run
     """
-    found = list(_unstarted(root))
+    found = list(_find_unstarted(root))
     if not found:
         return []
-    places = dict(_places(scenario))
+    locations = dict(_source_lines(scenario))
     diagnostics = []
-    for element in found[:_SHOWN]:
-        source, line = places.get(element.record.path, (str(scenario.path or ""), None))
+    for element in found[:_MAX_REPORTED]:
+        source, line = locations.get(element.record.path, (str(scenario.path or ""), None))
         skipped = sum(transition is ElementTransition.SKIP for _, transition in element.record.transitions)
         why = "its start trigger was not fulfilled" if element.start_leaf is not None else "nothing started it"
         if skipped:
@@ -37,19 +38,21 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
         diagnostics.append(
             Diagnostic(
                 f"{element.kind} {element.name!r} never started: {why} until the run ended at {time:.2f} s ({end})",
-                f"eidrive run --explain {element.name!r} states what its trigger lacked",
+                f"eidrive run --explain {element.name!r} states the unfulfilled conditions",
                 source,
                 line,
             )
         )
-    if len(found) > _SHOWN:
-        more = len(found) - _SHOWN
-        what = f"{more} more {'act or event' if more == 1 else 'acts and events'} never started"
-        diagnostics.append(Diagnostic(what, "eidrive run --log - shows those that did", str(scenario.path or "")))
+    if len(found) > _MAX_REPORTED:
+        remaining = len(found) - _MAX_REPORTED
+        message = f"{remaining} more {'act or event' if remaining == 1 else 'acts and events'} never started"
+        diagnostics.append(
+            Diagnostic(message, "eidrive run --log - prints the elements that started", str(scenario.path or ""))
+        )
     return diagnostics
 
 
-def _unstarted(element: StoryElement) -> Iterator[StoryElement]:
+def _find_unstarted(element: StoryElement) -> Iterator[StoryElement]:
     if element.limit < 1:
         return
     started = any(transition is ElementTransition.START for _, transition in element.record.transitions)
@@ -57,20 +60,20 @@ def _unstarted(element: StoryElement) -> Iterator[StoryElement]:
         yield element
     elif started and not isinstance(element, EventElement):
         for child in element.elements:
-            yield from _unstarted(child)
+            yield from _find_unstarted(child)
 
 
-def _places(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, int | None]]]:
-    """File and line of each act and event, by its path."""
+def _source_lines(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], tuple[str, int | None]]]:
+    """Yield path, file and line of each act and event."""
     for story in scenario.storyboard.story:
         for act in story.act:
-            yield (story.name, act.name), _place(act)
+            yield (story.name, act.name), _source_line(act)
             for group in act.maneuver_group:
                 entries = (scenario.entries.get(reference) for reference in group.catalog_reference)
                 for maneuver in (*group.maneuver, *(one for one in entries if isinstance(one, Maneuver))):
                     for event in maneuver.event:
-                        yield (story.name, act.name, group.name, maneuver.name, event.name), _place(event)
+                        yield (story.name, act.name, group.name, maneuver.name, event.name), _source_line(event)
 
 
-def _place(element: Element) -> tuple[str, int | None]:
+def _source_line(element: Element) -> tuple[str, int | None]:
     return element.source, element.line

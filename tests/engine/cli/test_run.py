@@ -184,8 +184,10 @@ def test_verdicts_on_narrow_terminal_wrap_reasons_only(
 def test_unused_user_value_and_controller_option_are_warnings(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--no-record", "--user-value", "mood=3", "--controller", "ALKS=alks")
     assert result.exit_code == 0, result.output
-    assert "warning: no UserDefinedValueCondition asks for 'mood'; none is known here" in result.stderr
-    assert "warning: the stand-in for 'ALKS' found no controller of that name" in result.stderr
+    assert (
+        "warning: --user-value mood: no UserDefinedValueCondition reads the value; none is known here" in result.stderr
+    )
+    assert "warning: --controller: no controller is named 'ALKS'" in result.stderr
 
 
 def test_run_with_long_time_step_ends(eidrive: Eidrive) -> None:
@@ -202,5 +204,5 @@ def test_show_prints_ratio_to_real_time(capsys: pytest.CaptureFixture[str]) -> N
 def test_controller_option_for_station_is_a_warning(eidrive: Eidrive) -> None:
     short = ("run", "coop/scenario_1", "--no-record", "--time-limit", "0.1")
     warned = eidrive(*short, "--controller", "EgoStack=alks").stderr
-    assert "warning: nothing stands in for 'EgoStack', which is a controller of ours" in warned
+    assert "warning: --controller: controller 'EgoStack' belongs to a station" in warned
     assert eidrive(*short).stderr == ""

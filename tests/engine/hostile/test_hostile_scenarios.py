@@ -191,4 +191,4 @@ def test_check_and_run_catalog_entries_that_multiply_are_refused(write: Write, t
 def test_check_and_run_positions_in_routes_of_positions_are_refused(write: Write, tmp_path: Path) -> None:
     """Each place of a route is a place on the next one: to find the first takes 2^24 routes."""
     catalogs, action = routes_of(tmp_path, "", "", 2)
-    refused(write(catalogs=catalogs, init=action), "R.xosc:", "lies on curves of positions on curves", line=False)
+    refused(write(catalogs=catalogs, init=action), "R.xosc:", "nested too deeply", line=False)

@@ -128,7 +128,7 @@ def test_explanation_of_group_lists_missing_condition(explained: Explained) -> N
 
 def test_explanation_of_absent_entity_states_its_absence(explained: Explained) -> None:
     lines = explained(event(when(of("Spare", '<SpeedCondition rule="greaterThan" value="1"/>'))))
-    assert lines[-1] == "at the last evaluation Spare is not in the world"
+    assert lines[-1] == "at the last evaluation Spare is absent"
 
 
 def test_explanation_of_undefined_quantity_states_it(explained: Explained) -> None:

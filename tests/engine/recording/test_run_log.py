@@ -9,7 +9,7 @@ import pytest
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import Frame, RunLog
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
-from eidrive_scenario.storyboard.tree.elements import EMPTY
+from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
 
 START, STOP, SKIP, END = ElementTransition.START, ElementTransition.STOP, ElementTransition.SKIP, ElementTransition.END
 RUNNING, STANDBY, COMPLETE = ElementState.RUNNING, ElementState.STANDBY, ElementState.COMPLETE
@@ -52,7 +52,7 @@ def test_run_log_writes_each_change_with_its_reason(lines: Lines) -> None:
 def test_run_log_of_immediate_start_omits_standby_state(lines: Lines) -> None:
     together = (
         change(0.0, "maneuverGroup", "s/a/g", None, STANDBY),
-        change(0.0, "maneuverGroup", "s/a/g", START, RUNNING, EMPTY),
+        change(0.0, "maneuverGroup", "s/a/g", START, RUNNING, NO_TRIGGER),
     )
     assert lines(together) == ["    0.000 s  maneuver group g (in s/a) starts"]
 

@@ -66,7 +66,7 @@ def test_the_ground_the_level_or_the_altitude_say_how_high(globe: RuntimeContext
     pose, location = at(globe, **place, altitude=118.0)
     assert (pose.z, location.road) == (pytest.approx(18.0), "2")
     assert at(globe, **place, height=111.0)[0].z == pytest.approx(11.0)
-    with pytest.raises(ScenarioError, match="road level 2, and there are 2"):
+    with pytest.raises(ScenarioError, match="road level does not exist; got 2; expected 0 to 1"):
         at(globe, **place, vertical_road_selection=2)
 
 
@@ -78,13 +78,13 @@ def test_before_1_2_angles_are_radians_and_degrees_are_recognized(globe: Runtime
     assert globe.warnings == []
     mistaken, _ = at(globe, latitude=LATITUDE, longitude=9.0)
     assert mistaken[:3] == pytest.approx(expected[:3], abs=1e-6)
-    assert "taken as degrees" in str(globe.warnings[0])
+    assert "are read as degrees" in str(globe.warnings[0])
 
 
 def test_a_latitude_beyond_the_pole(globe: RuntimeContext) -> None:
-    with pytest.raises(ScenarioError, match="latitudes end at"):
+    with pytest.raises(ScenarioError, match="latitudes within"):
         at(globe, latitude_deg=91.0, longitude_deg=9.0)
-    with pytest.raises(ScenarioError, match="lacks latitude or longitude"):
+    with pytest.raises(ScenarioError, match="latitude or longitude is missing"):
         at(globe, latitude_deg=48.0)
 
 

@@ -168,9 +168,9 @@ def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: A
 @pytest.mark.parametrize(
     ("frame", "text"),
     [
-        ({"lane_position": model.LanePosition(road_id="9", lane_id="-1", s=3)}, "names road '9'"),
-        ({"lane_position": model.LanePosition(road_id="1", lane_id="-5", s=3)}, "its lanes there: 1, -1, -2"),
-        ({"relative_lane_position": model.RelativeLanePosition(entity_ref="A", d_lane=-3, ds=0)}, "names lane -4"),
+        ({"lane_position": model.LanePosition(road_id="9", lane_id="-1", s=3)}, "unknown road '9'"),
+        ({"lane_position": model.LanePosition(road_id="1", lane_id="-5", s=3)}, "expected one of 1, -1, -2"),
+        ({"relative_lane_position": model.RelativeLanePosition(entity_ref="A", d_lane=-3, ds=0)}, "unknown lane -4"),
         ({"geo_position": model.GeoPosition(latitude_deg=1, longitude_deg=2)}, "has no geoReference; add"),
     ],
 )
@@ -182,7 +182,7 @@ def test_a_place_that_is_not_there_is_an_error(on_street: Any, frame: Any, text:
 def test_beyond_the_end_of_a_road_its_end_is_meant(on_street: Any) -> None:
     frame = model.LanePosition(road_id="1", lane_id="-1", s=300)
     assert resolve_position(model.Position(lane_position=frame), on_street).location.s == 200.0
-    assert "that road is 200.00 m long" in str(on_street.warnings[-1])
+    assert "got s = 300; expected 0 to 200.00" in str(on_street.warnings[-1])
 
 
 def test_nobody_is_placed_beside_who_is_not_there(on_street: Any) -> None:

@@ -170,12 +170,12 @@ def test_an_unknown_signal_is_told_with_the_nearest_one() -> None:
 @pytest.mark.parametrize(
     ("controllers", "expected"),
     [
-        ([controller(phase("go", -1))], "a phase of -1 s"),
-        ([controller(phase("go", math.nan))], "a phase of nan s"),
-        ([controller(*CYCLE, reference="c1", delay=-5)], "a delay of -5 s"),
+        ([controller(phase("go", -1))], "phase 'go' has an invalid duration; got -1 s"),
+        ([controller(phase("go", math.nan))], "phase 'go' has an invalid duration; got nan s"),
+        ([controller(*CYCLE, reference="c1", delay=-5)], "negative delay; got -5 s"),
         (
             [controller(*CYCLE, reference="c2", delay=1), controller(*CYCLE, name="c2", reference="c1", delay=1)],
-            "'c1' is its own reference",
+            "'c1': reference to itself",
         ),
     ],
 )
@@ -186,10 +186,10 @@ def test_declarations_that_make_no_sense(controllers: list[model.TrafficSignalCo
 @pytest.mark.parametrize(
     ("controllers", "expected"),
     [
-        ([controller(*CYCLE, delay=5)], "delay to no controller"),
-        ([controller(*CYCLE, reference="c9", delay=5)], "'c9', which has no phases here"),
+        ([controller(*CYCLE, delay=5)], "delay without a reference"),
+        ([controller(*CYCLE, reference="c9", delay=5)], "'c9' has no phases"),
         ([controller(*CYCLE), controller(*CYCLE, name="c2", reference="c1")], "without a delay"),
-        ([controller(*CYCLE), controller(phase("go", 5), name="c2", reference="c1", delay=1)], "5 s for its phases"),
+        ([controller(*CYCLE), controller(phase("go", 5), name="c2", reference="c1", delay=1)], "cycle of 5 s, but"),
     ],
 )
 def test_declarations_that_are_odd(controllers: list[model.TrafficSignalController], expected: str) -> None:

@@ -78,7 +78,7 @@ def test_the_order_of_init_does_not_matter_where_one_is_placed_beside_another(bu
 
 def test_who_is_placed_beside_nobody_is_an_error(build: Any) -> None:
     beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
-    with pytest.raises(ScenarioError, match="nobody places"):
+    with pytest.raises(ScenarioError, match="entity without a position"):
         build(beside).initial()
 
 
@@ -149,7 +149,7 @@ def test_all_that_cannot_be_executed_is_named_at_once_with_its_line(build: Any) 
             registered=Registry("actions", all_but_one),
         )
     messages = [diagnostic.message for diagnostic in caught.value.diagnostics]
-    assert messages == ["TrafficStopAction is not executed yet"] * 2
+    assert messages == ["TrafficStopAction is not supported"] * 2
     assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
 
 
