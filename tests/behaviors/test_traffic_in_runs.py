@@ -244,7 +244,7 @@ def test_traffic_controller_properties_set_the_driver_model(run: Run) -> None:
         (swarm(more='<InitialSpeedRange lowerLimit="9" upperLimit="3"/>'), r"speed range is invalid \(got 9 to 3 m/s;"),
         (swarm(center="Egon"), "Egon"),
         (swarm(more=distribution((0.0, PEDESTRIAN))), "are no shares"),
-        (area(2, "true", road_range(0.0, 10.0).replace('roadId="1"', 'roadId="9"', 1)), "no road '9'"),
+        (area(2, "true", road_range(0.0, 10.0).replace('roadId="1"', 'roadId="9"', 1)), "road '9' does not exist"),
         (
             swarm(
                 more=DEFINITION.format(
