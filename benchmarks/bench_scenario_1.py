@@ -261,7 +261,7 @@ def main() -> None:
     trace = Trace()
     with record_calls(trace):
         simulation = build(trace)
-        bodies, trace.driven = simulation.world._bodies, simulation.stations.drivers
+        bodies, trace.driven = simulation.world._bodies, simulation.stack.drivers
         trace.handles = {name: body.handle for name, body in bodies.items()}
         simulated = simulation.run().simulated_s
     bare_loop(trace, settings.dt)

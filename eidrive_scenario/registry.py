@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -98,6 +98,12 @@ _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
 def registry(kind: str) -> Registry:
     """The registry of one kind, read once per process."""
     return Registry(kind)
+
+
+def distributions(used: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Return the distributions of third-party extensions by `group.name`, of these pairs of group and name."""
+    found = {f"{kind}.{name}": registry(kind).distribution(name) for kind, name in sorted(used)}
+    return {name: distribution for name, distribution in found.items() if distribution is not None}
 
 
 def singular(kind: str) -> str:

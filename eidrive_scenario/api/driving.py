@@ -1,12 +1,21 @@
-"""Planners: from the ego state, the fused objects and the goal to a trajectory.
+"""Planners: from the ego state, the fused objects and the goal to a trajectory. Driving stacks: all stations of a run.
 
-Stable: all names.
+Stable: all names but those of driving stacks (`DrivingStack`, `EmptyStack`, `StackContext`, `StackFactory`,
+`StackInputs`, `StackSettings`), which may change in a minor version.
 """
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.stack import (
+    DrivingStack,
+    EmptyStack,
+    StackContext,
+    StackFactory,
+    StackInputs,
+    StackSettings,
+)
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
@@ -15,9 +24,15 @@ __all__ = [
     "AgentSettings",
     "AgentStep",
     "Detections",
+    "DrivingStack",
     "EgoState",
+    "EmptyStack",
     "Goal",
     "Plan",
     "Planner",
     "RoutePlanner",
+    "StackContext",
+    "StackFactory",
+    "StackInputs",
+    "StackSettings",
 ]

@@ -42,8 +42,7 @@ class Agent:
     """One station. It sees its readings and its inbox, nothing else.
 
     Of each sender it keeps the newest report until that is too old (`report_timeout`). It sends its own detections,
-    never fused ones: a box that came back to its first reporter would count twice. With `own_perception` it does not
-    use its own detections before the channel brings them back.
+    never fused ones: a box that came back to its first reporter would count twice.
     """
 
     def __init__(
@@ -58,7 +57,6 @@ class Agent:
         speaker: MessageGenerator,
         dt: float,
         receives_messages: bool = True,
-        own_perception: bool = False,
         points: PointCloudSharing | None = None,
     ) -> None:
         self.name = spec.name
@@ -71,11 +69,8 @@ class Agent:
         self._planner_checked = planner is not None and not is_built_in(type(planner))
         self.controller = controller
         self.receives_messages = receives_messages
-        """Whether the messages of others are for this station; one that does not drive may only speak."""
-        self.own_perception = own_perception
+        """Whether the station uses messages; a station that does not drive may transmit only."""
         self.points = points
-        self.message_interval = 0.0
-        """Least time between two messages that congestion control leaves this station [s]."""
         self._speaker = speaker
         self._clock = settings.clock
         self._partial: dict[str, PartialReportAssembler] = {}
@@ -89,8 +84,35 @@ class Agent:
         )
         """Time [s], center of the body and height of its reference point [m], heading [rad]."""
 
-    def act(self, readings: Readings, inbox: Sequence[ReceivedMessage], now: float, goal: Goal | None) -> AgentStep:
-        """One tick at `now` [s]."""
+    def receives_from(self, sender: str, *, own_perception: bool) -> bool:
+        """Return whether messages of `sender` are sent to this station: the only place that decides on reception.
+
+        own_perception  whether the channel carries the detections of a station back to itself
+        """
+        if not self.receives_messages:
+            return False
+        if sender == self.name:
+            return own_perception
+        return self.settings.cooperates_with is None or sender in self.settings.cooperates_with
+
+    def act(
+        self,
+        readings: Readings,
+        inbox: Sequence[ReceivedMessage],
+        now: float,
+        goal: Goal | None,
+        *,
+        message_interval: float = 0.0,
+        own_perception: bool = False,
+    ) -> AgentStep:
+        """Return the step of the station at `now` [s].
+
+        inbox             messages delivered since the last tick
+        message_interval  minimum time between two messages under congestion control [s]
+        own_perception    whether the channel carries the detections of a station back to itself; a receiving station
+                          then uses its own detections only after that delay
+        """
+        own_perception = own_perception and self.receives_messages
         readings = self.perception.locate(readings)
         ego = readings.ego
         self._record_ego_pose(ego)
@@ -98,10 +120,10 @@ class Agent:
         if fresh is not None:
             self._detections = fresh
         detections = self._detections
-        self._process_inbox(inbox, now)
+        self._process_inbox(inbox, now, own_perception)
         state = self._state(ego)
         found = fresh if self.points is None else self.points.perceive(readings, fresh)
-        if found is not None and not self.own_perception:
+        if found is not None and not own_perception:
             self._accept_report(Report(self.name, found, now, state))
         fused = self.fusion.fuse(list(self._reports.values()), now)
         if self._fusion_checked:
@@ -124,7 +146,7 @@ class Agent:
                 detections,
                 now,
                 self.points.own if self.points is not None else None,
-                interval=self.message_interval,
+                interval=message_interval,
             ),
             estimate=ego if self.settings.localization != "oracle" else None,
         )
@@ -135,15 +157,12 @@ class Agent:
         ahead, aside, _ = self.spec.offset
         self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
 
-    def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float) -> None:
+    def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float, own_perception: bool) -> None:
         """Keep the newest report of each sender that counts, and forget the old ones."""
         for received in inbox:
             message = self._clock.with_local_timestamps(received.message, now)
             sender = message.sender
-            if sender == self.name:
-                if not self.own_perception or message.kind == "cam":
-                    continue
-            elif self.settings.cooperates_with is not None and sender not in self.settings.cooperates_with:
+            if sender == self.name and (not own_perception or message.kind == "cam"):
                 continue
             if self.points is not None and message.points is not None and sender != self.name:
                 self.points.add_points(sender, message.points, self._own_body(message.points.time))

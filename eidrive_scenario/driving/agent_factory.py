@@ -92,7 +92,6 @@ def build_agent(
     *,
     seed: int,
     dt: float,
-    own_perception: bool = False,
     detector: Detector | None = None,
     encoder: Asn1Encoder | None = None,
 ) -> Agent:
@@ -134,7 +133,6 @@ def build_agent(
         speaker=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
         receives_messages=listens,
-        own_perception=own_perception and listens,
         points=points,
     )
 

@@ -1,26 +1,35 @@
-"""All stations of a run, and the radio between them."""
+"""Stations of a run and the channel between them: the driving stack of this project."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
 from eidrive_scenario.driving.communication.radio_line_of_sight import antenna_position, line_of_sight_states
 from eidrive_scenario.driving.control.overrides import ControlOverrides
+from eidrive_scenario.driving.planning.area_checks import areas_off_road
+from eidrive_scenario.driving.resolved_stations import resolved_stations
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.station_declarations import declared_detectors, declared_encoders, declared_settings
+from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackInputs, StackSettings
+from eidrive_scenario.driving.station_declarations import (
+    declared_detectors,
+    declared_encoders,
+    declared_settings,
+    possible_drivers,
+)
 from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.library import library_path
-from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.registry import is_built_in
-from eidrive_scenario.requests import Goal, Overrides
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.requests import Overrides
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
@@ -36,214 +45,223 @@ from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
 
 
-class Stations:
-    """Every actor whose controller is ours, the sensors on it, and the channel that joins them.
+class Stations(DrivingStack):
+    """All actors whose controller has `module=eidrive`, their sensors, and the channel between them.
 
-    channel    profile that wins over what the file says; None leaves it to the file
-    detector   for all stations; None leaves it to their controllers
-    cooperate  the senders whom listening stations hear; None leaves it to their controllers
-    load_weights       whether detectors load their weights, which `eidrive check` does not
-    allow_torchscript  whether weights may be TorchScript, which can execute any code
-
-    Raises SettingError if a controller's properties, the channel or one of these options is wrong.
+    Raises SettingError if the properties of a controller, the channel or an option is invalid.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        roads: RoadNetwork | None,
-        *,
-        seed: int,
-        dt: float,
-        channel: str | Path | None = None,
-        detector: str | None = None,
-        cooperate: tuple[str, ...] | None = None,
-        load_weights: bool = True,
-        allow_torchscript: bool = False,
-    ) -> None:
-        self._scenario = scenario
-        self._roads = roads
-        self._seed = seed
-        self._dt = dt
-        self._fixed_channel = channel is not None
+    def __init__(self, context: StackContext) -> None:
+        self._context = context
         self._channel: Channel | None = None
         self._checked_channel: Channel | None = None
         """The channel, if its results are checked: that of a third party."""
         self._retired_channel: Channel | None = None
-        """The channel before, where there is none any more: its books still count."""
-        self._books: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
-        """When the books of the channel were last read, and what they said: those of many links take a while."""
-        self.channel_name = NO_COOPERATION
-        self.goals: Mapping[str, Goal] = {}
-        self.signals: Mapping[str, str] = {}
-        """What the traffic lights show, by their ids."""
-        self.links: Sequence[LinkEvent] = ()
-        """What became of the messages that were said in the last tick."""
-        self.readings: Mapping[str, Readings] = {}
-        """What the sensors of each station gave in the last tick."""
-        self.min_existence: dict[str, float] = {}
-        """Of the stations with a planner, the probability of existence from which on it reacts to objects."""
+        """The last channel after cooperation was switched off: its statistics remain part of the result."""
+        self._statistics: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
+        """Time and value of the last statistics of the channel: those of many links are expensive."""
+        self._channel_name = NO_COOPERATION
+        self._channel_profile: ChannelProfile | None = None
+        self._readings: Mapping[str, Readings] = {}
+        self._min_existence: dict[str, float] = {}
         self._agents: dict[str, Agent] = {}
         self._rigs: dict[str, Rig] = {}
-        self._lookouts: dict[str, SignalSensor] = {}
-        self._held: dict[str, ControlOverrides] = {}
-        self._settings = declared_settings(scenario, detector, cooperate)
-        self.channel_profile: ChannelProfile | None = None
-        """The profile of the channel; None where there is none."""
-        self._load_weights = load_weights
-        self._allow_torchscript = allow_torchscript
+        self._signal_sensors: dict[str, SignalSensor] = {}
+        self._overrides: dict[str, ControlOverrides] = {}
+        scenario, detector = context.scenario, context.detector
+        self._settings = declared_settings(scenario, detector, context.cooperate)
+        # Detectors are built here to report unsuitable settings before the run.
         self._detectors = declared_detectors(
-            scenario, self._settings, detector, load_weights=load_weights, allow_torchscript=allow_torchscript
+            scenario,
+            self._settings,
+            detector,
+            load_weights=context.load_weights,
+            allow_torchscript=context.allow_torchscript,
         )
-        """Built beforehand, as what they cannot work with shall be told before the run."""
-        self.library_versions: Mapping[str, str] = {
+        self._library_versions = {
             name: version
-            for detector in self._detectors.values()
-            for name, version in sorted(detector.library_versions.items())
+            for built in self._detectors.values()
+            for name, version in sorted(built.library_versions.items())
         }
         """Versions of the libraries that compute the detections of any station, by name."""
         self._encoders = declared_encoders(scenario, self._settings)
-        if channel is not None:
-            self._set_channel(channel, origin="--channel", line=None, scope=scenario.scope)
+        if context.channel is not None:
+            self._set_channel(context.channel, origin="--channel", line=None, scope=scenario.scope)
 
     @property
     def settings(self) -> Mapping[str, AgentSettings]:
-        """The settings of every station of the scenario, options applied, whether it is in the world or not."""
+        """Settings of every station of the scenario, options applied, whether it is present or not."""
         return self._settings
 
     @property
     def drivers(self) -> frozenset[str]:
-        """The stations that move by their own pedals and steering."""
         return frozenset(name for name, agent in self._agents.items() if agent.controller is not None)
 
-    def detector(self, name: str) -> Detector:
-        """Of a station. Raises KeyError if it is not in the world."""
-        return self._agents[name].perception.detector
+    @property
+    def possible_drivers(self) -> Collection[str]:
+        return possible_drivers(self._context.scenario, self._settings)
+
+    @property
+    def min_existence(self) -> Mapping[str, float]:
+        return self._min_existence
+
+    @property
+    def channel_name(self) -> str:
+        return self._channel_name
+
+    @property
+    def readings(self) -> Mapping[str, Readings]:
+        return self._readings
+
+    def image_detections(self, station: str) -> Mapping[str, ImageDetections]:
+        return self._agents[station].perception.detector.image_detections
+
+    def resolved_settings(self) -> StackSettings:
+        return replace(
+            resolved_stations(self._settings, self._channel_name, self._channel_profile),
+            versions=self._library_versions,
+        )
+
+    def warnings(self) -> Iterator[Diagnostic]:
+        context = self._context
+        yield from areas_off_road(context.scenario, self._settings, context.roads)
+        yield from short_detector_latencies(self._settings, context.dt)
+        if context.channel is not None:
+            yield from short_channel_delay(self._channel_profile, context.dt, "--channel")
 
     def add(self, spec: ActorSpec) -> None:
-        """An actor has entered the world; it becomes a station if it has a controller of ours."""
         settings = self._settings.get(spec.name)
         if settings is None:
             return
-        self._rigs[spec.name] = build_rig(settings, spec, seed=self._seed)
+        context = self._context
+        self._rigs[spec.name] = build_rig(settings, spec, seed=context.seed)
         detector = self._detectors.pop(spec.name, None) or build_detector(settings)
-        if self._load_weights:
-            detector.load_weights(allow_torchscript=self._allow_torchscript)
-        self._agents[spec.name] = build_agent(
+        if context.load_weights:
+            detector.load_weights(allow_torchscript=context.allow_torchscript)
+        agent = self._agents[spec.name] = build_agent(
             settings,
             spec,
-            self._roads,
-            seed=self._seed,
-            dt=self._dt,
-            own_perception=self._own_perception,
+            context.roads,
+            seed=context.seed,
+            dt=context.dt,
             detector=detector,
             encoder=self._encoders.get(spec.name),
         )
-        if self._agents[spec.name].planner is not None:
-            self.min_existence[spec.name] = settings.min_existence
-        unseen = SIGNAL_KINDS - self._agents[spec.name].perception.detector.detectable_signals
-        if settings.obey_signals and unseen:
-            self._lookouts[spec.name] = SignalSensor(spec, self._roads, unseen)
-        if self._agents[spec.name].controller is not None:
-            self._held[spec.name] = ControlOverrides(spec, self._dt)
+        if agent.planner is not None:
+            self._min_existence[spec.name] = settings.min_existence
+        unread = SIGNAL_KINDS - agent.perception.detector.detectable_signals
+        if settings.obey_signals and unread:
+            self._signal_sensors[spec.name] = SignalSensor(spec, context.roads, unread)
+        if agent.controller is not None:
+            self._overrides[spec.name] = ControlOverrides(spec, context.dt)
 
     def remove(self, name: str) -> None:
-        """An actor has left the world."""
-        self._agents.pop(name, None)
-        self.min_existence.pop(name, None)
-        self._rigs.pop(name, None)
-        self._lookouts.pop(name, None)
-        self._held.pop(name, None)
+        for held in (self._agents, self._min_existence, self._rigs, self._signal_sensors, self._overrides):
+            held.pop(name, None)
 
-    def request_channel(self, profile: str, *, source: str, line: int, scope: Scope | None = None) -> None:
-        """The file asks for a channel, at the start or on a trigger; an option given by the caller wins."""
-        if not self._fixed_channel:
-            self._set_channel(profile, origin=source, line=line, scope=scope)
+    def request_channel(
+        self, profile: str, *, source: str, line: int, scope: Scope | None = None
+    ) -> Iterator[Diagnostic]:
+        """Select a channel, unless an option of the run fixes it."""
+        if self._context.channel is not None:
+            return iter(())
+        self._set_channel(profile, origin=source, line=line, scope=scope)
+        return short_channel_delay(self._channel_profile, self._context.dt, source, line)
 
-    def step(self, world: World, view: WorldView) -> dict[str, AgentStep]:
-        """Sensors read, messages that have arrived are heard, every agent acts."""
-        self.readings = {}
+    def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:
+        """Read all sensors, deliver messages, and let every agent act."""
+        self._readings = {}
         if not self._agents:
             return {}
         if self._channel is not None:
-            self._books = None
-            self._channel.update_environment(self._surroundings(world, view))
-        readings = read_all(list(self._rigs.values()), world, view)
-        for name, lookout in self._lookouts.items():
-            seen = lookout.read(world, view, view.row(name), self.signals)
-            readings[name] = replace(readings[name], signals=seen)
-        self.readings = readings
-        now = view.time
-        for name, agent in self._agents.items():
-            agent.message_interval = 0.0 if self._channel is None else self._channel.min_message_interval(name)
-            if self._checked_channel is not None:
-                check_interval(self._checked_channel, agent.message_interval)
+            self._statistics = None
+            self._channel.update_environment(self._radio_environment(world, view))
+        self._readings = readings = self._read(world, view, inputs.signals)
+        now, own_perception = view.time, self._own_perception
+        intervals = {name: self._min_message_interval(name) for name in self._agents}
         return {
-            name: agent.act(readings[name], self._deliver(name, now), now, self.goals.get(name))
+            name: agent.act(
+                readings[name],
+                self._deliver(name, now),
+                now,
+                inputs.goals.get(name),
+                message_interval=intervals[name],
+                own_perception=own_perception,
+            )
             for name, agent in self._agents.items()
         }
 
     def controls(
-        self, steps: Mapping[str, AgentStep], overrides: Mapping[str, Overrides] | None = None
+        self, steps: Mapping[str, AgentStep], overrides: Mapping[str, Overrides] = MappingProxyType({})
     ) -> dict[str, Control]:
-        """The pedals and steering that the agents chose, but for those that the scenario holds.
-
-        Who has left the world in this step has none any more.
-        """
-        held = overrides or {}
+        """Return the controls of the agents with overrides applied. Actors removed after `act` have none."""
         return {
-            name: self._held[name].apply(step.control, held.get(name, {}))
+            name: self._overrides[name].apply(step.control, overrides.get(name, {}))
             for name, step in steps.items()
-            if step.control is not None and name in self._held
+            if step.control is not None and name in self._overrides
         }
 
-    def send(self, steps: Mapping[str, AgentStep], now: float) -> None:
-        """What the agents said goes on the air, each message on the link to each station that listens.
+    def send(self, steps: Mapping[str, AgentStep], now: float) -> Sequence[LinkEvent]:
+        """Transmit the messages of the agents, each on the links to its receivers.
 
-        A message that nobody listens to takes its time on the air all the same.
+        A message without receivers occupies the medium as well.
         """
         if self._channel is None:
-            self.links = ()
-            return
+            return ()
         outbox = []
         for sender, step in steps.items():
             receivers = self._receivers(sender)
             outbox += [(message, receivers) for message in step.outbox]
-        told = self._channel.transmit(outbox, now)
+        events = self._channel.transmit(outbox, now)
         if self._checked_channel is not None:
-            check_events(self._checked_channel, told)
-        self._books = None
-        self.links = told if isinstance(told, LinkEvents) else tuple(told)
+            check_events(self._checked_channel, events)
+        self._statistics = None
+        return events if isinstance(events, LinkEvents) else tuple(events)
 
     def metrics(self, now: float) -> dict[str, float]:
-        """Counts of messages over all links."""
+        """Return the counts of messages over all links."""
         if self._channel is None and self._retired_channel is None:
             return {}
-        books = self.link_statistics(now).values()
+        links = self.link_statistics(now).values()
         return {
-            "messages.sent": sum(book.sent for book in books),
-            "messages.received": sum(book.received for book in books),
-            "messages.lost": sum(book.lost for book in books),
-            "messages.bytes": sum(book.bytes_sent for book in books),
+            "messages.sent": sum(link.sent for link in links),
+            "messages.received": sum(link.received for link in links),
+            "messages.lost": sum(link.lost for link in links),
+            "messages.bytes": sum(link.bytes_sent for link in links),
         }
 
     def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
-        """The books of every link, by (sender, receiver); empty where there never was a channel."""
         channel = self._channel or self._retired_channel
         if channel is None:
             return {}
-        if self._books is None or self._books[0] != now:
-            self._books = now, channel.statistics(now)
+        if self._statistics is None or self._statistics[0] != now:
+            self._statistics = now, channel.statistics(now)
             if not is_built_in(type(channel)):
-                check_statistics(channel, self._books[1])
-        return self._books[1]
+                check_statistics(channel, self._statistics[1])
+        return self._statistics[1]
 
-    def _surroundings(self, world: World, view: WorldView) -> RadioEnvironment:
-        places = {
+    def _read(self, world: World, view: WorldView, signals: Mapping[str, str]) -> dict[str, Readings]:
+        readings = read_all(list(self._rigs.values()), world, view)
+        for name, sensor in self._signal_sensors.items():
+            visible = sensor.read(world, view, view.row(name), signals)
+            readings[name] = replace(readings[name], signals=visible)
+        return readings
+
+    def _radio_environment(self, world: World, view: WorldView) -> RadioEnvironment:
+        antennas = {
             name: antenna_position(view, agent.spec, agent.settings.antenna_height)
             for name, agent in self._agents.items()
         }
-        return RadioEnvironment(places, partial(line_of_sight_states, world, places))
+        return RadioEnvironment(antennas, partial(line_of_sight_states, world, antennas))
+
+    def _min_message_interval(self, sender: str) -> float:
+        """Return the minimum time between two messages of a station under congestion control [s]."""
+        if self._channel is None:
+            return 0.0
+        interval = self._channel.min_message_interval(sender)
+        if self._checked_channel is not None:
+            check_interval(self._checked_channel, interval)
+        return interval
 
     def _deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
         if self._channel is None:
@@ -254,29 +272,23 @@ class Stations:
         return delivered
 
     def _receivers(self, sender: str) -> list[str]:
-        """Who hears `sender`: listening stations that count it; itself too where the channel carries own perception."""
-        found = []
-        for name, agent in self._agents.items():
-            if not agent.receives_messages:
-                continue
-            heard = agent.settings.cooperates_with
-            if self._own_perception if name == sender else heard is None or sender in heard:
-                found.append(name)
-        return found
+        own_perception = self._own_perception
+        return [
+            name for name, agent in self._agents.items() if agent.receives_from(sender, own_perception=own_perception)
+        ]
 
     @property
     def _own_perception(self) -> bool:
+        """Whether the channel carries the detections of a station back to itself."""
         return self._channel is not None and self._channel.own_perception
 
     def _set_channel(self, source: str | Path, *, origin: str, line: int | None, scope: Scope | None) -> None:
         profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
         before = self._channel or self._retired_channel
-        self._channel = build_channel(profile, self._seed, previous=before)
+        self._channel = build_channel(profile, self._context.seed, previous=before)
         third_party = self._channel is not None and not is_built_in(type(self._channel))
         self._checked_channel = self._channel if third_party else None
         self._retired_channel = before if self._channel is None else None
-        self._books = None
-        self.channel_profile = profile
-        self.channel_name = profile.name if profile is not None else NO_COOPERATION
-        for agent in self._agents.values():
-            agent.own_perception = self._own_perception and agent.receives_messages
+        self._statistics = None
+        self._channel_profile = profile
+        self._channel_name = profile.name if profile is not None else NO_COOPERATION

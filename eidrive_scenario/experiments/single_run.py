@@ -137,7 +137,7 @@ def _record(
 ) -> None:
     """Let a recorder and a writer of camera images look on."""
     pictures = CameraImageWriter(folder.pictures)
-    pictures.watch(simulation.stations)
+    pictures.watch(simulation.stack)
     simulation.add_observer(pictures)
     scenario, resolved = simulation.scenario, simulation.resolved
     told = _told(scenario, resolved.seed, resolved.run, settings)

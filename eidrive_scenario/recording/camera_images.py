@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.stations import Stations
+from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.geometry import box_corners
 from eidrive_scenario.perception.geometry.projection import pixels
@@ -47,18 +47,18 @@ class CameraImageWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._stations: Stations | None = None
+        self._stack: DrivingStack | None = None
 
-    def watch(self, stations: Stations) -> None:
-        """Select the stations whose images are written."""
-        self._stations = stations
+    def watch(self, stack: DrivingStack) -> None:
+        """Select the driving stack whose camera images are written."""
+        self._stack = stack
 
     def observe(self, frame: Frame) -> None:
         """Write the images of this tick. Raise SettingError if a file cannot be written."""
-        if self._stations is None:
+        if self._stack is None:
             return
-        for station, readings in self._stations.readings.items():
-            detections = self._stations.detector(station).image_detections
+        for station, readings in self._stack.readings.items():
+            detections = self._stack.image_detections(station)
             for camera, reading in readings.cameras.items():
                 if camera in detections:
                     image = draw_image_detections(reading.rgb, detections[camera])

@@ -1,21 +1,73 @@
-"""Outcome of a run: verdicts, metrics, and the warnings that only the whole run can give."""
+"""Outcome of a run: verdicts, metrics, exit code, late warnings, and the result with all of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
+from eidrive_scenario.evaluation.false_tracks import FalseTracks
+from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.simulation.run import ABORTED, FAILED, PASSED
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.resolved_settings import ResolvedSettings
+from eidrive_scenario.simulation.command_execution import RunState
+from eidrive_scenario.simulation.run import ABORTED, FAILED, PASSED, RunResult
 from eidrive_scenario.storyboard.state.external_inputs import user_value_warnings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
 
 TIME_LIMIT = "time limit"
-"""End of a run that simulated time has cut off."""
-_CUT_SHORT = ("command: exitFailure",)
-"""Ends of a failed run that leave the rest of the storyboard out."""
+"""Reason for the end of a run that reaches the limit of simulated time."""
+_EARLY_ENDS = ("command: exitFailure",)
+"""Ends of a failed run before the rest of the storyboard."""
+
+
+@dataclass(frozen=True)
+class RunEnd:
+    """End of a run: the last frame, the reason, and the wall time until then [s]."""
+
+    frame: Frame
+    reason: str
+    wall_s: float
+
+
+def build_result(
+    state: RunState,
+    end: RunEnd,
+    *,
+    settings: ResolvedSettings,
+    trace_hash: str,
+    false_tracks: FalseTracks,
+    late_warnings: Iterator[str],
+) -> RunResult:
+    """Return the result of a run that has ended."""
+    frame, scenario, stack = end.frame, state.scenario, state.stack
+    verdicts = final_verdicts(state.criteria, state.exit)
+    exit_code = exit_code_of(verdicts, end.reason)
+    metrics = criteria_metrics(state.criteria)
+    metrics.update(stack.metrics(frame.view.time))
+    metrics.update(false_tracks.metrics())
+    metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
+    return RunResult(
+        scenario=name_of(scenario.path) if scenario.path is not None else scenario.name,
+        seed=settings.seed,
+        channel=stack.channel_name,
+        passed=exit_code == PASSED,
+        end_reason=end.reason,
+        exit_code=exit_code,
+        criteria=verdicts,
+        metrics=metrics,
+        trace_hash=trace_hash,
+        simulated_s=frame.view.time,
+        wall_s=end.wall_s,
+        warnings=tuple(dict.fromkeys([*state.warnings, *late_warnings])),
+        parameters=dict(scenario.parameters),
+        run=settings.run,
+        links=dict(stack.link_statistics(frame.view.time)),
+        settings=settings,
+    )
 
 
 def final_verdicts(criteria: Sequence[Criterion], exit_verdict: Verdict | None) -> tuple[Verdict, ...]:
@@ -44,15 +96,15 @@ def late_warnings(
     storyboard: Storyboard,
     motionless: MotionlessStations,
     user_values: tuple[Mapping[str, str], Mapping[str, str]],
-    time: float,
-    end: str,
+    end: RunEnd,
 ) -> Iterator[str]:
-    """Yield the warnings of a run that has ended at `time` [s].
+    """Yield the warnings of a run that has ended.
 
-    user_values  all that were set, and those of them that the caller's settings have set
+    user_values  all values that were set, and those of them that the settings of the run set
     """
+    time = end.frame.view.time
     yield from map(str, storyboard.context.warnings)
     yield from user_value_warnings(storyboard.context.requested_user_values, *user_values)
     yield from map(str, motionless.warnings(scenario, time))
-    if end not in _CUT_SHORT and not end.startswith("criterion: "):
-        yield from map(str, unstarted(storyboard.root, scenario, time, end))
+    if end.reason not in _EARLY_ENDS and not end.reason.startswith("criterion: "):
+        yield from map(str, unstarted(storyboard.root, scenario, time, end.reason))

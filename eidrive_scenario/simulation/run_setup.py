@@ -1,13 +1,12 @@
-"""Setup of a run: everything that takes part in it, built from a scenario, a seed and the caller's settings."""
+"""Setup of a run: all its parts, built from a scenario, a seed and the settings of the run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eidrive_scenario.driving.planning.area_checks import areas_off_road
+from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.evaluation.criteria_parser import stop_trigger_criteria, unsupported_criteria
 from eidrive_scenario.evaluation.criterion import Criterion
@@ -27,14 +26,14 @@ class RunSetup:
 
     criteria           criteria of the StopTrigger; commands of the storyboard add the others
     declared_criteria  criteria that commands of the storyboard declare
-    weather            weather option, which overrides the scenario; None for the weather of the scenario
+    weather            option that overrides the scenario; None uses the weather of the scenario
     warnings           warnings that are known before the run
     """
 
     scenario: Scenario
     roads: RoadNetwork | None
     storyboard: Storyboard
-    stations: Stations
+    stack: DrivingStack
     criteria: tuple[Criterion, ...]
     declared_criteria: DeclaredCriteria
     weather: Weather | None
@@ -43,52 +42,63 @@ class RunSetup:
 
 
 def set_up_run(
-    source: Scenario | Source | ConcreteRun, seed: int, settings: RunSettings, *, load_weights: bool
+    source: Scenario | Source | ConcreteRun,
+    seed: int,
+    settings: RunSettings,
+    *,
+    load_weights: bool,
+    stack: StackFactory = Stations,
 ) -> RunSetup:
-    """Load a scenario for a seed and build all parts of its run. Raise InputError with everything that is wrong."""
-    together = ErrorCollector()
-    scenario = load_for_run(source, seed, settings.parameters, together)
+    """Load a scenario for a seed and build all parts of its run.
+
+    stack  builds the driving stack
+
+    Raise InputError with the diagnostics of all parts.
+    """
+    collector = ErrorCollector()
+    scenario = load_for_run(source, seed, settings.parameters, collector)
     roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     criteria: tuple[Criterion, ...] = ()
     declared: DeclaredCriteria = {}
     weather: Weather | None = None
-    with together:
+    with collector:
         declared = check_commands(scenario)
-    with together:
+    with collector:
         storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=seed, controllers=settings.controllers)
-    with together:
-        stations = Stations(
-            scenario,
-            roads,
-            seed=seed,
-            dt=settings.dt,
-            channel=settings.channel,
-            detector=settings.detector,
-            cooperate=settings.cooperate,
-            load_weights=load_weights,
-            allow_torchscript=settings.allow_torchscript,
-        )
-    with together:
+    with collector:
+        driving = stack(_stack_context(scenario, roads, seed, settings, load_weights))
+    with collector:
         criteria = tuple(stop_trigger_criteria(scenario))
-    with together:
+    with collector:
         if settings.weather is not None:
             weather = load_weather(settings.weather, origin="--weather")
-    together.raise_if_any()
-    warnings = tuple(map(str, _warnings(scenario, roads, stations, settings)))
+    collector.raise_if_any()
+    warnings = tuple(map(str, _warnings(scenario, roads, driving)))
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
     if weather is not None:
         world.set_weather(weather)
-    return RunSetup(scenario, roads, storyboard, stations, criteria, declared, weather, world, warnings)
+    return RunSetup(scenario, roads, storyboard, driving, criteria, declared, weather, world, warnings)
 
 
-def _warnings(
-    scenario: Scenario, roads: RoadNetwork | None, stations: Stations, settings: RunSettings
-) -> Iterator[Diagnostic]:
-    """Everything that is doubtful about a run and known before it."""
+def _stack_context(
+    scenario: Scenario, roads: RoadNetwork | None, seed: int, settings: RunSettings, load_weights: bool
+) -> StackContext:
+    return StackContext(
+        scenario,
+        roads,
+        seed,
+        settings.dt,
+        channel=settings.channel,
+        detector=settings.detector,
+        cooperate=settings.cooperate,
+        load_weights=load_weights,
+        allow_torchscript=settings.allow_torchscript,
+    )
+
+
+def _warnings(scenario: Scenario, roads: RoadNetwork | None, stack: DrivingStack) -> Iterator[Diagnostic]:
+    """Yield all warnings that are known before the run."""
     yield from scenario.warnings
     yield from unsupported_criteria(scenario)
     yield from roads.map_warnings if roads is not None else ()
-    yield from areas_off_road(scenario, stations.settings, roads)
-    yield from short_detector_latencies(stations.settings, settings.dt)
-    if settings.channel is not None:
-        yield from short_channel_delay(stations.channel_profile, settings.dt, "--channel")
+    yield from stack.warnings()

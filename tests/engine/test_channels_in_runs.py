@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
+from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording import RunLog, read_recording
@@ -141,7 +142,8 @@ def test_run_without_loss_and_delay_equals_shared_memory(scenario: str) -> None:
     simulation = Simulation(
         load_for_seed(path, 1, {}), seed=1, settings=RunSettings(channel="ideal"), observers=[shared]
     )
-    simulation.stations._channel = SharedMemory()
+    assert isinstance(simulation.stack, Stations)
+    simulation.stack._channel = SharedMemory()
     simulation.run()
     assert shared.motion == collector.motion
     assert shared.known == collector.known

@@ -156,6 +156,8 @@ def test_a_planner_without_wheels_is_told_by_line_before_the_run(tmp_path: Path)
 def test_who_listens_without_wheels(names: str | None, hears: bool) -> None:
     given = {} if names is None else {"cooperates_with": names}
     settings = AgentSettings.model_validate({"detector": "lidar", "fusion": "early", **given})
-    station = build_agent(settings, MAST, None, seed=0, dt=0.05, own_perception=True)
+    station = build_agent(settings, MAST, None, seed=0, dt=0.05)
     assert station.receives_messages is hears
-    assert station.own_perception is hears
+    assert station.receives_from("Ego", own_perception=False) is hears
+    assert station.receives_from(MAST.name, own_perception=True) is hears
+    assert not station.receives_from(MAST.name, own_perception=False)

@@ -182,11 +182,10 @@ def test_etsi_generation_respects_the_interval_of_congestion_control() -> None:
     for kinds, interval, gap in (("cpm", 0.4, 0.4), ("cam", 0.4, 0.4), ("[cpm, cam]", 0.4, 0.8), ("cpm", 0.0, 0.2)):
         cooperation = Cooperation(PLACES, None, generation="etsi", messages=kinds.strip("[]"))
         agent = cooperation.agents["A"]
-        agent.message_interval = interval
         sent: dict[str, list[float]] = {"cpm": [], "cam": []}
         for tick in range(100):
             now = tick * DT
-            for message in agent.act(fast(now), (), now, None).outbox:
+            for message in agent.act(fast(now), (), now, None, message_interval=interval).outbox:
                 sent[message.kind].append(now)
         for times in filter(None, sent.values()):
             assert np.diff(times) == pytest.approx(gap), (kinds, interval)

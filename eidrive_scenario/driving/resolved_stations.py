@@ -1,0 +1,37 @@
+"""Resolved settings of stations, and the third-party extensions that they use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel
+
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.stack import StackSettings
+from eidrive_scenario.registry import distributions, registry
+from eidrive_scenario.v2x.profile import ChannelProfile
+
+
+def resolved_stations(
+    settings: Mapping[str, AgentSettings], channel: str, profile: ChannelProfile | None
+) -> StackSettings:
+    """Return the settings of stations and channel with the defaults of all extensions."""
+    used = {("channels", profile.model)} if profile is not None else set()
+    for station in settings.values():
+        used |= {("detectors", station.detector), ("fusion", station.fusion), ("planners", station.planner or "")}
+    return StackSettings(
+        channel=channel,
+        channel_profile=None if profile is None else profile.model_dump(mode="json"),
+        stations={name: _resolved(station) for name, station in sorted(settings.items())},
+        extensions=distributions(used),
+    )
+
+
+def _resolved(settings: AgentSettings) -> dict[str, Any]:
+    found = settings.model_dump(mode="json")
+    for kind, name in (("detectors", "detector"), ("fusion", "fusion")):
+        model = getattr(registry(kind).load(found[name]), "settings_type", None)
+        if isinstance(model, type) and issubclass(model, BaseModel):
+            found[f"{name}_settings"] = model.model_validate(found[f"{name}_settings"]).model_dump(mode="json")
+    return found

@@ -1,0 +1,152 @@
+"""Execution of the commands of the storyboard: one handler per kind of command, called in the order of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from eidrive_scenario.driving.stack import DrivingStack, StackInputs
+from eidrive_scenario.evaluation.criteria_parser import EXITS, build_criteria, exit_verdict, parse_criteria
+from eidrive_scenario.evaluation.criterion import Criterion, Verdict
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.simulation.commands import CHANNEL, CRITERION, PREFIX, DeclaredCriteria, command_key
+from eidrive_scenario.simulation.run_setup import RunSetup
+from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
+from eidrive_scenario.world import World
+from eidrive_scenario.world.environment_weather import weather_from_environment
+from eidrive_scenario.world.specs import actor_spec
+
+
+@dataclass
+class RunState:
+    """Objects of a run that commands change.
+
+    weather_fixed  True if an option of the run overrides the weather of the scenario
+    declared       criteria that the commands of the scenario declare, parsed before the run
+    inputs         requests and signal states for the next step of the stack
+    criteria       of the run; commands add to them
+    warnings       of the run; commands without effect add to them
+    exit           verdict of the command that ends the run; None before it
+    """
+
+    scenario: Scenario
+    world: World
+    stack: DrivingStack
+    weather_fixed: bool
+    declared: DeclaredCriteria
+    criteria: list[Criterion]
+    warnings: list[str]
+    inputs: StackInputs = field(default_factory=StackInputs)
+    exit: Verdict | None = None
+
+    @classmethod
+    def of(cls, setup: RunSetup) -> RunState:
+        """Return the state of a run before its first tick."""
+        return cls(
+            setup.scenario,
+            setup.world,
+            setup.stack,
+            weather_fixed=setup.weather is not None,
+            declared=setup.declared_criteria,
+            criteria=list(setup.criteria),
+            warnings=list(setup.warnings),
+        )
+
+
+def execute(commands: Commands, run: RunState) -> None:
+    """Execute all commands of one tick but the placements, which are an argument of `World.step`."""
+    for handler in HANDLERS:
+        handler(commands, run)
+
+
+def remove_actors(commands: Commands, run: RunState) -> None:
+    """Remove actors from the world and the stack."""
+    for name in sorted(commands.removals):
+        run.world.remove(name)
+        run.stack.remove(name)
+
+
+def spawn_actors(commands: Commands, run: RunState) -> None:
+    """Add actors to the world and the stack."""
+    for name, placement in commands.spawns.items():
+        spec = commands.actor_specs.get(name) or actor_spec(name, run.scenario.entities[name])
+        run.world.add(spec, placement)
+        run.stack.add(spec)
+
+
+def switch_drivers(commands: Commands, run: RunState) -> None:
+    """Switch each vehicle of the stack between its own controls and scripted motion."""
+    for name in sorted(run.stack.drivers):
+        run.world.set_driven(name, name in commands.driven)
+
+
+def set_inputs(commands: Commands, run: RunState) -> None:
+    """Pass goals and signal states to the next step of the stack."""
+    run.inputs = StackInputs(commands.goals, commands.signals)
+
+
+def set_display_state(commands: Commands, run: RunState) -> None:
+    """Show signal states and appearances in camera images."""
+    run.world.set_display_state(commands.signals, commands.appearances)
+
+
+def set_weather(commands: Commands, run: RunState) -> None:
+    """Set the weather of an EnvironmentAction, unless an option overrides it."""
+    if commands.environment is not None and not run.weather_fixed:
+        run.world.set_weather(weather_from_environment(commands.environment, run.world.time))
+
+
+def execute_custom(commands: Commands, run: RunState) -> None:
+    """Execute CustomCommandActions. A command of another tool has no effect, which is a warning."""
+    for command in commands.custom:
+        handler = CUSTOM_HANDLERS.get(command.type)
+        if handler is not None:
+            handler(command, run)
+        elif not command.type.startswith(PREFIX):
+            run.warnings.append(
+                f"{command.source}:{command.line}: command of type {command.type!r} is recorded, not executed"
+            )
+
+
+def select_channel(command: CustomCommand, run: RunState) -> None:
+    """Select the channel of a command `eidrive.channel`."""
+    warnings = run.stack.request_channel(command.content, source=command.source, line=command.line, scope=command.scope)
+    run.warnings += map(str, warnings)
+
+
+def add_criteria(command: CustomCommand, run: RunState) -> None:
+    """Add the criteria of a command `eidrive.criterion`."""
+    declarations = run.declared.get(command_key(command))
+    if declarations is None:  # A command that an action of an extension has created
+        declarations = parse_criteria(
+            command.content,
+            source=command.source,
+            line=command.line,
+            entities=run.scenario.entities,
+            scope=command.scope,
+        )
+    run.criteria += build_criteria(declarations, [criterion.name for criterion in run.criteria])
+
+
+def end_run(command: CustomCommand, run: RunState) -> None:
+    """End the run with the verdict of an exit command."""
+    run.exit = exit_verdict(command, run.world.time)
+
+
+HANDLERS: tuple[Callable[[Commands, RunState], None], ...] = (
+    remove_actors,
+    spawn_actors,
+    switch_drivers,
+    set_inputs,
+    set_display_state,
+    set_weather,
+    execute_custom,
+)
+"""Handlers of `Commands`, in the order of execution."""
+
+CUSTOM_HANDLERS: dict[str, Callable[[CustomCommand, RunState], None]] = {
+    CHANNEL: select_channel,
+    CRITERION: add_criteria,
+    **dict.fromkeys(EXITS, end_run),
+}
+"""Handlers of CustomCommandActions by type. No command starts a program."""

@@ -1,0 +1,46 @@
+"""Observers of one run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, suppress
+
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation.run import Observer, checked_observer
+
+
+class Observers:
+    """The observers of one run. Each is closed exactly once.
+
+    Raises SettingError for an object that lacks the methods of an observer.
+    """
+
+    def __init__(self, observers: Iterable[Observer] = ()) -> None:
+        self._observers: tuple[Observer, ...] = ()
+        self._unclosed: list[Observer] = []
+        for observer in observers:
+            self.add(observer)
+
+    def __iter__(self) -> Iterator[Observer]:
+        return iter(self._observers)
+
+    def add(self, observer: Observer) -> None:
+        """Add an observer of all frames from now on. Raise SettingError if it lacks a method."""
+        self._observers = (*self._observers, checked_observer(observer))
+        self._unclosed.append(observer)
+
+    def observe(self, frame: Frame) -> None:
+        """Pass a frame to all observers, in the order in which they were added."""
+        for observer in self._observers:
+            observer.observe(frame)
+
+    def close(self, stack: ExitStack) -> None:
+        """Register the closing of all open observers with `stack`, so that an exception of one does not skip others."""
+        while self._unclosed:
+            stack.callback(self._unclosed.pop().close)
+
+    def close_silently(self) -> None:
+        """Close all open observers and ignore their exceptions."""
+        while self._unclosed:
+            with suppress(Exception):
+                self._unclosed.pop(0).close()
