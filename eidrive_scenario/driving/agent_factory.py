@@ -9,9 +9,9 @@ from eidrive_scenario.driving.communication.message_generator import MessageGene
 from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.planner import Planner
-from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
+from eidrive_scenario.driving.planning.planner_settings import DEFAULT_PLANNER, NO_PLANNER
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
-from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer, motion_noise
@@ -76,7 +76,7 @@ def build_fusion(
     if given and kind.settings_type is None:
         message = f"fusion {settings.fusion!r} has no settings of its own"
         raise SettingError(Diagnostic(message, "remove the property 'fusion_settings'", source, line))
-    if issubclass(kind, EarlyFusion) and "lidar" not in detector.needs:
+    if kind.shares_points and "lidar" not in detector.needs:
         message = f"fusion {settings.fusion!r} joins points, and detector {settings.detector!r} looks at none"
         raise SettingError(Diagnostic(message, "give it a detector for LiDAR: lidar", source, line))
     if kind.settings_type is None:
@@ -104,7 +104,7 @@ def build_agent(
     Raises SettingError if a planner is asked of a body without wheels.
     """
     wheels = spec.wheelbase > 0.0
-    planner = settings.planner or ("route" if wheels else NO_PLANNER)
+    planner = settings.planner or (DEFAULT_PLANNER if wheels else NO_PLANNER)
     if planner != NO_PLANNER and not wheels:
         raise SettingError(Diagnostic(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
     detector = detector or build_detector(settings)
@@ -114,7 +114,7 @@ def build_agent(
     fusion = build_fusion(settings, detector)
     points = None
     listens = planner != NO_PLANNER or settings.restricts_senders
-    if isinstance(fusion, EarlyFusion):
+    if fusion.shares_points:
         points = PointCloudSharing(fusion, _joint(settings, installation) if listens else None)
     return Agent(
         spec,

@@ -6,8 +6,13 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
 
+from eidrive_scenario.driving.planning.planner_settings import (
+    NO_PLANNER,
+    PlannerSettings,
+    split_planner_settings,
+)
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.values.references import resolve_references
@@ -27,9 +32,6 @@ from eidrive_scenario.v2x.messages.clock import StationClock
 MODULE = "eidrive"
 """The value of the property `module` by which a controller is one of ours."""
 
-NO_PLANNER = "none"
-"""The planner of a station that does not drive: a parked vehicle, which keeps its brakes on."""
-
 _TEXTS = frozenset({"module", "detector", "fusion", "planner"})
 """Properties whose values are names, not YAML."""
 
@@ -48,8 +50,6 @@ PARTIAL_LIFETIME = 1.5
 
 MAX_TIME = 1e4
 """Largest latency, lifetime and clock error [s]."""
-
-Polygon = tuple[tuple[float, float], ...]
 
 
 def _names(value: Any) -> Any:
@@ -84,37 +84,6 @@ def _sensors(value: Any) -> Any:
     return sensors
 
 
-def _areas(value: Any) -> Any:
-    """Areas as polygons: given as [x0, x1, y0, y1], a list of such rectangles, one polygon, or a list of polygons."""
-    if value is None:
-        return None
-    explanation = "an area is [x0, x1, y0, y1], a list of such, or a polygon [[x, y], [x, y], [x, y], …], in meters"
-    if not isinstance(value, Sequence) or isinstance(value, str) or not value:
-        raise ValueError(explanation)
-    if all(isinstance(entry, (int, float)) for entry in value) or all(_is_point(entry) for entry in value):
-        value = [value]
-    polygons: list[Polygon] = []
-    for entry in value:
-        if not isinstance(entry, Sequence) or isinstance(entry, str):
-            raise ValueError(explanation)
-        if len(entry) == 4 and all(isinstance(bound, (int, float)) for bound in entry):
-            x0, x1, y0, y1 = entry
-            if x0 >= x1 or y0 >= y1:
-                raise ValueError(f"the rectangle {list(entry)} is empty: x0 < x1 and y0 < y1 are expected")
-            polygons.append(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
-        elif len(entry) >= 3 and all(_is_point(point) for point in entry):
-            polygons.append(tuple((point[0], point[1]) for point in entry))
-        else:
-            raise ValueError(explanation)
-    return tuple(polygons)
-
-
-def _is_point(entry: Any) -> bool:
-    return (
-        isinstance(entry, (list, tuple)) and len(entry) == 2 and all(isinstance(part, (int, float)) for part in entry)
-    )
-
-
 class AgentSettings(Settings):
     """One station. Lengths in m, speeds in m/s, times in s, angles in degrees, rates in Hz; world frame.
 
@@ -142,11 +111,7 @@ class AgentSettings(Settings):
     clock_offset    how much the station's clock is ahead;  clock_drift  how fast it gains [parts per million]
     asn1_files      ASN.1 modules that say how large a message is, relative to the scenario file
     target_speed    where the storyboard asks for none; None keeps the first one
-    conflict_area   polygons (a rectangle is [x0, x1, y0, y1]) in which an object makes the vehicle brake with
-    conflict_deceleration  [m/s²], until
-    conflict_hold_time   has gone by since an object was last known there
-    min_existence   probability of existence (of an object without one: score) from which on the planner reacts to it;
-                    0.5 is the likelier of the two hypotheses, as in trackers and fusion
+    planner_settings  of the selected planner; each may also be a property of its own
     """
 
     module: Literal["eidrive"] = "eidrive"
@@ -176,10 +141,7 @@ class AgentSettings(Settings):
     clock_drift: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
     asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names)] = ()
     target_speed: Annotated[float, Field(ge=0.0, le=1e4)] | None = None
-    conflict_area: Annotated[tuple[Polygon, ...] | None, BeforeValidator(_areas)] = None
-    conflict_deceleration: PositiveFloat = 5.0
-    conflict_hold_time: NonNegativeFloat = 1.05
-    min_existence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+    planner_settings: SerializeAsAny[PlannerSettings] = PlannerSettings()
 
     @model_validator(mode="after")
     def _one_truth_sensor(self) -> AgentSettings:
@@ -262,7 +224,7 @@ def agent_settings(controller: Controller) -> AgentSettings:
     source = controller.source
     data: dict[str, Any] = {}
     lines: dict[str, int] = {}
-    diagnostics = []
+    diagnostics: list[Diagnostic] = []
     for entry in entries:
         if entry.name in data:
             message = f"property {entry.name!r} is given twice, first in line {lines[entry.name]}"
@@ -285,14 +247,29 @@ def agent_settings(controller: Controller) -> AgentSettings:
         if name in data and data[name] not in known:
             message = f"unknown {name} {data[name]!r}"
             diagnostics.append(Diagnostic(message, suggestion(data[name], known), source, lines[name]))
-    lacks_area = data.get("conflict_area") is None and ("conflict_area" in data or "conflict_area" not in lines)
-    if data.get("planner") == "conflict_area" and lacks_area:
-        message = "planner 'conflict_area' has no area"
-        diagnostics.append(Diagnostic(message, "add the property 'conflict_area'", source, lines["planner"]))
+    return parse_station_settings(data, source=source, line=controller.line, lines=lines, diagnostics=diagnostics)
+
+
+def parse_station_settings(
+    data: Mapping[str, Any],
+    *,
+    source: str = "",
+    line: int | None = None,
+    lines: Mapping[str, int] = MappingProxyType({}),
+    diagnostics: Sequence[Diagnostic] = (),
+) -> AgentSettings:
+    """Return the settings of a station and its planner from the properties of its controller.
+
+    `lines` gives the line of each property. Raise SettingError with these diagnostics and those of invalid settings.
+    """
+    found = list(diagnostics)
+    station, planner_settings = split_planner_settings(
+        data, AgentSettings.model_fields, source=source, line=line, lines=lines, diagnostics=found
+    )
     try:
-        settings = parse_settings(AgentSettings, data, source=source, line=controller.line, lines=lines)
+        settings = parse_settings(AgentSettings, station, source=source, line=line, lines=lines)
     except SettingError as error:
-        raise SettingError([*diagnostics, *error.diagnostics]) from error
-    if diagnostics:
-        raise SettingError(diagnostics)
-    return settings
+        raise SettingError([*found, *error.diagnostics]) from error
+    if found:
+        raise SettingError(found)
+    return settings.model_copy(update={"planner_settings": planner_settings})

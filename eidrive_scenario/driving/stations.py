@@ -148,7 +148,7 @@ class Stations(DrivingStack):
             encoder=self._encoders.get(spec.name),
         )
         if agent.planner is not None:
-            self._min_existence[spec.name] = settings.min_existence
+            self._min_existence[spec.name] = settings.planner_settings.min_existence
         unread = SIGNAL_KINDS - agent.perception.detector.detectable_signals
         if settings.obey_signals and unread:
             self._signal_sensors[spec.name] = SignalSensor(spec, context.roads, unread)

@@ -40,9 +40,15 @@ class EarlyFusion(CovarianceIntersectionFusion):
 
     settings_type: ClassVar[type[Settings] | None] = EarlyFusionSettings
 
+    shares_points: ClassVar[bool] = True
+
     def __init__(self, settings: EarlyFusionSettings | None = None) -> None:
         self.early = settings or EarlyFusionSettings()
         super().__init__(self.early)
+
+    @property
+    def max_point_age(self) -> float:
+        return self.early.max_lateness
 
     def shared_cloud(self, readings: Readings) -> PointCloud | None:
         """Return the points of all lidars of a station for transmission; None without a lidar reading."""

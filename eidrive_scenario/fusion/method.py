@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.records import fast_frozen
+from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.message import StationState
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 
 @fast_frozen
@@ -44,6 +47,22 @@ class FusionMethod(ABC):
 
         This includes out-of-sequence and incomplete reports.
         """
+
+    shares_points: ClassVar[bool] = False
+    """Whether stations send lidar points beside their detections and detect in the points of all stations."""
+
+    @property
+    def max_point_age(self) -> float:
+        """Maximum age of received points that are merged [s]."""
+        return 0.0
+
+    def shared_cloud(self, readings: Readings) -> PointCloud | None:
+        """Return the points of a station that shares points, as it sends them; None if no lidar was read."""
+        return None
+
+    def merge_readings(self, readings: Readings, received: Sequence[Array]) -> Readings:
+        """Return the readings of a station that shares points, with the received points (N, 3) merged."""
+        return readings
 
     @abstractmethod
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:

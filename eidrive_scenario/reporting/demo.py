@@ -65,7 +65,7 @@ def conflict_areas(scenario: Scenario) -> tuple[Array, ...]:
         np.array(polygon)
         for controller in scenario.controllers.get(EGO, ())
         if is_agent_controller(controller)
-        for polygon in agent_settings(controller).conflict_area or ()
+        for polygon in agent_settings(controller).planner_settings.areas
     )
 
 

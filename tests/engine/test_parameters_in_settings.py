@@ -127,7 +127,7 @@ def test_controller_of_a_catalog_uses_its_own_parameters(make: Make, tmp_path: P
         ("<MiscObjectCatalog>", '<ControllerCatalog><Directory path="."/></ControllerCatalog><MiscObjectCatalog>'),
     )
     with Simulation(path, settings=RunSettings(parameters={"Gap": "28"})) as simulation:
-        area = simulation.resolved.stations["Ego"]["conflict_area"]
+        area = simulation.resolved.stations["Ego"]["planner_settings"]["conflict_area"]
     assert area[0][0] == [28.0, 2.8]
     (tmp_path / "stacks.xosc").write_text(catalog.replace("${$West", "${$Wst"))
     with pytest.raises(InputError) as caught:
@@ -227,7 +227,7 @@ def test_controller_property_refers_inside_its_yaml(make: Make) -> None:
         scenario = load_scenario(path, {"Gap": str(gap)})
         with Simulation(scenario, settings=RunSettings(parameters={"Latency": "0.3"})) as simulation:
             settings = simulation.resolved.stations["Ego"]
-        assert settings["conflict_area"][0][0] == [gap, 4.5 * gap]
+        assert settings["planner_settings"]["conflict_area"][0][0] == [gap, 4.5 * gap]
         assert settings["detector_latency"] == 0.3
     wrong = make("ideal", (area[0], 'value="[$Gab, 32.0, 4.5, 10.5]"'))
     with pytest.raises(InputError, match=r"setting 'conflict_area.0': unknown parameter \$Gab; did you mean 'Gap'"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.fusion.early import EarlyFusion
+from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.sensing.readings import Readings
@@ -19,7 +19,7 @@ class PointCloudSharing:
                  that hears nobody
     """
 
-    def __init__(self, fusion: EarlyFusion, perception: Perception | None) -> None:
+    def __init__(self, fusion: FusionMethod, perception: Perception | None) -> None:
         self.own: PointCloud | None = None
         """The newest points of this station, as it sends them."""
         self._fusion = fusion
@@ -41,7 +41,7 @@ class PointCloudSharing:
         self.own = self._fusion.shared_cloud(readings) or self.own
         if self._perception is None:
             return alone
-        oldest = readings.time - self._fusion.early.max_lateness - TIME_TOLERANCE
+        oldest = readings.time - self._fusion.max_point_age - TIME_TOLERANCE
         self._heard = {sender: held for sender, held in self._heard.items() if held[0] >= oldest}
         return self._perception.perceive(
             self._fusion.merge_readings(readings, [points for _, (_, points) in sorted(self._heard.items())])

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from eidrive_scenario.driving.planning.conflict_area import inside
-from eidrive_scenario.driving.settings import AgentSettings, Polygon, is_agent_controller
+from eidrive_scenario.driving.planning.planner_settings import Polygon
+from eidrive_scenario.driving.settings import AgentSettings, is_agent_controller
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
@@ -26,11 +27,14 @@ def areas_off_road(
     if roads is None:
         return
     for name, station in settings.items():
-        for number, area in enumerate(station.conflict_area or (), 1):
+        planner = station.planner_settings
+        setting = planner.area_setting or ""
+        for number, area in enumerate(planner.areas, 1):
             gap = distance_to_road(area, roads)
             if gap > MARGIN:
-                which = "the conflict area" if len(station.conflict_area or ()) == 1 else f"conflict area {number}"
-                source, line = _place(scenario, name)
+                what = setting.replace("_", " ")
+                which = f"the {what}" if len(planner.areas) == 1 else f"{what} {number}"
+                source, line = _place(scenario, name, setting)
                 yield Diagnostic(
                     f"{which} of {name!r} never holds a vehicle on a road: it lies {gap:.0f} m off the nearest one",
                     "give world coordinates [m] in the frame of the road network: [x0, x1, y0, y1]",
@@ -53,11 +57,11 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
     return max(0.0, nearest - reach)
 
 
-def _place(scenario: Scenario, name: str) -> tuple[str, int]:
+def _place(scenario: Scenario, name: str, setting: str) -> tuple[str, int]:
     """File and line of the property that states the areas of a station."""
     for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
         for entry in controller.properties.property if controller.properties is not None else ():
-            if entry.name == "conflict_area":
+            if entry.name in (setting, "planner_settings"):
                 return controller.source, entry.line
         return controller.source, controller.line
     return "", 0

@@ -3,18 +3,66 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar
+
+from pydantic import BeforeValidator, NonNegativeFloat, PositiveFloat
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.planner_settings import PlannerSettings, Polygon
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
-from eidrive_scenario.driving.settings import AgentSettings, Polygon
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.records import replaced
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
+
+
+def _areas(value: Any) -> Any:
+    """Return areas as polygons. Accept [x0, x1, y0, y1], a polygon, or a list of rectangles and polygons."""
+    explanation = "an area is [x0, x1, y0, y1], a list of such, or a polygon [[x, y], [x, y], [x, y], …], in meters"
+    if not isinstance(value, Sequence) or isinstance(value, str) or not value:
+        raise ValueError(explanation)
+    if all(isinstance(entry, (int, float)) for entry in value) or all(_is_point(entry) for entry in value):
+        value = [value]
+    polygons: list[Polygon] = []
+    for entry in value:
+        if not isinstance(entry, Sequence) or isinstance(entry, str):
+            raise ValueError(explanation)
+        if len(entry) == 4 and all(isinstance(bound, (int, float)) for bound in entry):
+            x0, x1, y0, y1 = entry
+            if x0 >= x1 or y0 >= y1:
+                raise ValueError(f"the rectangle {list(entry)} is empty: x0 < x1 and y0 < y1 are expected")
+            polygons.append(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+        elif len(entry) >= 3 and all(_is_point(point) for point in entry):
+            polygons.append(tuple((point[0], point[1]) for point in entry))
+        else:
+            raise ValueError(explanation)
+    return tuple(polygons)
+
+
+def _is_point(entry: Any) -> bool:
+    return (
+        isinstance(entry, (list, tuple)) and len(entry) == 2 and all(isinstance(part, (int, float)) for part in entry)
+    )
+
+
+class ConflictAreaSettings(PlannerSettings):
+    """Settings of the planner `conflict_area`.
+
+    conflict_area  polygons in the world frame [m]; a rectangle may be written as [x0, x1, y0, y1]
+    conflict_deceleration  deceleration while an object is in an area [m/s²]
+    conflict_hold_time     time for which the vehicle brakes after an object was last known in an area [s]
+    """
+
+    area_setting: ClassVar[str | None] = "conflict_area"
+
+    conflict_area: Annotated[tuple[Polygon, ...], BeforeValidator(_areas)]
+    conflict_deceleration: PositiveFloat = 5.0
+    conflict_hold_time: NonNegativeFloat = 1.05
 
 
 class ConflictAreaPlanner(RoutePlanner):
@@ -28,26 +76,25 @@ class ConflictAreaPlanner(RoutePlanner):
     the steering goes on. Which deceleration that brake gives is our choice.
     """
 
+    settings_type: ClassVar[type[PlannerSettings]] = ConflictAreaSettings
+    planner_settings: ConflictAreaSettings
+
     def __init__(
         self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int
     ) -> None:
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
-        if not settings.conflict_area:
-            raise SettingError(Diagnostic("planner 'conflict_area' has no area", "add the property 'conflict_area'"))
-        self.areas = settings.conflict_area
         self._last_sighting = -math.inf
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         plan = super().plan(ego, objects, goal, now)
+        braking = self.planner_settings.conflict_deceleration
         inside_area = self._in_areas(objects) if len(objects) else ()
         if inside_area:
             self._last_sighting = now
             reason = f"{objects.classes[inside_area[0]]} in the conflict area"
-            return replaced(plan, reason=reason, braking=self.settings.conflict_deceleration, objects=inside_area)
-        if now - self._last_sighting < self.settings.conflict_hold_time - TIME_TOLERANCE:
-            return replaced(
-                plan, reason="an object was in the conflict area", braking=self.settings.conflict_deceleration
-            )
+            return replaced(plan, reason=reason, braking=braking, objects=inside_area)
+        if now - self._last_sighting < self.planner_settings.conflict_hold_time - TIME_TOLERANCE:
+            return replaced(plan, reason="an object was in the conflict area", braking=braking)
         return plan
 
     def _in_areas(self, objects: Detections) -> tuple[int, ...]:
@@ -55,12 +102,12 @@ class ConflictAreaPlanner(RoutePlanner):
         found = [
             index
             for index, (x, y) in enumerate(objects.boxes[:, :2].tolist())
-            if any([inside(x, y, area) for area in self.areas])
+            if any([inside(x, y, area) for area in self.planner_settings.conflict_area])
         ]
         if not found:
             return ()
         existence = objects.confidence.tolist()
-        return tuple([index for index in found if existence[index] >= self.settings.min_existence])
+        return tuple([index for index in found if existence[index] >= self.planner_settings.min_existence])
 
 
 def inside(x: float, y: float, polygon: Polygon) -> bool:

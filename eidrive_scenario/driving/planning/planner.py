@@ -1,34 +1,49 @@
-"""The seam of planning: a Planner turns what a station knows into a trajectory."""
+"""Interface of planners (abstract base class `Planner`)."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import ClassVar
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.planner_settings import PlannerSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
+from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.world.actor import ActorSpec
 
 
 class Planner(ABC):
-    """Built anew for each station and run, and asked in every tick. It knows what its station knows, nothing else."""
+    """Turns the information of one station into a trajectory, in every tick. Built once for each station and run.
+
+    A class is registered in the entry points `eidrive_scenario.planners`. Its inputs are those of its station only.
+    """
+
+    settings_type: ClassVar[type[PlannerSettings]] = PlannerSettings
+    """Type of the settings that the controller may give the planner, each as a property of its name or in the property
+    `planner_settings`."""
+    planner_settings: PlannerSettings
 
     def __init__(
         self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int
     ) -> None:
+        own = settings.planner_settings
+        if not isinstance(own, self.settings_type):
+            own = parse_settings(self.settings_type, own.model_dump(exclude_unset=True))
         self.settings = settings
+        self.planner_settings = own
         self.spec = spec
         self.roads = roads
         self.dt = dt
         self.seed = seed
 
     def observe_signals(self, signals: Sequence[SignalReading]) -> None:  # noqa: B027 - for planners that know signals
-        """The traffic lights and stop signs in sight now; called before `plan` where the station obeys them."""
+        """Receive the visible traffic lights and stop signs; called before `plan` if the station obeys signals."""
 
     @abstractmethod
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
-        """Where to go from here, and how fast."""
+        """Return the trajectory from the ego pose at `now` [s]. `goal` is the request of the scenario, or None."""

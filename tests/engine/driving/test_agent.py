@@ -10,6 +10,7 @@ import pytest
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_rig
+from eidrive_scenario.driving.planning.conflict_area import ConflictAreaSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import SettingError
@@ -245,8 +246,9 @@ def test_a_heard_object_in_the_area_brakes_exactly_as_asked(car: ActorSpec) -> N
         "{model: composed}",
         planner="conflict_area",
         target_speed=8.0,
-        conflict_area=[29, 31, 18, 22],
-        conflict_deceleration=4.5,
+        planner_settings=ConflictAreaSettings.model_validate(
+            {"conflict_area": [29, 31, 18, 22], "conflict_deceleration": 4.5}
+        ),
     )
     first = talk.step({"RSU": (HIDDEN,)})["Ego"]
     second = talk.step({"RSU": (HIDDEN,)})["Ego"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from eidrive_scenario.driving.planning.conflict_area import ConflictAreaSettings
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario.model.controllers import Controller
@@ -28,7 +29,7 @@ def test_the_defaults() -> None:
     found = settings()
     assert (found.detector, found.planner, found.cooperates_with) == ("oracle", None, None)
     assert found.fusion == "covariance_intersection"
-    assert (found.report_timeout, found.conflict_deceleration, found.conflict_hold_time) == (1.0, 5.0, 1.05)
+    assert (found.report_timeout, found.planner_settings.min_existence) == (1.0, 0.5)
     assert found.rig_sensors(frozenset({"truth"})) == {"truth": TruthSettings()}
     assert found.rig_sensors(frozenset({"camera"})) == {"camera": CameraSettings()}
 
@@ -80,7 +81,30 @@ SQUARE = ((29.0, 4.5), (32.0, 4.5), (32.0, 10.5), (29.0, 10.5))
     ],
 )
 def test_conflict_areas(text: str, areas: object) -> None:
-    assert settings(("planner", "conflict_area"), ("conflict_area", text)).conflict_area == areas
+    found = settings(("planner", "conflict_area"), ("conflict_area", text)).planner_settings
+    assert found.areas == areas
+    assert isinstance(found, ConflictAreaSettings)
+    assert (found.conflict_deceleration, found.conflict_hold_time) == (5.0, 1.05)
+
+
+def test_planner_settings_are_properties_or_entries_of_one_property() -> None:
+    area = ("conflict_area", "[0, 1, 0, 1]")
+    single = settings(("planner", "conflict_area"), area, ("min_existence", "0.7"), ("conflict_hold_time", "2"))
+    nested = settings(
+        ("planner", "conflict_area"),
+        ("planner_settings", "{conflict_area: [0, 1, 0, 1], min_existence: 0.7, conflict_hold_time: 2}"),
+    )
+    assert single.planner_settings == nested.planner_settings
+    assert single.planner_settings.min_existence == 0.7
+    assert single.model_dump(mode="json")["planner_settings"]["conflict_hold_time"] == 2.0
+
+
+@pytest.mark.parametrize("planner", [("planner", "route"), ("planner", "none"), ("min_existence", "0.5")])
+def test_properties_of_a_planner_that_is_not_selected_are_checked_and_ignored(planner: tuple[str, str]) -> None:
+    """A file with these properties can be run with several planners."""
+    assert settings(planner, ("conflict_hold_time", "2")).planner_settings.areas == ()
+    with pytest.raises(SettingError, match=r"s.xosc:13: setting 'conflict_hold_time' is -1"):
+        settings(planner, ("conflict_hold_time", "-1"))
 
 
 def test_sensors_by_kind_and_in_full() -> None:
@@ -102,7 +126,13 @@ WRONG = [
     ([("range", "50"), ("range", "60")], "s.xosc:13: property 'range' is given twice, first in line 12"),
     ([("range", "far")], "s.xosc:12: setting 'range' is 'far'"),
     ([("target_speed", "-3")], "s.xosc:12: setting 'target_speed' is -3"),
-    ([("planner", "conflict_area")], "s.xosc:12: planner 'conflict_area' has no area"),
+    ([("planner", "conflict_area")], "s.xosc:12: setting 'conflict_area' is missing"),
+    ([("planner", "route"), ("planner_settings", "{gap: 1}")], "s.xosc:13: unknown setting 'gap'"),
+    ([("planner_settings", "[1]")], "setting 'planner_settings' is [1]; a mapping is expected"),
+    (
+        [("min_existence", "0.2"), ("planner_settings", "{min_existence: 0.4}")],
+        "s.xosc:12: setting 'min_existence' of the planner is given twice; remove it from 'planner_settings'",
+    ),
     ([("conflict_area", "[3, 1, 0, 1]")], "the rectangle [3, 1, 0, 1] is empty"),
     ([("conflict_area", "[1, 2, 3]")], "an area is [x0, x1, y0, y1]"),
     ([("conflict_area", "5")], "an area is [x0, x1, y0, y1]"),

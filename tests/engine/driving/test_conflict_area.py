@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.conflict_area import ConflictAreaPlanner, inside
+from eidrive_scenario.driving.planning.conflict_area import ConflictAreaPlanner, ConflictAreaSettings, inside
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.registry import registry
@@ -21,8 +21,8 @@ SEEN_IN, SEEN_OUT = (30.0, 7.0), (30.0, 12.0)
 
 
 def planner(car: ActorSpec, **settings: object) -> ConflictAreaPlanner:
-    data = {"conflict_area": [29, 32, 4.5, 10.5], "target_speed": 8.0, **settings}
-    return ConflictAreaPlanner(AgentSettings.model_validate(data), car, None, dt=0.05, seed=0)
+    own = ConflictAreaSettings.model_validate({"conflict_area": [29, 32, 4.5, 10.5], **settings})
+    return ConflictAreaPlanner(AgentSettings(target_speed=8.0, planner_settings=own), car, None, dt=0.05, seed=0)
 
 
 def objects(time: float, *places: tuple[float, float], kind: str = "car") -> Detections:
@@ -97,7 +97,7 @@ def test_inside_a_polygon_that_is_not_convex() -> None:
 
 
 def test_without_an_area_there_is_no_such_planner(car: ActorSpec) -> None:
-    with pytest.raises(SettingError, match="has no area"):
+    with pytest.raises(SettingError, match="setting 'conflict_area' is missing"):
         ConflictAreaPlanner(AgentSettings(), car, None, dt=0.05, seed=0)
 
 

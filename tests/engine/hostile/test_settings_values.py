@@ -20,7 +20,7 @@ from pydantic import BaseModel
 from settings_values import CHANNELS, CRITERIA, STATIONS, WEATHER, as_text, variants
 from trial import attempt
 
-from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.settings import AgentSettings, parse_station_settings
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.evaluation.criteria_parser import parse_criteria
 from eidrive_scenario.openscenario import load_scenario
@@ -41,7 +41,7 @@ CAMERA = "{truth: {}, camera: {width: 64, height: 48}, lidar: {channels: 16, poi
 def parsed(kind: str, name: str, data: Mapping[str, Any]) -> list[Settings]:
     """The models that settings are read into. Raises SettingError."""
     if kind == "station":
-        station = parse_settings(AgentSettings, data)
+        station = parse_station_settings(data)
         inner = [("detectors", station.detector, station.detector_settings)]
         inner.append(("fusion", station.fusion, station.fusion_settings))
         types = [(registry(group).load(known, object).settings_type, given) for group, known, given in inner if given]
@@ -116,7 +116,7 @@ def _owner(model: type[BaseModel], field: str) -> type[BaseModel]:
 
 def test_tables_hold_every_setting_with_a_number() -> None:
     roots: list[type[BaseModel]] = [AgentSettings, Weather]
-    for group in ("detectors", "fusion", "criteria"):
+    for group in ("detectors", "fusion", "criteria", "planners"):
         kinds = [registry(group).load(name, object) for name in registry(group)]
         roots += [kind.settings_type for kind in kinds if kind.settings_type is not None]
     roots += [registry("channels").load(name, Channel).settings for name in registry("channels")]

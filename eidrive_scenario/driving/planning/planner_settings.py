@@ -1,0 +1,135 @@
+"""Settings of planners, in the properties of a controller."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field, ValidationError
+
+from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
+from eidrive_scenario.registry import registry
+from eidrive_scenario.settings import Settings, parse_settings
+
+NO_PLANNER = "none"
+"""Planner of a station that does not drive: a parked vehicle, which holds its brake."""
+
+DEFAULT_PLANNER = "route"
+"""Planner of a vehicle whose controller names none."""
+
+Polygon = tuple[tuple[float, float], ...]
+
+
+class PlannerSettings(Settings):
+    """Settings of every planner; a planner derives from this class to add its own.
+
+    min_existence  existence probability (score of an object without one) from which on the planner reacts to an object;
+                   0.5 selects the likelier of the two hypotheses, as in trackers and fusion
+    """
+
+    area_setting: ClassVar[str | None] = None
+    """Name of the setting that holds areas (`tuple[Polygon, ...]`) in which the planner expects other road users. These
+    are drawn on pages and compared with the roads."""
+
+    min_existence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
+
+    @property
+    def areas(self) -> tuple[Polygon, ...]:
+        """Areas in which the planner expects other road users, in the world frame [m]."""
+        return () if self.area_setting is None else getattr(self, self.area_setting) or ()
+
+
+def planner_settings_type(name: str | None) -> type[PlannerSettings]:
+    """Return the settings type of a planner; that of the default planner for None.
+
+    Raise RegistryError if the planner does not load, or if its `settings_type` does not derive from PlannerSettings.
+    """
+    planners = registry("planners")
+    found = getattr(planners.load(name or DEFAULT_PLANNER), "settings_type", None) if name != NO_PLANNER else None
+    if found is None:
+        return PlannerSettings
+    if not (isinstance(found, type) and issubclass(found, PlannerSettings)):
+        described = f"planners {name!r} ({planners.value(name or DEFAULT_PLANNER)})"
+        raise RegistryError(f"{described}: settings_type is {found!r} (expected a class derived from PlannerSettings)")
+    return found
+
+
+def split_planner_settings(
+    data: Mapping[str, Any],
+    station_settings: Collection[str],
+    *,
+    source: str,
+    line: int | None,
+    lines: Mapping[str, int],
+    diagnostics: list[Diagnostic],
+) -> tuple[dict[str, Any], PlannerSettings]:
+    """Return the properties of the station without those of its planner, and the settings of the planner.
+
+    A setting of the planner is a property of its name, or an entry of the property `planner_settings`. Properties of
+    planners that are not selected are checked and ignored, so that one file can be run with several planners.
+
+    data              properties of the controller
+    station_settings  names of the settings of all stations, which are none of the planner
+    lines             line of each property
+    diagnostics       list that receives all errors
+    """
+    rest = {key: value for key, value in data.items() if key != "planner_settings"}
+    nested = data.get("planner_settings", {})
+    if not isinstance(nested, Mapping):
+        message = f"setting 'planner_settings' is {nested!r}"
+        diagnostics.append(Diagnostic(message, "a mapping is expected: {key: value, …}", source, lines.get("planner")))
+        nested = {}
+    name = data.get("planner")
+    is_known = isinstance(name, str) and (name == NO_PLANNER or name in registry("planners"))
+    model = planner_settings_type(name if is_known else None)
+    own = {key: rest.pop(key) for key in list(rest) if key not in station_settings and key in model.model_fields}
+    for key in own.keys() & nested.keys():
+        message = f"setting {key!r} of the planner is given twice"
+        diagnostics.append(Diagnostic(message, "remove it from 'planner_settings'", source, lines.get(key)))
+    for key in [key for key in rest if key not in station_settings]:
+        other = _model_with(key)
+        if other is not None:
+            _parse(other, {key: rest.pop(key)}, source, lines.get(key, line), lines, diagnostics, partial=True)
+    place = lines.get("planner_settings", lines.get("planner", line))
+    found = _parse(model, {**own, **nested}, source, place, lines, diagnostics)
+    return rest, found or PlannerSettings()
+
+
+def _parse(
+    model: type[PlannerSettings],
+    given: Mapping[str, Any],
+    source: str,
+    line: int | None,
+    lines: Mapping[str, int],
+    diagnostics: list[Diagnostic],
+    *,
+    partial: bool = False,
+) -> PlannerSettings | None:
+    """Return the settings, or None after their errors are added to `diagnostics`.
+
+    A missing setting is no error if the settings are partial, or if its property has an error of its own.
+    """
+    try:
+        return parse_settings(model, given, source=source, line=line, lines=lines)
+    except SettingError as error:
+        cause = error.__cause__
+        if not isinstance(cause, ValidationError):
+            diagnostics += error.diagnostics
+            return None
+        for diagnostic, found in zip(error.diagnostics, cause.errors(include_url=False), strict=False):
+            if found["type"] != "missing" or not (partial or found["loc"][0] in lines):
+                diagnostics.append(diagnostic)
+        return None
+
+
+def _model_with(key: str) -> type[PlannerSettings] | None:
+    """Return the settings type of an installed planner that has this setting, or None."""
+    return next((model for model in _installed() if key in model.model_fields), None)
+
+
+def _installed() -> Iterator[type[PlannerSettings]]:
+    for name in registry("planners"):
+        try:
+            yield planner_settings_type(name)
+        except RegistryError:  # A planner that is not selected may be broken
+            continue
