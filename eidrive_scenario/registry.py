@@ -12,8 +12,24 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, suggestion
 
-GROUPS = ("actions", "conditions", "criteria", "detectors", "channels", "fusion", "planners", "controllers")
-_SINGULAR = {"criteria": "criterion", "fusion": "fusion method", "controllers": "controller model"}
+GROUPS = (
+    "actions",
+    "conditions",
+    "criteria",
+    "detectors",
+    "channels",
+    "fusion",
+    "planners",
+    "controllers",
+    "trackers",
+    "vehicle_controllers",
+)
+_SINGULAR = {
+    "criteria": "criterion",
+    "fusion": "fusion method",
+    "controllers": "controller model",
+    "vehicle_controllers": "vehicle controller",
+}
 _BUILT_IN = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
 _loaded: dict[type, tuple[str, str, str]] = {}
 """Kind, name and value of the entry point of each extension that was loaded."""

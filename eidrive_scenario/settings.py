@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.files.yaml_text import key_lines as key_lines
@@ -56,6 +56,24 @@ def parse_settings(
     return settings
 
 
+def validate_nested(model: type[S], data: Any) -> S:
+    """Return `data` as an instance of a model that a validator of other settings has selected by their content.
+
+    Raise ValidationError with the hints for unknown keys, which the annotation of the outer settings cannot give.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        found: list[InitErrorDetails] = []
+        for one in error.errors(include_url=False):
+            details = InitErrorDetails(type=one["type"], loc=one["loc"], input=one["input"], ctx=one.get("ctx", {}))
+            if one["type"] == "extra_forbidden" and "hint" not in details["ctx"]:
+                hint = suggestion(str(one["loc"][-1]), _known_keys(model, one["loc"][:-1]))
+                details["type"] = PydanticCustomError("extra_forbidden", "unknown setting", {"hint": hint})
+            found.append(details)
+        raise ValidationError.from_exception_data(error.title, found) from None
+
+
 def _diagnostic(
     model: type[BaseModel],
     data: Mapping[str, Any],
@@ -69,7 +87,8 @@ def _diagnostic(
     path = _typed_path(loc, data)
     place = _line_of(loc, lines, line)
     if kind == "extra_forbidden":
-        hint = suggestion(str(loc[-1]), _known_keys(model, loc[:-1]))
+        given = finding.get("ctx", {}).get("hint")
+        hint = suggestion(str(loc[-1]), _known_keys(model, loc[:-1])) if given is None else given
         return Diagnostic(f"unknown setting {quoted(path)}", hint, source, place)
     if kind == "missing":
         return Diagnostic(f"setting {path!r} is missing", "add it", source, place)

@@ -22,6 +22,8 @@ class Names(StrEnum):
     detectors = "detectors"
     fusion = "fusion"
     planners = "planners"
+    trackers = "trackers"
+    vehicle_controllers = "vehicle_controllers"
     controllers = "controllers"
     criteria = "criteria"
     actions = "actions"

@@ -16,8 +16,8 @@ from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.tracking.settings import TrackerSettings
-from eidrive_scenario.perception.tracking.tracker import Tracker
+from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerSettings
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
@@ -85,6 +85,24 @@ def build_fusion(
     return construct(kind, own)  # type: ignore[no-any-return]
 
 
+def vehicle_controller_settings(
+    settings: AgentSettings, *, source: str = "", line: int | None = None
+) -> Settings | None:
+    """Return the own settings of the vehicle controller; None if it has none.
+
+    Raise SettingError with this location if they are invalid.
+    """
+    name, given = settings.vehicle_controller, settings.vehicle_controller_settings
+    kind: type[VehicleController] = registry("vehicle_controllers").load(name, VehicleController)
+    _check_settings_type("vehicle_controllers", name, kind.settings_type)
+    if kind.settings_type is not None:
+        return parse_settings(kind.settings_type, given, source=source, line=line)
+    if given:
+        message = f"vehicle controller {name!r} has no settings"
+        raise SettingError(Diagnostic(message, "remove the property 'vehicle_controller_settings'", source, line))
+    return None
+
+
 def build_agent(
     settings: AgentSettings,
     spec: ActorSpec,
@@ -129,12 +147,18 @@ def build_agent(
         planner=None
         if planner == NO_PLANNER
         else construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed),
-        controller=VehicleController(spec, dt) if wheels else None,
+        controller=_vehicle_controller(settings, spec, dt) if wheels else None,
         speaker=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
         receives_messages=listens,
         points=points,
     )
+
+
+def _vehicle_controller(settings: AgentSettings, spec: ActorSpec, dt: float) -> VehicleController:
+    kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
+    own = vehicle_controller_settings(settings)
+    return construct(kind, spec, dt, *(() if own is None else (own,)))  # type: ignore[no-any-return]
 
 
 def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception:
@@ -144,11 +168,14 @@ def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception
     return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
 
 
-def _tracker(settings: AgentSettings, detector: Detector) -> Tracker | None:
-    """The tracker that the settings ask for; without a word of theirs, one where the detector gives no velocities."""
-    if settings.tracker is None:
-        return None if detector.provides_velocity else Tracker(TrackerSettings())
-    return None if settings.tracker.kind == "none" else Tracker(settings.tracker)
+def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | None:
+    """Build the tracker that the settings select. By default detections without velocities are tracked."""
+    if settings.tracker is None and detector.provides_velocity:
+        return None
+    chosen = settings.tracker or TrackerSettings()
+    if chosen.kind == NO_TRACKER:
+        return None
+    return construct(registry("trackers").load(chosen.kind, TrackingMethod), chosen)  # type: ignore[no-any-return]
 
 
 def _localizer(name: str, seed: int, sensors: Mapping[str, SensorSettings]) -> Localizer:

@@ -12,6 +12,13 @@ from eidrive_scenario.driving.stack import StackSettings
 from eidrive_scenario.registry import distributions, registry
 from eidrive_scenario.v2x.profile import ChannelProfile
 
+_WITH_SETTINGS = (
+    ("detectors", "detector"),
+    ("fusion", "fusion"),
+    ("vehicle_controllers", "vehicle_controller"),
+)
+"""Registries and properties of the extensions that have a mapping of settings of their own."""
+
 
 def resolved_stations(
     settings: Mapping[str, AgentSettings], channel: str, profile: ChannelProfile | None
@@ -19,7 +26,13 @@ def resolved_stations(
     """Return the settings of stations and channel with the defaults of all extensions."""
     used = {("channels", profile.model)} if profile is not None else set()
     for station in settings.values():
-        used |= {("detectors", station.detector), ("fusion", station.fusion), ("planners", station.planner or "")}
+        used |= {
+            ("detectors", station.detector),
+            ("fusion", station.fusion),
+            ("planners", station.planner or ""),
+            ("vehicle_controllers", station.vehicle_controller),
+            ("trackers", station.tracker.kind if station.tracker is not None else ""),
+        }
     return StackSettings(
         channel=channel,
         channel_profile=None if profile is None else profile.model_dump(mode="json"),
@@ -30,7 +43,7 @@ def resolved_stations(
 
 def _resolved(settings: AgentSettings) -> dict[str, Any]:
     found = settings.model_dump(mode="json")
-    for kind, name in (("detectors", "detector"), ("fusion", "fusion")):
+    for kind, name in _WITH_SETTINGS:
         model = getattr(registry(kind).load(found[name]), "settings_type", None)
         if isinstance(model, type) and issubclass(model, BaseModel):
             found[f"{name}_settings"] = model.model_validate(found[f"{name}_settings"]).model_dump(mode="json")

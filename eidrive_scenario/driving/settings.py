@@ -16,7 +16,7 @@ from eidrive_scenario.driving.planning.planner_settings import (
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.values.references import resolve_references
-from eidrive_scenario.perception.tracking.settings import TrackerSettings, tracker_setting
+from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.settings import (
     KINDS,
@@ -32,8 +32,16 @@ from eidrive_scenario.v2x.messages.clock import StationClock
 MODULE = "eidrive"
 """The value of the property `module` by which a controller is one of ours."""
 
-_TEXTS = frozenset({"module", "detector", "fusion", "planner"})
+_TEXTS = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})
 """Properties whose values are names, not YAML."""
+
+_SELECTED = {
+    "detector": "detectors",
+    "fusion": "fusion",
+    "planner": "planners",
+    "vehicle_controller": "vehicle_controllers",
+}
+"""Registry of the extension that each of these properties names."""
 
 DEFAULT_SENSORS: Mapping[str, Any] = {
     model.model_fields["kind"].default: model for model in get_args(get_args(AnySensorSettings)[0])
@@ -111,6 +119,8 @@ class AgentSettings(Settings):
     clock_offset    how much the station's clock is ahead;  clock_drift  how fast it gains [parts per million]
     asn1_files      ASN.1 modules that say how large a message is, relative to the scenario file
     target_speed    where the storyboard asks for none; None keeps the first one
+    vehicle_controller  name of the controller that follows the trajectories of the planner, and
+    vehicle_controller_settings  its own settings
     planner_settings  of the selected planner; each may also be a property of its own
     """
 
@@ -118,12 +128,14 @@ class AgentSettings(Settings):
     detector: str = "oracle"
     detector_settings: dict[str, Any] = Field(default_factory=dict)
     detector_latency: Annotated[float, Field(ge=0.0, le=MAX_TIME)] = 0.0
-    tracker: Annotated[TrackerSettings | None, BeforeValidator(tracker_setting)] = None
+    tracker: Annotated[SerializeAsAny[TrackerKind] | None, BeforeValidator(tracker_setting)] = None
     localization: Literal["oracle", "ekf"] = "oracle"
     obey_signals: bool = False
     fusion: str = "covariance_intersection"
     fusion_settings: dict[str, Any] = Field(default_factory=dict)
     planner: str | None = None
+    vehicle_controller: str = "pid"
+    vehicle_controller_settings: dict[str, Any] = Field(default_factory=dict)
     sensors: Annotated[dict[str, AnySensorSettings] | None, BeforeValidator(_sensors)] = None
     range: Annotated[float, Field(gt=0.0, le=MAX_RANGE)] | None = None
     field_of_view: Annotated[float, Field(gt=0.0, le=360.0)] | None = None
@@ -242,7 +254,7 @@ def agent_settings(controller: Controller) -> AgentSettings:
             data[entry.name] = resolve_references(value, entry.scope, source=source, line=entry.line, path=entry.name)
         except SettingError as error:
             diagnostics += error.diagnostics
-    for name, kind in (("detector", "detectors"), ("fusion", "fusion"), ("planner", "planners")):
+    for name, kind in _SELECTED.items():
         known = [*registry(kind), *((NO_PLANNER,) if name == "planner" else ())]
         if name in data and data[name] not in known:
             message = f"unknown {name} {data[name]!r}"

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.driving.agent_factory import build_detector, build_fusion
+from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
 from eidrive_scenario.driving.planning.planner_settings import NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
@@ -103,6 +103,8 @@ def declared_detectors(
             station.rig_sensors(found[name].needs, found[name].default_sensors)
             line = _line(controller, "fusion_settings", "fusion")
             build_fusion(station, found[name], source=controller.source, line=line)
+            line = _line(controller, "vehicle_controller_settings", "vehicle_controller")
+            vehicle_controller_settings(station, source=controller.source, line=line)
         except SettingError as error:
             diagnostics += [
                 diagnostic if diagnostic.source else replace(diagnostic, source=source, line=line)

@@ -11,7 +11,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import PLANE, Localizer
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
-from eidrive_scenario.perception.tracking.tracker import Tracker
+from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
@@ -29,7 +29,7 @@ class Perception:
         self,
         detector: Detector,
         *,
-        tracker: Tracker | None = None,
+        tracker: TrackingMethod | None = None,
         localizer: Localizer | None = None,
         latency: float = 0.0,
     ) -> None:

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field, PositiveInt, model_validator
 
 from eidrive_scenario.perception.tracking.existence import BIRTH_DENSITY, DETECTION_PROBABILITY, LIFETIME
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.registry import registry
+from eidrive_scenario.settings import Settings, validate_nested
+
+NO_TRACKER = "none"
+"""Kind that passes detections on unchanged."""
 
 
-class TrackerSettings(Settings):
+class TrackerKind(Settings):
+    """Settings of every tracker: the name under which it is registered."""
+
+    kind: str
+
+
+class TrackerSettings(TrackerKind):
     """Settings of the property `tracker`: a kind, or a mapping with these keys.
 
     kind      cv: constant velocity; ctrv: constant turn rate and speed; none
@@ -49,5 +60,15 @@ class TrackerSettings(Settings):
 
 
 def tracker_setting(value: Any) -> Any:
-    """Return the tracker settings as a mapping if only a kind is given; None selects the default of the detector."""
-    return {"kind": value} if isinstance(value, str) else value
+    """Return the settings of the tracker that the property names; None selects the default of the detector.
+
+    Keys without a kind are those of the built-in tracker.
+    """
+    if isinstance(value, str):
+        value = {"kind": value}
+    if value is None or isinstance(value, TrackerKind) or not isinstance(value, Mapping):
+        return value
+    kind = value.get("kind")
+    if isinstance(kind, str) and kind in registry("trackers"):
+        return validate_nested(registry("trackers").load(kind).settings_type, value)
+    return validate_nested(TrackerSettings, value)

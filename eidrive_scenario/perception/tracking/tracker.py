@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,9 @@ from eidrive_scenario.perception.tracking.existence import (
     survived,
 )
 from eidrive_scenario.perception.tracking.history import TrackHistory
+from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
-from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerKind, TrackerSettings
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
@@ -31,7 +33,7 @@ SMOOTHING = 0.2
 """Weight of a new box in the size, height and heading of an object with many detections."""
 
 
-class Tracker:
+class Tracker(TrackingMethod):
     """Multi-object tracker: one Kalman filter per object, gated global nearest neighbors, and track management.
 
     The assignment of tracks and boxes maximizes the total likelihood (Hungarian method). Each pair has a squared
@@ -41,10 +43,13 @@ class Tracker:
     object is that of its last detection times this probability.
     """
 
+    settings_type: ClassVar[type[TrackerKind]] = TrackerSettings
+    settings: TrackerSettings
+
     def __init__(self, settings: TrackerSettings) -> None:
-        if settings.kind == "none":
+        super().__init__(settings)
+        if settings.kind == NO_TRACKER:
             raise ValueError("tracker settings: kind 'none' disables tracking (expected cv or ctrv)")
-        self.settings = settings
         self._model = MODELS[settings.kind]()
         self._gate = float(chdtri(2, 1.0 - settings.gate))
         self._time: float | None = None

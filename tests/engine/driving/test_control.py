@@ -11,7 +11,7 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control.pid import PID, Gains
-from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
@@ -48,7 +48,7 @@ def test_the_integral_learns_near_the_target_only() -> None:
 
 
 def test_two_regulators_share_nothing(car: ActorSpec) -> None:
-    first, second = VehicleController(car, 0.05), VehicleController(car, 0.05)
+    first, second = PidController(car, 0.05), PidController(car, 0.05)
     assert first._speed is not first._direction
     assert first._speed is not second._speed
     assert first._speed.gains != first._direction.gains
@@ -59,7 +59,7 @@ def planner(car: ActorSpec, **settings: Any) -> RoutePlanner:
 
 
 def drive(vehicle: Any, route: RoutePlanner, goal: Goal | None, seconds: float) -> None:
-    controller = VehicleController(vehicle.spec, 0.05)
+    controller = PidController(vehicle.spec, 0.05)
     for _ in range(round(seconds / 0.05)):
         ego = vehicle.state()
         vehicle.drive(controller.control(ego, route.plan(ego, NOTHING, goal, vehicle.time)))
@@ -98,7 +98,7 @@ def test_it_stops_at_the_destination_and_stays(car: ActorSpec, vehicle: Any) -> 
 def test_an_offset_decays_and_hardly_swings_over(car: ActorSpec, vehicle: Any, offset: float) -> None:
     ego = vehicle(y=offset, speed=10.0)
     goal = Goal(speed=10.0, path=np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]]))
-    route, controller = planner(car), VehicleController(car, 0.05)
+    route, controller = planner(car), PidController(car, 0.05)
     for _ in range(120):
         state = ego.state()
         ego.drive(controller.control(state, route.plan(state, NOTHING, goal, ego.time)))
@@ -115,7 +115,7 @@ def test_what_is_far_off_or_stands_across_comes_back_and_stays(
     car: ActorSpec, vehicle: Any, offset: float, yaw: float, speed: float
 ) -> None:
     """As after a turn tighter than its wheels allow, or where somebody pushed: it does not swing about its path."""
-    ego, route, controller = vehicle(y=offset, yaw=yaw, speed=speed), planner(car), VehicleController(car, 0.05)
+    ego, route, controller = vehicle(y=offset, yaw=yaw, speed=speed), planner(car), PidController(car, 0.05)
     goal = Goal(speed=speed, path=np.array([[-20.0, 0.0, 0.0], [900.0, 0.0, 0.0]]))
     for _ in range(300):
         state = ego.state()
@@ -132,7 +132,7 @@ def test_a_circle_is_kept(car: ActorSpec, vehicle: Any, radius: float, speed: fl
     """
     angles = np.linspace(0.0, 1.5 * math.pi, 400)
     circle = np.stack([abs(radius) * np.sin(angles), radius * (1.0 - np.cos(angles))], axis=1)
-    ego, route, controller = vehicle(speed=speed), planner(car, target_speed=speed), VehicleController(car, 0.05)
+    ego, route, controller = vehicle(speed=speed), planner(car, target_speed=speed), PidController(car, 0.05)
     route._path = PlannedPath(circle, ends=True)
     errors = []
     for _ in range(int(1.2 * math.pi * abs(radius) / speed / 0.05)):
@@ -150,17 +150,17 @@ def test_a_demanded_deceleration_is_the_pedal_exactly_and_steering_goes_on(car: 
     ego = vehicle(y=1.0, speed=8.0)
     points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [9.0, 0.0]])
     free, braked = (Plan(points, np.full(5, 8.0), "", braking=braking) for braking in (None, 5.0))
-    first, second = (VehicleController(car, 0.05).control(ego.state(), plan) for plan in (free, braked))
+    first, second = (PidController(car, 0.05).control(ego.state(), plan) for plan in (free, braked))
     assert second.throttle == 0.0
     assert second.brake == pytest.approx(5.0 / 9.0)
     assert second.steering == first.steering < 0.0
     beyond = Plan(points, np.full(5, 8.0), "", braking=12.0)
-    assert VehicleController(car, 0.05).control(ego.state(), beyond).brake == 1.0
+    assert PidController(car, 0.05).control(ego.state(), beyond).brake == 1.0
 
 
 def test_braking_to_a_stand_takes_the_time_and_way_of_that_deceleration(car: ActorSpec, vehicle: Any) -> None:
     """From 8 m/s with 5 m/s²: 1.6 s and 6.4 m, a little less with rolling resistance and drag."""
-    ego, controller = vehicle(speed=8.0), VehicleController(car, 0.05)
+    ego, controller = vehicle(speed=8.0), PidController(car, 0.05)
     points = np.stack([np.arange(60.0), np.zeros(60)], axis=1)
     while ego.speed > 0.01 and ego.time < 5.0:
         ego.drive(controller.control(ego.state(), Plan(points, np.full(60, 8.0), "", braking=5.0)))
@@ -173,10 +173,10 @@ def test_braking_to_a_stand_takes_the_time_and_way_of_that_deceleration(car: Act
 )
 def test_a_vehicle_without_brakes_or_drive_has_pedals_all_the_same(car: ActorSpec, vehicle: Any, plan: Plan) -> None:
     weak = replace(car, max_acceleration=0.0, max_deceleration=0.0)
-    control = VehicleController(weak, 0.05).control(vehicle(speed=5.0).state(), plan)
+    control = PidController(weak, 0.05).control(vehicle(speed=5.0).state(), plan)
     assert max(control.throttle, control.brake) == 1.0
 
 
 def test_parked(car: ActorSpec) -> None:
-    control = VehicleController(car, 0.05).hold_standstill()
+    control = PidController(car, 0.05).hold_standstill()
     assert (control.throttle, control.brake, control.steering) == (0.0, 1.0, 0.0)

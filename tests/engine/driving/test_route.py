@@ -9,7 +9,7 @@ import pytest
 from scenariogeneration import xodr
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
@@ -179,7 +179,7 @@ def test_a_vehicle_that_is_where_it_shall_go_stands(car: ActorSpec, roads: RoadN
     here = ego(0.0, 0.0, yaw=2.0)
     for network in (None, roads):
         plan = planner(car, network, target_speed=10.0).plan(here, NOTHING, goal, 0.0)
-        control = VehicleController(car, 0.05).control(here, plan)
+        control = PidController(car, 0.05).control(here, plan)
         assert (control.throttle, control.brake > 0.0) == (0.0, True)
 
 
@@ -190,7 +190,7 @@ def test_a_way_that_turns_back_between_two_points_of_the_path(car: ActorSpec) ->
     for x in (0.0, 3.9, 4.2, 3.0):
         plan = route.plan(ego(x, 0.0, speed=2.0), NOTHING, goal, 0.0)
         assert np.hypot(*np.diff(plan.points, axis=0).T).min() > 0.1
-        assert math.isfinite(VehicleController(car, 0.05).control(ego(x, 0.0, speed=2.0), plan).steering)
+        assert math.isfinite(PidController(car, 0.05).control(ego(x, 0.0, speed=2.0), plan).steering)
 
 
 def test_speeds(car: ActorSpec) -> None:

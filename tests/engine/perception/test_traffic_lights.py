@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.planning.signal_stops import BEFORE_LINE, WAIT, SignalStops
 from eidrive_scenario.driving.settings import AgentSettings
@@ -160,7 +160,7 @@ class Drive:
         self.world.add(CAR, Placement(20.0, -1.75, speed=10.0), driven=True)
         settings = AgentSettings.model_validate({"obey_signals": obeys, "target_speed": 10.0})
         self.planner = RoutePlanner(settings, CAR, roads, dt=0.05, seed=0)
-        self.controller = VehicleController(CAR, 0.05)
+        self.controller = PidController(CAR, 0.05)
         self.sensor = SignalSensor(CAR, roads)
         self.rig = Rig(CAR, {})
         self.reasons: list[str] = []

@@ -1,0 +1,142 @@
+"""PID vehicle controller: from a trajectory to throttle, brake and steering."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.driving.control.pid import PID, Gains
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planning.path import LEADS_AWAY
+from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.world.actor import ActorSpec, Control
+
+LARGEST_ACCELERATION = 3.5
+LARGEST_DECELERATION = 6.5
+"""Maximum acceleration and deceleration of the PID, as of the planner of EI-Drive [m/s²]; emergency braking of a plan
+may exceed the latter."""
+LONGITUDINAL = Gains(proportional=1.5, integral=0.2)
+"""Gains of the speed error [1/s]: time constant 2/3 s. The integral compensates rolling resistance and drag."""
+SPEED_BAND = 1.0
+"""Maximum speed error at which the integral accumulates [m/s]."""
+LATERAL = Gains(proportional=1.0, integral=0.1)
+"""Gains of the turn towards the path; the integral compensates the slip of the tires in a curve."""
+CROSS_TRACK_GAIN = 2.0
+"""Decay rate of an offset from the path [1/s]."""
+LARGEST_APPROACH = 2.0
+"""Maximum speed towards the path at a large offset [m/s]. Tires and steering reverse this speed before the path."""
+LEARNING = 0.1
+"""Maximum turn towards the path at which the integral accumulates [rad]; beyond it the approach would be integrated."""
+SOFTENING = 1.0
+"""Softening constant of the Stanley law, for calm steering near standstill [m/s]."""
+STANDSTILL = 0.3
+"""Speed below which a stopping vehicle holds its brake [m/s]."""
+HOLDING = 3.0
+"""Deceleration that corresponds to the held brake: sufficient on a slope of 30 % [m/s²]."""
+
+
+class PidController(VehicleController):
+    """PID control of the speed, and lateral control by the Stanley law with an integral part.
+
+    Source of the lateral law: Hoffmann, Tomlin, Montemerlo, Thrun, "Autonomous automobile trajectory tracking for
+    off-road driving", ACC 2007. The front wheels point along the path, turned towards it by atan(k e / (v0 + v)). The
+    product k e is bounded; otherwise a vehicle far from its path or across it oscillates about the path.
+    """
+
+    def __init__(self, spec: ActorSpec, dt: float) -> None:
+        super().__init__(spec, dt)
+        self._speed = PID(LONGITUDINAL, low=-LARGEST_DECELERATION, high=LARGEST_ACCELERATION, dt=dt, band=SPEED_BAND)
+        self._direction = PID(LATERAL, low=-spec.max_steering, high=spec.max_steering, dt=dt, band=LEARNING)
+        self._steering = 0.0
+
+    def control(self, ego: EgoState, plan: Plan) -> Control:
+        """Return throttle, brake and steering of the next time step. The braking of a plan overrides its speeds."""
+        steering = self._steer(ego, plan)
+        if plan.braking is not None:
+            self._speed.reset()
+            return Control(0.0, _pedal(plan.braking, self.spec.max_deceleration), steering)
+        return self._pedals(self._accelerate(ego, plan), steering)
+
+    def hold_standstill(self) -> Control:
+        """Return full brake with the last steering angle."""
+        return Control(0.0, 1.0, self._steering)
+
+    def _accelerate(self, ego: EgoState, plan: Plan) -> float:
+        """Return the requested acceleration [m/s²], fed forward with the deceleration of the speed profile."""
+        target, falling = _speed_here(ego, plan)
+        if target < STANDSTILL and ego.speed < STANDSTILL:
+            self._speed.reset()
+            return -HOLDING
+        return self._speed.update(target - ego.speed, falling or plan.acceleration)
+
+    def _pedals(self, acceleration: float, steering: float) -> Control:
+        if acceleration >= 0.0:
+            return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
+        return Control(0.0, _pedal(-acceleration, self.spec.max_deceleration), steering)
+
+    def _steer(self, ego: EgoState, plan: Plan) -> float:
+        x = float(ego.position[0]) + self.spec.wheelbase * math.cos(ego.yaw)
+        y = float(ego.position[1]) + self.spec.wheelbase * math.sin(ego.yaw)
+        heading, left = _nearest(plan.points[:12].tolist(), x, y)
+        back = -CROSS_TRACK_GAIN * left
+        if abs(back) > LARGEST_APPROACH:
+            back = math.copysign(LARGEST_APPROACH, back)
+        turn = math.atan2(back, SOFTENING + max(ego.speed, 0.0))
+        self._steering = self._direction.update(turn, feed_forward=wrap_angle(heading - ego.yaw))
+        return self._steering
+
+
+def _pedal(acceleration: float, maximum: float) -> float:
+    """Return the pedal position in [0, 1] for an acceleration; a fully pressed pedal gives `maximum` [m/s²]."""
+    return acceleration / maximum if acceleration < maximum else 1.0
+
+
+def _speed_here(ego: EgoState, plan: Plan) -> tuple[float, float]:
+    """Return speed [m/s] and acceleration (at most 0) [m/s²] of the plan at the vehicle, on its first segment.
+
+    The deceleration of a segment is constant: the square of the speed falls linearly with the distance.
+    """
+    here, ahead = plan.speeds[:2].tolist()
+    if ahead >= here:
+        return here, 0.0
+    (x0, y0), (x1, y1) = plan.points[:2].tolist()
+    square = (x1 - x0) ** 2 + (y1 - y0) ** 2
+    x, y, _ = ego.position.tolist()
+    share = min(max(((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / square, 0.0), 1.0)
+    fall = ahead * ahead - here * here
+    return math.sqrt(here * here + share * fall), fall / (2.0 * math.sqrt(square))
+
+
+def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, float]:
+    """Return the heading of the path at its nearest point [rad], and the signed offset of the point to the left [m].
+
+    The heading is interpolated between the midpoints of segments, so that the steering is continuous.
+    """
+    best, nearest, place, leads_away = 0, math.inf, 0.0, math.inf
+    x0, y0 = points[0]
+    for index, (x1, y1) in enumerate(points[1:]):
+        dx, dy = x1 - x0, y1 - y0
+        ax, ay = x - x0, y - y0
+        share = (ax * dx + ay * dy) / (dx * dx + dy * dy)
+        held = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+        ax, ay = ax - held * dx, ay - held * dy
+        gap = ax * ax + ay * ay
+        if gap < nearest:
+            root = math.sqrt(gap)
+            best, nearest, place, leads_away = index, gap - 2e-9 * root, held, (root + LEADS_AWAY) ** 2
+        elif gap > leads_away:
+            break
+        x0, y0 = x1, y1
+    heading = _heading(points, best)
+    (x0, y0), (x1, y1) = points[best], points[best + 1]
+    left = ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) / math.hypot(x1 - x0, y1 - y0)
+    neighbor = best + 1 if place > 0.5 else best - 1
+    if 0 <= neighbor < len(points) - 1:
+        heading += abs(place - 0.5) * wrap_angle(_heading(points, neighbor) - heading)
+    return heading, left
+
+
+def _heading(points: list[list[float]], index: int) -> float:
+    (x0, y0), (x1, y1) = points[index], points[index + 1]
+    return math.atan2(y1 - y0, x1 - x0)
