@@ -8,8 +8,8 @@ from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.planning.planner import Planner
-from eidrive_scenario.driving.planning.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.fusion.method import FusionMethod

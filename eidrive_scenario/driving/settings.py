@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
 
-from eidrive_scenario.driving.planning.planner_settings import (
+from eidrive_scenario.driving.planner_settings import (
     NO_PLANNER,
     PlannerSettings,
     split_planner_settings,

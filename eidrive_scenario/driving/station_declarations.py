@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
-from eidrive_scenario.driving.planning.planner_settings import NO_PLANNER
+from eidrive_scenario.driving.planner_settings import NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from eidrive_scenario.driving.planner_settings import Polygon
 from eidrive_scenario.driving.planning.conflict_area import inside
-from eidrive_scenario.driving.planning.planner_settings import Polygon
 from eidrive_scenario.driving.settings import AgentSettings, is_agent_controller
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario

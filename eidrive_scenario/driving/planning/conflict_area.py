@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BeforeValidator, NonNegativeFloat, PositiveFloat
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.planner_settings import PlannerSettings, Polygon
+from eidrive_scenario.driving.planner_settings import PlannerSettings, Polygon
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan

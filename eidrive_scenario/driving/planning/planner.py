@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.planner_settings import PlannerSettings
+from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.requests import Goal
