@@ -20,6 +20,7 @@ GROUPS = (
     "channels",
     "fusion",
     "planners",
+    "sensors",
     "controllers",
     "trackers",
     "vehicle_controllers",

@@ -17,7 +17,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
-from eidrive_scenario.sensing.settings import AnySensorSettings, CameraSettings, LidarSettings
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -41,7 +41,7 @@ class StationScene:
     context: DetectorContext
 
 
-def default_sensors() -> dict[str, AnySensorSettings]:
+def default_sensors() -> dict[str, SensorSettings]:
     """Return a camera of 800 x 600 pixels and a lidar, both with default settings."""
     return {"camera": CameraSettings(), "lidar": LidarSettings()}
 
@@ -79,7 +79,7 @@ def random_scenes(
     worlds: int,
     weather: Weather,
     each: int = 2,
-    sensors: Mapping[str, AnySensorSettings] | None = None,
+    sensors: Mapping[str, SensorSettings] | None = None,
 ) -> Iterator[StationScene]:
     """Yield readings of a car with default sensors, or others named `camera` and `lidar`, in random traffic."""
     sensors = sensors or default_sensors()
@@ -118,7 +118,7 @@ def _read(
     specs: dict[str, ActorSpec],
     roads: RoadNetwork | None,
     weather: str,
-    sensors: Mapping[str, AnySensorSettings] | None = None,
+    sensors: Mapping[str, SensorSettings] | None = None,
 ) -> Iterator[StationScene]:
     view = world.view()
     for name, readings in read_all(list(rigs.values()), world, view).items():

@@ -22,6 +22,7 @@ class Names(StrEnum):
     detectors = "detectors"
     fusion = "fusion"
     planners = "planners"
+    sensors = "sensors"
     trackers = "trackers"
     vehicle_controllers = "vehicle_controllers"
     controllers = "controllers"

@@ -26,9 +26,6 @@ from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
 
-_SEEING = frozenset({"truth", "camera", "lidar"})
-"""The kinds of sensors that a detector may need."""
-
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
@@ -39,9 +36,10 @@ def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig
 def _detector_class(name: str) -> type[Detector]:
     """The class of a detector. Raises RegistryError if what it declares cannot be used."""
     kind: type[Detector] = registry("detectors").load(name, Detector)
-    if not isinstance(kind.needs, frozenset | set) or not kind.needs <= _SEEING:
+    sensors = frozenset(registry("sensors"))
+    if not isinstance(kind.needs, frozenset | set) or not kind.needs <= sensors:
         described = f"detectors {name!r} ({registry('detectors').value(name)})"
-        raise RegistryError(f"{described}: needs is {kind.needs!r} (expected a frozenset out of {sorted(_SEEING)})")
+        raise RegistryError(f"{described}: needs is {kind.needs!r} (expected a frozenset out of {sorted(sensors)})")
     _check_settings_type("detectors", name, kind.settings_type)
     return kind
 

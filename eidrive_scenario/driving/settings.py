@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
 
@@ -18,14 +18,8 @@ from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.values.references import resolve_references
 from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
 from eidrive_scenario.registry import registry
-from eidrive_scenario.sensing.settings import (
-    KINDS,
-    MAX_RANGE,
-    AnySensorSettings,
-    MountSetting,
-    SensorSettings,
-    TruthSettings,
-)
+from eidrive_scenario.sensing.sensor import default_sensor, parse_sensor
+from eidrive_scenario.sensing.settings import MAX_RANGE, MountSetting, SensorSettings, TruthSettings
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.v2x.messages.clock import StationClock
 
@@ -42,11 +36,6 @@ _SELECTED = {
     "vehicle_controller": "vehicle_controllers",
 }
 """Registry of the extension that each of these properties names."""
-
-DEFAULT_SENSORS: Mapping[str, Any] = {
-    model.model_fields["kind"].default: model for model in get_args(get_args(AnySensorSettings)[0])
-}
-"""The settings of each kind of sensor; as they are, where nothing else is said."""
 
 LOCALIZING = ("gnss", "imu")
 """The kinds of sensors by which a station finds out where it is."""
@@ -80,16 +69,20 @@ def _sensors(value: Any) -> Any:
     elif isinstance(value, Sequence) and all(isinstance(name, str) for name in value):
         entries = dict.fromkeys(value).items()
     else:
-        raise ValueError(f"name kinds, {', '.join(KINDS)}, or write a mapping from names to settings")
+        raise ValueError(f"name kinds, {', '.join(registry('sensors'))}, or write a mapping from names to settings")
+    kinds = registry("sensors")
     sensors: dict[str, Any] = {}
     for name, given in entries:
         entry = dict(given) if isinstance(given, Mapping) else {} if given is None else given
         if isinstance(entry, dict) and "kind" not in entry:
-            if name not in KINDS:
-                raise ValueError(f"sensor {name!r} needs a kind, or one for its name: {suggestion(str(name), KINDS)}")
+            if name not in kinds:
+                raise ValueError(f"sensor {name!r} needs a kind, or one for its name: {suggestion(str(name), kinds)}")
             entry["kind"] = name
         sensors[str(name)] = entry
     return sensors
+
+
+_Sensor = Annotated[SerializeAsAny[SensorSettings], BeforeValidator(parse_sensor)]
 
 
 class AgentSettings(Settings):
@@ -136,7 +129,7 @@ class AgentSettings(Settings):
     planner: str | None = None
     vehicle_controller: str = "pid"
     vehicle_controller_settings: dict[str, Any] = Field(default_factory=dict)
-    sensors: Annotated[dict[str, AnySensorSettings] | None, BeforeValidator(_sensors)] = None
+    sensors: Annotated[dict[str, _Sensor] | None, BeforeValidator(_sensors)] = None
     range: Annotated[float, Field(gt=0.0, le=MAX_RANGE)] | None = None
     field_of_view: Annotated[float, Field(gt=0.0, le=360.0)] | None = None
     visibility: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
@@ -196,14 +189,14 @@ class AgentSettings(Settings):
 
     def rig_sensors(
         self, needs: frozenset[str], usual: Mapping[str, SensorSettings] = MappingProxyType({})
-    ) -> dict[str, AnySensorSettings]:
+    ) -> dict[str, SensorSettings]:
         """The sensors of this station, for a detector that reads these kinds; those to localize by are added.
 
         `usual` are those of a station that says nothing of them; where empty, it has one of each kind.
 
         Raises SettingError if the settings leave one out that the detector needs.
         """
-        sensors: dict[str, Any] = dict(usual) or {kind: DEFAULT_SENSORS[kind]() for kind in sorted(needs)}
+        sensors: dict[str, Any] = dict(usual) or {kind: default_sensor(kind) for kind in sorted(needs)}
         if self.sensors is not None:
             sensors = dict(self.sensors)
         present = {sensor.kind for sensor in sensors.values()}
@@ -212,7 +205,7 @@ class AgentSettings(Settings):
             message = f"detector {self.detector!r} needs a sensor of kind {', '.join(sorted(missing))}"
             raise SettingError(Diagnostic(message, "add it to the property 'sensors'"))
         sensors |= {
-            kind: DEFAULT_SENSORS[kind]() for kind in LOCALIZING if self.localization == "ekf" and kind not in present
+            kind: default_sensor(kind) for kind in LOCALIZING if self.localization == "ekf" and kind not in present
         }
         for name, sensor in sensors.items():
             if isinstance(sensor, TruthSettings):

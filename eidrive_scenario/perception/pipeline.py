@@ -12,7 +12,7 @@ from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import PLANE, Localizer
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
-from eidrive_scenario.sensing.readings import Readings, SignalReading
+from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 
@@ -99,4 +99,7 @@ def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:
         ("truth" not in kinds or readings.truth is not None)
         and ("camera" not in kinds or bool(readings.cameras))
         and ("lidar" not in kinds or bool(readings.lidars))
+        and ("gnss" not in kinds or readings.gnss is not None)
+        and ("imu" not in kinds or readings.imu is not None)
+        and (kinds <= FIELDS or all(readings.others.get(kind) for kind in kinds - FIELDS))
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from eidrive_scenario.sensing.optics import Optics, lens_of
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.scene import Scene
-from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.settings import CameraSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
@@ -22,16 +24,18 @@ DROPS_STAY = 2.0
 """Time that drops stay on a lens before others replace them [s]."""
 
 
-class Camera:
+class Camera(Sensor):
     """Camera with square pixels and its principal point in the center of the image.
 
     Noise and drops in front of the lens are drawn by seed, station, name and tick. The image of a camera on a mast does
     not contain the mast, but its shadow.
     """
 
+    settings_type: ClassVar[type[SensorSettings]] = CameraSettings
+    settings: CameraSettings
+
     def __init__(self, settings: CameraSettings, spec: ActorSpec, name: str = "camera", seed: int = 0) -> None:
-        self.settings = settings
-        self.name = name
+        super().__init__(settings, spec, name, seed)
         self.mounting = mounting(settings, spec, "front")
         self._image_sensor = ImageSensor(settings)
         self._ignored = (spec.name,) if spec.wheelbase <= 0.0 else ()

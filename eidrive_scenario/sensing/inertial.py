@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,7 +11,9 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.readings import GnssReading, ImuReading
-from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings
+from eidrive_scenario.sensing.scene import Scene
+from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
@@ -20,21 +23,25 @@ FIRST_INTERVAL = 0.05
 """Integration time of the first reading of a unit that is read each tick [s]."""
 
 
-class Gnss:
+class Gnss(Sensor):
     """GNSS position of the reference point: the true position, a random-walk bias, and white noise.
 
     The covariance of a reading contains the noise and the initial bias; a receiver cannot measure the later drift of
     the bias. Noise and random walk are drawn by seed, station, name and tick.
     """
 
+    settings_type: ClassVar[type[SensorSettings]] = GnssSettings
+    unique: ClassVar[bool] = True
+    settings: GnssSettings
+
     def __init__(self, settings: GnssSettings, spec: ActorSpec, name: str = "gnss", seed: int = 0) -> None:
-        self.settings = settings
+        super().__init__(settings, spec, name, seed)
         self._key = (seed, "gnss", spec.name, name)
         self._bias = _RandomWalkBias(self._key, 2, settings.bias, settings.bias_walk)
         across = settings.position_noise**2 + settings.bias**2
         self._covariance = np.diag([max(v, EXACT**2) for v in (across, across, settings.height_noise**2)])
 
-    def read(self, view: WorldView, row: int) -> GnssReading:
+    def read(self, scene: Scene, view: WorldView, row: int) -> GnssReading:
         """Return the measured position of the actor in this row."""
         position = view.position[row]
         if self.settings.oracle:
@@ -48,15 +55,19 @@ class Gnss:
         return GnssReading(measured, self._covariance)
 
 
-class Imu:
+class Imu(Sensor):
     """Acceleration and turn rates in the body frame: true values, random-walk biases, and white noise.
 
     Noise of density n in readings of an interval T has the standard deviation n / √T (IEEE 952, annex C). Noise and
     random walk are drawn by seed, station, name and tick.
     """
 
+    settings_type: ClassVar[type[SensorSettings]] = ImuSettings
+    unique: ClassVar[bool] = True
+    settings: ImuSettings
+
     def __init__(self, settings: ImuSettings, spec: ActorSpec, name: str = "imu", seed: int = 0) -> None:
-        self.settings = settings
+        super().__init__(settings, spec, name, seed)
         self._key = (seed, "imu", spec.name, name)
         self._accelerometer_bias = _RandomWalkBias(
             (*self._key, "push"), 3, settings.accelerometer_bias, settings.accelerometer_walk
@@ -66,7 +77,7 @@ class Imu:
         )
         self._last: float | None = None
 
-    def read(self, view: WorldView, row: int) -> ImuReading:
+    def read(self, scene: Scene, view: WorldView, row: int) -> ImuReading:
         """Return the reading of the unit on the actor in this row."""
         settings = self.settings
         body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])

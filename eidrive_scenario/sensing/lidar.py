@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,14 @@ from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.scene import NOTHING, Scene
-from eidrive_scenario.sensing.settings import LidarSettings
+from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
 
 
-class Lidar:
+class Lidar(Sensor):
     """Lidar with rings of rays; a reading covers the rotation since the last one, at most one revolution.
 
     All rays of a reading start from the pose at its time: motion during a revolution does not distort the point cloud.
@@ -28,9 +30,11 @@ class Lidar:
     Random values are drawn by seed, station, name and tick.
     """
 
+    settings_type: ClassVar[type[SensorSettings]] = LidarSettings
+    settings: LidarSettings
+
     def __init__(self, settings: LidarSettings, spec: ActorSpec, name: str = "lidar", seed: int = 0) -> None:
-        self.settings = settings
-        self.name = name
+        super().__init__(settings, spec, name, seed)
         self.mounting = mounting(settings, spec, "roof")
         rings = settings.elevations or np.linspace(settings.upper_fov, settings.lower_fov, settings.channels)
         self._elevations = np.radians(rings)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
+
+FIELDS = frozenset({"truth", "camera", "lidar", "gnss", "imu"})
+"""Kinds of sensors with a field of their own in `Readings`."""
 
 
 @fast_frozen
@@ -121,3 +125,5 @@ class Readings:
     imu: ImuReading | None = None
     signals: tuple[SignalReading, ...] = ()
     """Signals in sight, for stations with a signal sensor."""
+    others: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Readings of all other sensors, by kind and name."""

@@ -4,35 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-from eidrive_scenario.sensing.camera import Camera
-from eidrive_scenario.sensing.inertial import Gnss, Imu
-from eidrive_scenario.sensing.lidar import Lidar
-from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, TruthReading
+from eidrive_scenario.registry import construct
+from eidrive_scenario.sensing.readings import FIELDS, EgoState, Readings
 from eidrive_scenario.sensing.scene import Scene
-from eidrive_scenario.sensing.settings import (
-    CameraSettings,
-    GnssSettings,
-    ImuSettings,
-    LidarSettings,
-    SensorSettings,
-    TruthSettings,
-)
-from eidrive_scenario.sensing.truth import TruthSensor, read_truth
+from eidrive_scenario.sensing.sensor import Sensor, sensor_class
+from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
-
-Sensor = TruthSensor | Camera | Lidar | Gnss | Imu
-
-_SINGLE = {TruthSensor: "truth sensor", Gnss: "GNSS receiver", Imu: "inertial unit"}
-"""Kinds of sensors of which a station has at most one."""
 
 
 class Rig:
     """Sensors of one actor. A sensor with a rate is read in the first tick of each period.
 
-    `seed` is that of the noise of all sensors. Raise ValueError if there is more than one truth sensor, GNSS receiver
-    or IMU.
+    `seed` is that of the noise of all sensors. Raise ValueError if there are several sensors of a kind of which a
+    station has at most one.
     """
 
     def __init__(self, spec: ActorSpec, sensors: Mapping[str, SensorSettings], *, seed: int = 0) -> None:
@@ -41,9 +28,11 @@ class Rig:
             name: _sensor(settings, spec, name, seed) for name, settings in sensors.items()
         }
         self._periods: dict[str, int] = {}
-        for kind, name in _SINGLE.items():
-            if sum(isinstance(sensor, kind) for sensor in self._sensors.values()) > 1:
-                raise ValueError(f"sensors: station {spec.name!r} has more than one {name}")
+        kinds = [settings.kind for settings in sensors.values()]
+        for sensor in self._sensors.values():
+            if sensor.unique and kinds.count(sensor.settings.kind) > 1:
+                kind = sensor.settings.kind
+                raise ValueError(f"sensors: station {spec.name!r} has more than one sensor of kind {kind!r}")
 
     def read(self, scene: Scene, view: WorldView) -> Readings:
         """Return the ego motion and the readings of due sensors. Raise KeyError if the actor is not in the world."""
@@ -64,42 +53,35 @@ class Rig:
 
 
 def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Readings]:
-    """Return the readings of several stations, by name; the rays of their truth sensors are cast in one batch."""
-    due = [rig.due(view.time) for rig in rigs]
+    """Return the readings of several stations, by name. The sensors of each class are read in one batch."""
     rows = [view.row(rig.station) for rig in rigs]
-    truth_sensors = [
-        (index, sensor)
-        for index, found in enumerate(due)
-        for sensor in found.values()
-        if isinstance(sensor, TruthSensor)
-    ]
-    truth_readings = read_truth(
-        [sensor for _, sensor in truth_sensors], [rows[index] for index, _ in truth_sensors], scene, view
+    groups: dict[type[Sensor], list[tuple[int, str, Sensor]]] = {}
+    for index, rig in enumerate(rigs):
+        for name, sensor in rig.due(view.time).items():
+            groups.setdefault(type(sensor), []).append((index, name, sensor))
+    found: list[dict[str, dict[str, Any]]] = [{} for _ in rigs]
+    for kind, entries in groups.items():
+        values = kind.read_batch(
+            [sensor for _, _, sensor in entries], [rows[index] for index, _, _ in entries], scene, view
+        )
+        for (index, name, sensor), value in zip(entries, values, strict=True):
+            found[index].setdefault(sensor.settings.kind, {})[name] = value
+    return {rig.station: _readings(found[index], view, rows[index]) for index, rig in enumerate(rigs)}
+
+
+def _readings(found: Mapping[str, Mapping[str, Any]], view: WorldView, row: int) -> Readings:
+    """Return the readings of one station from those of its sensors, by kind and name."""
+    truth, gnss, imu = (next(iter(found.get(kind, {}).values()), None) for kind in ("truth", "gnss", "imu"))
+    return Readings(
+        view.time,
+        ego_state(view, row),
+        truth,
+        found.get("camera", {}),
+        found.get("lidar", {}),
+        gnss,
+        imu,
+        others={} if found.keys() <= FIELDS else {kind: found[kind] for kind in found.keys() - FIELDS},
     )
-    truths = {index: reading for (index, _), reading in zip(truth_sensors, truth_readings, strict=True)}
-    return {
-        rig.station: _read(found, scene, view, row, truths.get(index))
-        for index, (rig, found, row) in enumerate(zip(rigs, due, rows, strict=True))
-    }
-
-
-def _read(
-    sensors: Mapping[str, Sensor], scene: Scene, view: WorldView, row: int, truth: TruthReading | None
-) -> Readings:
-    """Return the readings of one station, given that of its truth sensor."""
-    cameras: dict[str, CameraReading] = {}
-    lidars: dict[str, LidarReading] = {}
-    gnss = imu = None
-    for name, sensor in sensors.items():
-        if isinstance(sensor, Camera):
-            cameras[name] = sensor.read(scene, view, row)
-        elif isinstance(sensor, Lidar):
-            lidars[name] = sensor.read(scene, view, row)
-        elif isinstance(sensor, Gnss):
-            gnss = sensor.read(view, row)
-        elif isinstance(sensor, Imu):
-            imu = sensor.read(view, row)
-    return Readings(view.time, ego_state(view, row), truth, cameras, lidars, gnss, imu)
 
 
 def ego_state(view: WorldView, row: int) -> EgoState:
@@ -119,15 +101,4 @@ def ego_state(view: WorldView, row: int) -> EgoState:
 
 
 def _sensor(settings: SensorSettings, spec: ActorSpec, name: str, seed: int) -> Sensor:
-    match settings:
-        case TruthSettings():
-            return TruthSensor(settings, spec, name)
-        case CameraSettings():
-            return Camera(settings, spec, name, seed)
-        case LidarSettings():
-            return Lidar(settings, spec, name, seed)
-        case GnssSettings():
-            return Gnss(settings, spec, name, seed)
-        case ImuSettings():
-            return Imu(settings, spec, name, seed)
-    raise TypeError(f"sensors: unknown type of settings (got {type(settings).__name__})")
+    return construct(sensor_class(settings.kind), settings, spec, name, seed)  # type: ignore[no-any-return]

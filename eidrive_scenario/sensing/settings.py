@@ -46,6 +46,8 @@ MountSetting = Annotated[Mount | MountName | None, BeforeValidator(_mount)]
 class SensorSettings(Settings):
     """Settings of all sensors: a mount (None: default of the kind) and a rate (None: each tick)."""
 
+    kind: str
+    """Name under which the sensor is registered."""
     mount: MountSetting = None
     rate: Rate | None = None
     """Rate [Hz]."""
@@ -251,10 +253,3 @@ class ImuSettings(SensorSettings):
     accelerometer_walk: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     gyroscope_walk: Annotated[float, Field(ge=0.0, le=10.0)] = 1e-4
     oracle: bool = False
-
-
-AnySensorSettings = Annotated[
-    TruthSettings | CameraSettings | LidarSettings | GnssSettings | ImuSettings, Field(discriminator="kind")
-]
-
-KINDS = ("truth", "camera", "lidar", "gnss", "imu")

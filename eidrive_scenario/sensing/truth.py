@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from eidrive_scenario.sensing.crossing import is_occluded_by, is_occluded_by_sma
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
 from eidrive_scenario.sensing.scene import NOTHING, Point, Scene
-from eidrive_scenario.sensing.settings import TruthSettings
+from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.settings import SensorSettings, TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
@@ -30,18 +32,31 @@ FEW_PAIRS, FEW_RAYS = 64, 80
 """Maximum number of sensor-actor pairs, and of rays, for which scalar arithmetic is faster than arrays."""
 
 
-class TruthSensor:
+class TruthSensor(Sensor):
     """Sensor of objects whose center is within range and field of view, with enough of their points in sight.
 
     The range is measured between the centers of the bodies; rays start at the mount and pass through the ego body.
     """
 
-    def __init__(self, settings: TruthSettings, spec: ActorSpec, name: str = "truth") -> None:
-        self.settings = settings
-        self.name = name
+    settings_type: ClassVar[type[SensorSettings]] = TruthSettings
+    unique: ClassVar[bool] = True
+    settings: TruthSettings
+
+    def __init__(self, settings: TruthSettings, spec: ActorSpec, name: str = "truth", seed: int = 0) -> None:
+        super().__init__(settings, spec, name, seed)
         self.mounting = mounting(settings, spec, "roof")
         self.half_field = math.radians(settings.field_of_view) / 2.0
         self.range_squared = settings.range**2
+
+    def read(self, scene: Scene, view: WorldView, row: int) -> TruthReading:
+        return read_truth([self], [row], scene, view)[0]
+
+    @classmethod
+    def read_batch(
+        cls, sensors: Sequence[TruthSensor], rows: Sequence[int], scene: Scene, view: WorldView
+    ) -> list[TruthReading]:
+        """Return the readings of several sensors, whose rays are cast in one batch."""
+        return read_truth(sensors, rows, scene, view)
 
 
 def read_truth(

@@ -13,18 +13,21 @@ from eidrive_scenario.sensing.inertial import Gnss, Imu
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings
 
+SCENE: Any = None
+"""Neither sensor uses the scene."""
+
 
 def gnss_errors(boxes: Any, ticks: int, seed: int = 1, step: float = 0.1, **settings: float) -> np.ndarray:
     receiver = Gnss(GnssSettings(**settings), boxes.spec("Ego"), seed=seed)  # type: ignore[arg-type]
     view = boxes.view({"Ego": (5.0, -3.0, 0.4)})
-    readings = [receiver.read(replace(view, time=k * step, tick=k), 0).position for k in range(ticks)]
+    readings = [receiver.read(SCENE, replace(view, time=k * step, tick=k), 0).position for k in range(ticks)]
     return np.array(readings) - (5.0, -3.0, 0.0)
 
 
 def imu_errors(boxes: Any, ticks: int, seed: int = 1, step: float = 0.01, **settings: float) -> np.ndarray:
     unit = Imu(ImuSettings(**settings), boxes.spec("Ego"), seed=seed)  # type: ignore[arg-type]
     view = boxes.view({"Ego": (0.0, 0.0, 0.0)})
-    readings = [unit.read(replace(view, time=k * step, tick=k), 0) for k in range(1, ticks + 1)]
+    readings = [unit.read(SCENE, replace(view, time=k * step, tick=k), 0) for k in range(1, ticks + 1)]
     return np.array([(*r.acceleration, *r.angular_rate) for r in readings])
 
 
@@ -34,9 +37,9 @@ def test_oracle_readings_are_exact(boxes: Any) -> None:
         acceleration=np.array([[0.0, 2.0, 0.0]]),
         yaw_rate=np.array([0.3]),
     )
-    position = Gnss(GnssSettings(oracle=True), boxes.spec("Ego")).read(view, 0).position
+    position = Gnss(GnssSettings(oracle=True), boxes.spec("Ego")).read(SCENE, view, 0).position
     np.testing.assert_array_equal(position, [5.0, -3.0, 0.0])
-    imu = Imu(ImuSettings(oracle=True), boxes.spec("Ego")).read(view, 0)
+    imu = Imu(ImuSettings(oracle=True), boxes.spec("Ego")).read(SCENE, view, 0)
     np.testing.assert_allclose(imu.acceleration, [2.0, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(imu.angular_rate, [0.0, 0.0, 0.3], atol=1e-12)
 
@@ -48,7 +51,7 @@ def test_imu_on_slope_measures_in_body_frame(boxes: Any) -> None:
         pitch=np.array([-0.1]),
         acceleration=np.array([[2.0 * math.cos(0.1), 0.0, 2.0 * math.sin(0.1)]]),
     )
-    imu = Imu(ImuSettings(oracle=True), boxes.spec("Ego")).read(view, 0)
+    imu = Imu(ImuSettings(oracle=True), boxes.spec("Ego")).read(SCENE, view, 0)
     np.testing.assert_allclose(imu.acceleration, [2.0, 0.0, 0.0], atol=1e-12)
 
 
@@ -61,7 +64,7 @@ def test_gnss_noise_has_stated_deviation(boxes: Any) -> None:
 
 def test_gnss_covariance_contains_noise_and_initial_bias(boxes: Any) -> None:
     settings = GnssSettings(position_noise=0.3, height_noise=0.6, bias=0.4)
-    reading = Gnss(settings, boxes.spec("Ego")).read(boxes.view({"Ego": (0.0, 0.0, 0.0)}), 0)
+    reading = Gnss(settings, boxes.spec("Ego")).read(SCENE, boxes.view({"Ego": (0.0, 0.0, 0.0)}), 0)
     np.testing.assert_allclose(reading.covariance, np.diag([0.25, 0.25, 0.36]))
 
 
@@ -107,7 +110,7 @@ def test_gnss_draws_depend_on_seed_station_and_tick_only(boxes: Any) -> None:
     assert not np.array_equal(first, other)
     receiver = Gnss(GnssSettings(), boxes.spec("Ego"), seed=1)
     view = boxes.view({"Ego": (5.0, -3.0, 0.4)})
-    late = receiver.read(replace(view, time=0.4, tick=4), 0).position - (5.0, -3.0, 0.0)
+    late = receiver.read(SCENE, replace(view, time=0.4, tick=4), 0).position - (5.0, -3.0, 0.0)
     np.testing.assert_array_equal(late, first[4])
 
 
@@ -118,5 +121,5 @@ def test_rig_reads_gnss_and_imu_at_their_rates(boxes: Any) -> None:
         readings = rig.read(boxes.scene(view), view)
         assert readings.imu is not None
         assert (readings.gnss is not None) == (tick % 2 == 0)
-    with pytest.raises(ValueError, match="more than one GNSS receiver"):
+    with pytest.raises(ValueError, match="more than one sensor of kind 'gnss'"):
         Rig(boxes.spec("Ego"), {"a": GnssSettings(), "b": GnssSettings()})
