@@ -20,14 +20,14 @@ from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, object_category
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.settings import AnySensorSettings, CameraSettings, LidarSettings
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.world.weather import Weather
 from training.labels import Label
 from training.scenes import StationScene, random_scenes
 
 Array = NDArray[np.float64]
 
-SENSORS: dict[str, AnySensorSettings] = {
+SENSORS: dict[str, SensorSettings] = {
     "camera": CameraSettings(width=512, height=384),
     "lidar": LidarSettings(field_of_view=110.0),
 }

@@ -1,10 +1,12 @@
-"""Planners: from the ego state, the fused objects and the goal to a trajectory. Driving stacks: all stations of a run.
+"""Planners and vehicle controllers of a station, and driving stacks, which operate all stations of a run.
 
 Stable: all names but those of driving stacks (`DrivingStack`, `EmptyStack`, `StackContext`, `StackFactory`,
 `StackInputs`, `StackSettings`), which may change in a minor version.
 """
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
@@ -19,10 +21,13 @@ from eidrive_scenario.driving.stack import (
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.world.actor import ActorSpec, Control
 
 __all__ = [
+    "ActorSpec",
     "AgentSettings",
     "AgentStep",
+    "Control",
     "Detections",
     "DrivingStack",
     "EgoState",
@@ -30,9 +35,11 @@ __all__ = [
     "Goal",
     "Plan",
     "Planner",
+    "PlannerSettings",
     "RoutePlanner",
     "StackContext",
     "StackFactory",
     "StackInputs",
     "StackSettings",
+    "VehicleController",
 ]

@@ -1,4 +1,4 @@
-"""Detectors, the sensor readings that they get, and the detections that they return.
+"""Sensors and their readings, detectors and their detections, trackers.
 
 Stable: all names except `lift` and `MapContext`, which may change with a minor version.
 """
@@ -7,7 +7,13 @@ from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.lifting.lifting import lift
+from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.perception.tracking.settings import TrackerKind
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
+from eidrive_scenario.sensing.scene import Scene
+from eidrive_scenario.sensing.sensor import Sensor
+from eidrive_scenario.sensing.settings import SensorSettings
+from eidrive_scenario.world.view import WorldView
 
 __all__ = [
     "CLASSES",
@@ -19,6 +25,12 @@ __all__ = [
     "LidarReading",
     "MapContext",
     "Readings",
+    "Scene",
+    "Sensor",
+    "SensorSettings",
     "SignalReading",
+    "TrackerKind",
+    "TrackingMethod",
+    "WorldView",
     "lift",
 ]

@@ -93,7 +93,10 @@ def run_in(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 def test_every_kind_of_extension_has_its_section_and_example() -> None:
     project = tomllib.loads(files()["pyproject.toml"])
     kinds = {group.removeprefix("eidrive_scenario.") for group in project["project"]["entry-points"]}
-    assert kinds == {"detectors", "channels", "fusion", "planners", "actions", "conditions", "criteria"}
+    assert kinds == {
+        *("sensors", "detectors", "trackers", "channels", "fusion", "planners"),
+        *("actions", "conditions", "criteria"),
+    }
     modules = {
         value.partition(":")[0] for entries in project["project"]["entry-points"].values() for value in entries.values()
     }
