@@ -1,8 +1,8 @@
-"""Whole runs in turned, moved and mirrored worlds: the same run, turned, moved and mirrored.
+"""Equivariance of runs under rotation, translation and mirroring of the world.
 
-Nothing in physics or in the rules of messages knows where north is, or left from right. So map and scenario of the
-library are turned about by 217.3 degrees and moved, or reflected at the x axis (with lanes, rule of the road, areas and
-headings), and run again. What differs is rounding, some 1e-12 m where the world was turned.
+Physics and message generation do not depend on the direction of north or on the side of the road. Map and scenario of
+the library are rotated by 217.3 degrees and translated, or mirrored at the x axis (with lanes, traffic rule, areas and
+headings). The runs differ only by rounding, about 1e-12 m in the rotated world.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 
 TURN, EAST, NORTH = math.radians(217.3), 310.0, -85.0
 ROUNDING = 1e-9
-"""Of places [m], headings [rad] and path loss [dB]; a tick earlier or later in any decision would be 0.4 m."""
+"""Tolerance of positions [m], headings [rad] and path loss [dB]; a decision one tick later would change 0.4 m."""
 
 Node = etree._Element
 
 
 @dataclass
-class Seen:
-    """Where everybody was, what the ego knew and what came over the radio, tick by tick."""
+class RunTrace:
+    """Poses of all actors, fused objects of the ego, and link events, per tick."""
 
     places: list[np.ndarray] = field(default_factory=list)
     known: list[np.ndarray] = field(default_factory=list)
@@ -45,57 +45,57 @@ class Seen:
         self.losses.append(tuple(e.path_loss_db or 0.0 for e in frame.links))
 
     def close(self) -> None:
-        """Nothing to finish."""
+        """Do nothing."""
 
 
-def scaled(node: Node, *names: str, by: float = -1.0) -> None:
+def scale(node: Node, *names: str, by: float = -1.0) -> None:
     for name in names:
         if node.get(name) is not None:
-            node.set(name, repr(by * float(node.get(name))))
+            node.set(name, repr(by * float(node.attrib[name])))
 
 
-def negated_lane(node: Node, *names: str) -> None:
+def negate_lane(node: Node, *names: str) -> None:
     for name in names:
         if node.get(name) is not None:
-            node.set(name, str(-int(node.get(name))))
+            node.set(name, str(-int(node.attrib[name])))
 
 
-def turned(x: float, y: float) -> tuple[float, float]:
+def rotate(x: float, y: float) -> tuple[float, float]:
     cos, sin = math.cos(TURN), math.sin(TURN)
     return EAST + cos * x - sin * y, NORTH + sin * x + cos * y
 
 
-def turned_road(road: Node) -> None:
+def rotate_road(road: Node) -> None:
     for geometry in road.iter("geometry"):
-        x, y = turned(float(geometry.get("x")), float(geometry.get("y")))
+        x, y = rotate(float(geometry.attrib["x"]), float(geometry.attrib["y"]))
         geometry.set("x", repr(x))
         geometry.set("y", repr(y))
-        geometry.set("hdg", repr(float(geometry.get("hdg")) + TURN))
+        geometry.set("hdg", repr(float(geometry.attrib["hdg"]) + TURN))
 
 
-def mirrored_road(road: Node) -> None:
+def mirror_road(road: Node) -> None:
     for node in road.iter("geometry"):
-        scaled(node, "y", "hdg")
+        scale(node, "y", "hdg")
     for node in road.iter("arc", "spiral"):
-        scaled(node, "curvature", "curvStart", "curvEnd")
+        scale(node, "curvature", "curvStart", "curvEnd")
     for node in road.iter("laneOffset"):
-        scaled(node, "a", "b", "c", "d")
+        scale(node, "a", "b", "c", "d")
     for node in road.iter("object", "cornerRoad", "signal"):
-        scaled(node, "t", "hdg", "hOffset")
+        scale(node, "t", "hdg", "hOffset")
     for node in road.iter("validity"):
-        negated_lane(node, "fromLane", "toLane")
-        first, last = node.get("fromLane"), node.get("toLane")
+        negate_lane(node, "fromLane", "toLane")
+        first, last = node.attrib["fromLane"], node.attrib["toLane"]
         node.set("fromLane", last)
         node.set("toLane", first)
     for node in road.iter("laneLink"):
-        negated_lane(node, "from", "to")
+        negate_lane(node, "from", "to")
     for node in road.iter("road"):
         node.set("rule", "LHT" if node.get("rule", "RHT") == "RHT" else "RHT")
     for section in road.iter("laneSection"):
         for lane in section.iter("lane"):
-            negated_lane(lane, "id")
+            negate_lane(lane, "id")
             for link in lane.iter("predecessor", "successor"):
-                negated_lane(link, "id")
+                negate_lane(link, "id")
         sides = {side.tag: side for side in section if side.tag in ("left", "right")}
         for side in sides.values():
             side[:] = list(reversed(side))
@@ -103,19 +103,19 @@ def mirrored_road(road: Node) -> None:
         section[:] = sorted(section, key=lambda side: ["left", "center", "right"].index(side.tag))
 
 
-def turned_scenario(text: str) -> str:
+def rotate_scenario(text: str) -> str:
     def place(found: re.Match[str]) -> str:
-        x, y = turned(float(found[1]), float(found[2]))
+        x, y = rotate(float(found[1]), float(found[2]))
         return f'<WorldPosition x="{x!r}" y="{y!r}" z="0" h="{float(found[3]) + TURN!r}"/>'
 
     def area(found: re.Match[str]) -> str:
         x0, x1, y0, y1 = map(float, found[1].split(","))
-        return f'"conflict_area" value="{[list(turned(x, y)) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]}"'
+        return f'"conflict_area" value="{[list(rotate(x, y)) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]}"'
 
     return re.sub(AREA, area, re.sub(PLACE, place, text))
 
 
-def mirrored_scenario(text: str) -> str:
+def mirror_scenario(text: str) -> str:
     def area(found: re.Match[str]) -> str:
         x0, x1, y0, y1 = map(float, found[1].split(","))
         return f'"conflict_area" value="{[x0, x1, -y1, -y0]}"'
@@ -129,13 +129,13 @@ PLACE = r'<WorldPosition x="([-\d.]+)" y="([-\d.]+)" z="0" h="([-\d.]+)"/>'
 AREA = r'"conflict_area" value="\[([^\]]*)\]"'
 
 
-def turned_poses(poses: np.ndarray) -> np.ndarray:
+def rotate_poses(poses: np.ndarray) -> np.ndarray:
     cos, sin = math.cos(TURN), math.sin(TURN)
     x, y, yaw = poses.T
     return np.column_stack([EAST + cos * x - sin * y, NORTH + sin * x + cos * y, yaw + TURN])
 
 
-def mirrored_poses(poses: np.ndarray) -> np.ndarray:
+def mirror_poses(poses: np.ndarray) -> np.ndarray:
     return poses * [1.0, -1.0, -1.0]
 
 
@@ -143,17 +143,17 @@ Roads = Callable[[Node], None]
 Scenario = Callable[[str], str]
 Poses = Callable[[np.ndarray], np.ndarray]
 CHANGES: dict[str, tuple[Roads, Scenario, Poses]] = {
-    "turned": (turned_road, turned_scenario, turned_poses),
-    "mirrored": (mirrored_road, mirrored_scenario, mirrored_poses),
+    "rotated": (rotate_road, rotate_scenario, rotate_poses),
+    "mirrored": (mirror_road, mirror_scenario, mirror_poses),
 }
 
 
-def unchanged(root: Node) -> None:
-    """The roads as they are."""
+def keep_roads(root: Node) -> None:
+    """Keep the roads unchanged."""
 
 
-def changed(folder: Path, name: str, fusion: str, roads: Roads = unchanged, scenario: Scenario = str) -> Path:
-    """The scenario in a changed world, with this method of fusion; its catalogs are those of the library."""
+def write_scenario(folder: Path, name: str, fusion: str, roads: Roads = keep_roads, scenario: Scenario = str) -> Path:
+    """Write the scenario in a transformed world, with this fusion method and the catalogs of the library."""
     folder.mkdir()
     source = resolve_scenario(name)
     text = source.read_text().replace('x="${40.0 + $CenterAhead}"', 'x="41.384"')
@@ -169,13 +169,13 @@ def changed(folder: Path, name: str, fusion: str, roads: Roads = unchanged, scen
     return path
 
 
-def play(source: Path, channel: str, seed: int) -> tuple[Seen, RunResult]:
-    seen = Seen()
-    return seen, run_file(source, seed=seed, settings=RunSettings(channel=channel), observers=[seen])
+def simulate(source: Path, channel: str, seed: int) -> tuple[RunTrace, RunResult]:
+    trace = RunTrace()
+    return trace, run_file(source, seed=seed, settings=RunSettings(channel=channel), observers=[trace])
 
 
-def off(found: np.ndarray, expected: np.ndarray) -> float:
-    """The largest difference of poses (N, 3) [m, rad]."""
+def maximum_difference(found: np.ndarray, expected: np.ndarray) -> float:
+    """Return the maximum difference of poses (N, 3) [m, rad]."""
     difference = np.abs(found - expected)
     difference[:, 2] = np.abs((found[:, 2] - expected[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
     return float(difference.max(initial=0.0))
@@ -193,20 +193,20 @@ def off(found: np.ndarray, expected: np.ndarray) -> float:
         ("coop/scenario_2", "average", "none", 3),
     ],
 )
-def test_the_run_turns_with_the_world(
+def test_run_in_transformed_world_is_the_transformed_run(
     tmp_path: Path, change: str, name: str, fusion: str, channel: str, seed: int
 ) -> None:
     roads, scenario, poses = CHANGES[change]
-    usual, before = play(changed(tmp_path / "usual", name, fusion), channel, seed)
-    other, after = play(changed(tmp_path / "other", name, fusion, roads, scenario), channel, seed)
-    assert len(other.places) == len(usual.places) > 100
+    original, before = simulate(write_scenario(tmp_path / "original", name, fusion), channel, seed)
+    other, after = simulate(write_scenario(tmp_path / "other", name, fusion, roads, scenario), channel, seed)
+    assert len(other.places) == len(original.places) > 100
     assert (after.passed, after.end_reason) == (before.passed, before.end_reason)
-    assert other.links == usual.links
-    for tick, (there, here) in enumerate(zip(other.places, usual.places, strict=True)):
-        assert off(there, poses(here)) < ROUNDING, tick
-    for tick, (there, here) in enumerate(zip(other.known, usual.known, strict=True)):
+    assert other.links == original.links
+    for tick, (there, here) in enumerate(zip(other.places, original.places, strict=True)):
+        assert maximum_difference(there, poses(here)) < ROUNDING, tick
+    for tick, (there, here) in enumerate(zip(other.known, original.known, strict=True)):
         assert there.shape == here.shape, tick
-        assert off(there, poses(here)) < ROUNDING, tick
+        assert maximum_difference(there, poses(here)) < ROUNDING, tick
     assert [loss for tick in other.losses for loss in tick] == pytest.approx(
-        [loss for tick in usual.losses for loss in tick], abs=ROUNDING
+        [loss for tick in original.losses for loss in tick], abs=ROUNDING
     )

@@ -13,7 +13,7 @@ def random_covariances(count: int, *key: int) -> np.ndarray:
     """Return pairs of covariances (count, 2, 2, 2): arbitrary, nearly equal, and isotropic ones."""
     rng = generator(1, "covariances", *key)
     roots = rng.normal(size=(count, 2, 2, 2)) * rng.choice([0.01, 1.0, 10.0], size=(count, 2, 1, 1))
-    pairs = roots @ np.swapaxes(roots, -1, -2) + 1e-4 * np.eye(2)
+    pairs: np.ndarray = roots @ np.swapaxes(roots, -1, -2) + 1e-4 * np.eye(2)
     third = count // 3
     pairs[:third] = pairs[:third, :1] * rng.uniform(0.8, 1.2, size=(third, 2, 1, 1))
     pairs[third : 2 * third] = rng.uniform(0.5, 2.0, size=(third, 2, 1, 1)) * np.eye(2)

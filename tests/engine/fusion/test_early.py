@@ -51,8 +51,8 @@ def car(x: float, y: float, sides: str, length: float = 4.5) -> np.ndarray:
         "f": [(end, a, z) for a in across for z in up],
         "b": [(-end, a, z) for a in across for z in up],
     }
-    points: np.ndarray = np.concatenate([np.array(faces[side]) for side in sides])
-    return points + np.array([x, y, 0.0])
+    points = np.concatenate([np.array(faces[side]) for side in sides])
+    return np.asarray(points + np.array([x, y, 0.0]))
 
 
 def readings(time: float, at: tuple[float, float, float], *objects: np.ndarray, height: float = 0.0) -> Readings:
