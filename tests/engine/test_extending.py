@@ -1,4 +1,4 @@
-"""docs/extending.md word by word: its files are written, its package installed, its commands typed."""
+"""Execution of docs/extending.md: its files are written, its package is installed, its commands are run."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ GUIDE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCKS = BLOCK.findall(GUIDE.read_text(encoding="utf-8"))
 NAMED = re.compile(r"\A(?:# (\S+\.py)|<!-- (\S+) -->)\n")
-LONGEST = 30
-"""Lines of a worked example."""
-MADE = ("red.onnx", "red.pt")
-"""What the script of the page writes."""
+MAX_LINES = 30
+"""Maximum number of lines of an example."""
+GENERATED_FILES = ("red.onnx", "red.pt")
+"""Files that the script of the page writes."""
 
 
 def commands() -> list[tuple[str, tuple[str, ...]]]:
-    """What is typed, and what must be read then."""
+    """Return the commands of the page, each with the lines that its output must contain."""
     found: list[tuple[str, list[str]]] = []
     for kind, text in BLOCKS:
         if kind == "console":
@@ -36,12 +36,12 @@ def commands() -> list[tuple[str, tuple[str, ...]]]:
 
 
 def scripts() -> list[str]:
-    """The commands that make files which later ones take."""
+    """Return the commands that create files for later commands."""
     return [command for command, _ in commands() if command.startswith("python ")]
 
 
 def files() -> dict[str, str]:
-    """By name, what the page shows of them; the pieces of pyproject.toml put together."""
+    """Return the files of the page by name; the parts of pyproject.toml are joined."""
     found = {"pyproject.toml": "\n".join(text for kind, text in BLOCKS if kind == "toml")}
     for kind, text in BLOCKS:
         name = NAMED.match(text)
@@ -52,7 +52,7 @@ def files() -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The files, and beside them the metadata that `pip install -e .` would make of pyproject.toml."""
+    """Write the files, and beside them the metadata that `pip install -e .` would create from pyproject.toml."""
     folder = tmp_path_factory.mktemp("acme")
     for name, text in files().items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -72,7 +72,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def made(folder: Path) -> Path:
-    """The folder once its scripts have run; they need what their section says to install."""
+    """Return the folder after its scripts have run; skip without the packages of their section."""
     for module in ("torch", "onnxscript"):
         pytest.importorskip(module, reason="needs the extras 'learned' and 'dev'")
     for script in scripts():
@@ -90,7 +90,7 @@ def run_in(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_every_kind_of_extension_has_its_section_and_example() -> None:
+def test_guide_has_an_example_of_every_kind_of_extension() -> None:
     project = tomllib.loads(files()["pyproject.toml"])
     kinds = {group.removeprefix("eidrive_scenario.") for group in project["project"]["entry-points"]}
     assert kinds == {
@@ -106,27 +106,27 @@ def test_every_kind_of_extension_has_its_section_and_example() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(name for name in files() if name.endswith(".py")))
-def test_examples_are_short_and_use_the_api_alone(name: str) -> None:
+def test_guide_examples_are_short_and_import_the_api_only(name: str) -> None:
     lines = files()[name].splitlines()
     code = [line for line in lines[1:] if line.strip()]
-    assert len(code) <= LONGEST
+    assert len(code) <= MAX_LINES
     ours = [line for line in lines if "eidrive" in line and "import" in line]
     assert all(line.startswith("from eidrive_scenario.api.") for line in ours)
 
 
 @pytest.mark.parametrize(("command", "expected"), commands(), ids=[command for command, _ in commands()])
-def test_what_is_typed_works(
+def test_guide_commands_print_the_expected_lines(
     folder: Path, command: str, expected: tuple[str, ...], request: pytest.FixtureRequest
 ) -> None:
-    """A run that is shown to fail exits with 1, one that is cut short with 3."""
+    """A run with failed criteria exits with 1, an interrupted one with 3."""
     program, *arguments = shlex.split(command)
     if program == "pip":
-        assert arguments[0] == "install"  # what it installs is there already: tests do without a network
+        assert arguments[0] == "install"  # the package is installed by the fixture: tests have no network
         return
-    if program == "python" or any(name in command for name in MADE):
+    if program == "python" or any(name in command for name in GENERATED_FILES):
         request.getfixturevalue("made")
     if program == "python":
-        assert all((folder / name).is_file() for name in MADE)
+        assert all((folder / name).is_file() for name in GENERATED_FILES)
         return
     assert program == "eidrive"
     done = run_in(folder, sys.executable, "-m", "eidrive_scenario", *arguments)
