@@ -1,4 +1,4 @@
-"""A stage without roads and two cars on it, and doubles for conditions and actions whose course a test writes down."""
+"""Runtime context without roads and with two cars; scripted conditions and actions."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from eidrive_scenario.registry import Registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.domains import Domain
 from eidrive_scenario.storyboard.storyboard import Storyboard
@@ -45,42 +46,42 @@ ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
 
 
 def empty_view(time: float = 0.0, tick: int = 0) -> WorldView:
-    """A view of nobody."""
+    """Return a view without actors."""
     none, points = np.empty(0), np.empty((0, 3))
     return WorldView(time, tick, (), (), points, none, none, none, points, points, none, none, points, points)
 
 
 class Clock:
-    """Steps a stage through time without a world."""
+    """Clock that steps a runtime context without a world."""
 
     def __init__(self, context: RuntimeContext, dt: float) -> None:
         self.context, self.dt, self.tick = context, dt, -1
 
     def step(self) -> RuntimeContext:
-        """One tick further."""
+        """Start the next tick."""
         self.tick += 1
         self.context.begin_tick(replace(self.context.view, time=self.tick * self.dt, tick=self.tick), self.dt)
         return self.context
 
 
 class Script(Condition):
-    """A condition that holds as a list says, one value per evaluation; after its end the last one stays."""
+    """Condition with a list of values, one per evaluation; the last value is repeated."""
 
     def __init__(self, values: Sequence[bool]) -> None:
         super().__init__(model.SimulationTimeCondition(rule=model.Rule.EQUAL_TO, value=0.0))
         self.values, self.asked = list(values), 0
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         value = self.values[min(self.asked, len(self.values) - 1)]
         self.asked += 1
         return value
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         return f"value {self.asked} at {context.time:g} s"
 
 
 class Task(ActionBehaviour):
-    """An action that takes a number of ticks."""
+    """Action that takes a number of ticks."""
 
     def __init__(
         self, context: RuntimeContext, ticks: int, *, actor: str | None = None, domain: Domain = Domain.NONE
@@ -94,7 +95,7 @@ class Task(ActionBehaviour):
 
     @property
     def is_actor_missing(self) -> bool:
-        """Never: nobody is placed where elements are tested alone."""
+        """False, as elements are tested without placed actors."""
         return False
 
     def initialise(self) -> None:
@@ -107,14 +108,14 @@ class Task(ActionBehaviour):
 
 
 class Setting(Task):
-    """An action that only sets a value: it is done as soon as it starts."""
+    """Action that sets a value and ends at its start."""
 
     immediate = True
 
 
 @pytest.fixture
 def context() -> RuntimeContext:
-    """A stage with cars A and B and no roads."""
+    """Runtime context with cars A and B, without roads."""
     cars = "".join(CAR.format(name=name) for name in "AB")
     scenario = load_scenario(SCENARIO.format(cars=cars).encode())
     return RuntimeContext(scenario, None, dt=0.1, seed=0, empty_view=empty_view(tick=-1))
@@ -122,31 +123,31 @@ def context() -> RuntimeContext:
 
 @pytest.fixture
 def clock(context: RuntimeContext) -> Clock:
-    """Time in steps of 0.1 s."""
+    """Clock with steps of 0.1 s."""
     return Clock(context, 0.1)
 
 
 @pytest.fixture
 def script() -> Callable[[Sequence[bool]], Script]:
-    """Makes conditions."""
+    """Constructor of scripted conditions."""
     return Script
 
 
 @pytest.fixture
 def task(context: RuntimeContext) -> Callable[..., Task]:
-    """Makes actions."""
+    """Constructor of actions."""
     return lambda ticks, **more: Task(context, ticks, **more)
 
 
 @pytest.fixture
 def setting(context: RuntimeContext) -> Callable[[], Setting]:
-    """Makes actions that take no time."""
+    """Constructor of actions that take no time."""
     return lambda: Setting(context, 1)
 
 
 @pytest.fixture
 def fresh() -> Callable[[], tuple[RuntimeContext, Clock, type[Script], Callable[..., Task]]]:
-    """Makes a stage, its clock, and makers of conditions and actions on it; anew for each example of a property."""
+    """Constructor of a context, its clock, conditions and actions, called for each example of a property."""
     scenario = load_scenario(SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB")).encode())
 
     def made() -> tuple[RuntimeContext, Clock, type[Script], Callable[..., Task]]:
@@ -158,13 +159,13 @@ def fresh() -> Callable[[], tuple[RuntimeContext, Clock, type[Script], Callable[
 
 @pytest.fixture
 def street() -> RoadNetwork:
-    """A straight street along x, 200 m: lane 1 (y = 2, towards -x), lanes -1 (y = -2) and -2 (y = -6, towards +x)."""
+    """Straight road along x, 200 m: lane 1 (y = 2, towards -x), lanes -1 (y = -2) and -2 (y = -6, towards +x)."""
     return RoadNetwork.parse(ROAD.format(length=200, shape="<line/>"))
 
 
 @pytest.fixture
 def bend() -> RoadNetwork:
-    """The same street in a left bend of radius 50 m, a quarter circle."""
+    """Road with the same lanes in a left bend of radius 50 m, a quarter circle."""
     return RoadNetwork.parse(ROAD.format(length=78.5398163397, shape='<arc curvature="0.02"/>'))
 
 
@@ -175,18 +176,18 @@ ACT = """<Story name="story"><Act name="act"><ManeuverGroup name="group" maximum
 
 @pytest.fixture
 def build() -> Callable[..., Storyboard]:
-    """A storyboard over cars A and B without roads: A's actions in Init, events for A, stop trigger, global actions."""
+    """Constructor of a storyboard with cars A and B: Init actions and events of A, stop trigger, global actions."""
 
     def made(
         init: str,
         events: str = "",
         stop: str = "<StopTrigger/>",
-        everywhere: str = "",
+        global_actions: str = "",
         registered: Registry | None = None,
         declared: str = "",
     ) -> Storyboard:
         text = SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB"))
-        actions = f'<Actions>{everywhere}<Private entityRef="A">{init}</Private></Actions>'
+        actions = f'<Actions>{global_actions}<Private entityRef="A">{init}</Private></Actions>'
         stories = ACT.format(events=events) if events else ""
         text = text.replace("<CatalogLocations/>", declared + "<CatalogLocations/>")
         text = text.replace("<Actions/>", actions).replace("<StopTrigger/>", stories + stop)

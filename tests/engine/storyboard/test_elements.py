@@ -1,4 +1,4 @@
-"""The state machine, tick by tick. Actions take a written number of ticks; triggers fire as a list says."""
+"""State machines of the elements by tick, with scripted actions and triggers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ YES, NO = True, False
 
 
 class Builder:
-    """Elements of one tree; paths do not matter here."""
+    """Constructor of the elements of one tree with arbitrary paths."""
 
     def __init__(self, context: Any, script: Any) -> None:
         self.context, self.script = context, script
@@ -62,7 +62,7 @@ def make(context: Any, script: Any) -> Any:
 
 
 def play(clock: Any, root: Any, ticks: Any) -> Any:
-    """One list of `element transition` per tick."""
+    """Return one list of `element transition` per tick."""
     seen = []
     for _ in range(ticks):
         context = clock.step()
@@ -72,7 +72,7 @@ def play(clock: Any, root: Any, ticks: Any) -> Any:
 
 
 @pytest.mark.element("Event without StartTrigger")
-def test_without_triggers_all_starts_in_one_tick_and_ends_from_the_bottom_up(clock: Any, make: Any, task: Any) -> None:
+def test_elements_without_triggers_start_in_one_tick_and_end_bottom_up(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(2))))))
     first, second, third, fourth = play(clock, root, 4)
     assert first == [
@@ -83,20 +83,20 @@ def test_without_triggers_all_starts_in_one_tick_and_ends_from_the_bottom_up(clo
     assert fourth == []
 
 
-def test_an_action_of_one_step_ends_when_the_step_does(clock: Any, make: Any, task: Any) -> None:
+def test_action_of_one_step_ends_with_the_step(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(1))))))
     first, second = play(clock, root, 2)
     assert first[-1] == "event.0 start"
     assert second[-2:] == ["story end", "storyboard end"]
 
 
-def test_an_action_that_only_sets_a_value_takes_no_time(clock: Any, make: Any, setting: Any) -> None:
+def test_immediate_action_takes_no_time(clock: Any, make: Any, setting: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", setting())))))
     assert play(clock, root, 1)[0][-2:] == ["story end", "storyboard end"]
 
 
 @pytest.mark.element("Act StartTrigger")
-def test_an_act_waits_for_its_trigger_and_its_events_begin_to_look_only_then(clock: Any, make: Any, task: Any) -> None:
+def test_events_are_evaluated_after_the_act_starts(clock: Any, make: Any, task: Any) -> None:
     event = make.event("event", task(1), start=[YES])
     root = make.storyboard(make.act(make.group(make.maneuver(event)), start=[NO, NO, YES]))
     ticks = play(clock, root, 3)
@@ -106,7 +106,7 @@ def test_an_act_waits_for_its_trigger_and_its_events_begin_to_look_only_then(clo
 
 
 @pytest.mark.element("Storyboard StopTrigger")
-def test_a_stop_trigger_is_judged_before_the_children(clock: Any, make: Any, task: Any) -> None:
+def test_stop_trigger_is_evaluated_before_children(clock: Any, make: Any, task: Any) -> None:
     late = make.event("late", task(1), start=[NO, YES])
     running = make.event("running", task(9))
     root = make.storyboard(make.act(make.group(make.maneuver(running, late))), stop=[NO, YES])
@@ -117,7 +117,7 @@ def test_a_stop_trigger_is_judged_before_the_children(clock: Any, make: Any, tas
 
 
 @pytest.mark.element("Act StopTrigger")
-def test_an_act_is_stopped_alone_from_the_tick_after_its_start(clock: Any, make: Any, task: Any) -> None:
+def test_stop_trigger_of_act_counts_from_the_tick_after_its_start(clock: Any, make: Any, task: Any) -> None:
     one = make.act(make.group(make.maneuver(make.event("one", task(9)))), stop=[NO, YES], name="first")
     two = make.act(make.group(make.maneuver(make.event("two", task(9)))), name="second")
     ticks = play(clock, make.storyboard(one, two), 3)
@@ -128,9 +128,7 @@ def test_an_act_is_stopped_alone_from_the_tick_after_its_start(clock: Any, make:
 
 @pytest.mark.element("priority overwrite", "priority override")
 @pytest.mark.parametrize("priority", ["override", "overwrite"])
-def test_override_stops_the_running_events_of_its_maneuver_only(
-    clock: Any, make: Any, task: Any, priority: str
-) -> None:
+def test_override_stops_running_events_of_its_maneuver_only(clock: Any, make: Any, task: Any, priority: str) -> None:
     old, new = make.event("old", task(9)), make.event("new", task(1), start=[NO, YES], priority=priority)
     other = make.maneuver(make.event("other", task(9)))
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new), other))), 2)
@@ -139,9 +137,7 @@ def test_override_stops_the_running_events_of_its_maneuver_only(
 
 
 @pytest.mark.element("priority override")
-def test_who_is_overridden_is_complete_however_often_it_might_have_been_executed(
-    clock: Any, make: Any, task: Any
-) -> None:
+def test_overridden_event_is_complete_with_executions_left(clock: Any, make: Any, task: Any) -> None:
     old = make.event("old", task(9), start=[YES], limit=3)
     new = make.event("new", task(1), start=[NO, YES], priority="override")
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new)))), 3)
@@ -151,7 +147,7 @@ def test_who_is_overridden_is_complete_however_often_it_might_have_been_executed
 
 
 @pytest.mark.element("priority skip")
-def test_a_skipped_start_is_one_of_the_executions(clock: Any, make: Any, task: Any) -> None:
+def test_skipped_start_counts_as_execution(clock: Any, make: Any, task: Any) -> None:
     running = make.event("running", task(2))
     shy = make.event("shy", task(1), start=[NO, YES, YES], priority="skip", limit=2)
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(running, shy)))), 4)
@@ -161,7 +157,7 @@ def test_a_skipped_start_is_one_of_the_executions(clock: Any, make: Any, task: A
 
 
 @pytest.mark.element("priority skip")
-def test_a_skipped_event_without_executions_left_is_complete(clock: Any, make: Any, task: Any) -> None:
+def test_skipped_event_without_executions_left_is_complete(clock: Any, make: Any, task: Any) -> None:
     running = make.event("running", task(2))
     shy = make.event("shy", task(1), start=[NO, YES], priority="skip")
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(running, shy)))), 3)
@@ -170,7 +166,7 @@ def test_a_skipped_event_without_executions_left_is_complete(clock: Any, make: A
     assert ticks[2][:3] == ["running.0 end", "running end", "maneuver end"]
 
 
-def test_what_may_never_be_executed_is_skipped_at_once(clock: Any, make: Any, task: Any) -> None:
+def test_element_with_execution_count_zero_is_skipped(clock: Any, make: Any, task: Any) -> None:
     never, other = make.event("never", task(1), limit=0), make.event("other", task(1))
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(never, other)))), 2)
     assert "never skip" in ticks[0]
@@ -180,14 +176,14 @@ def test_what_may_never_be_executed_is_skipped_at_once(clock: Any, make: Any, ta
 
 
 @pytest.mark.element("priority parallel")
-def test_parallel_lets_others_run(clock: Any, make: Any, task: Any) -> None:
+def test_parallel_event_does_not_stop_others(clock: Any, make: Any, task: Any) -> None:
     old, new = make.event("old", task(9)), make.event("new", task(9), start=[NO, YES])
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new)))), 2)
     assert ticks[1] == ["new start", "new.0 start"]
 
 
 @pytest.mark.element("Event maximumExecutionCount")
-def test_an_event_is_executed_as_often_as_it_may(clock: Any, make: Any, task: Any) -> None:
+def test_event_is_executed_up_to_its_execution_count(clock: Any, make: Any, task: Any) -> None:
     event = make.event("event", task(1), start=[NO, YES], limit=2)
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 4)
     assert ticks[1] == ["event start", "event.0 start"]
@@ -197,7 +193,7 @@ def test_an_event_is_executed_as_often_as_it_may(clock: Any, make: Any, task: An
 
 
 @pytest.mark.element("ManeuverGroup maximumExecutionCount")
-def test_a_group_that_is_executed_again_starts_all_below_anew(clock: Any, make: Any, task: Any) -> None:
+def test_repeated_group_restarts_its_children(clock: Any, make: Any, task: Any) -> None:
     doing = task(1)
     group = make.group(make.maneuver(make.event("event", doing)), limit=3)
     ticks = play(clock, make.storyboard(make.act(group)), 4)
@@ -207,21 +203,21 @@ def test_a_group_that_is_executed_again_starts_all_below_anew(clock: Any, make: 
     assert ticks[3][-1] == "storyboard end"
 
 
-def test_what_has_no_children_runs_until_it_is_stopped(clock: Any, make: Any) -> None:
+def test_element_without_children_runs_until_stopped(clock: Any, make: Any) -> None:
     group = make.group()
     ticks = play(clock, make.storyboard(make.act(group), stop=[NO, NO, YES]), 3)
     assert ticks[1] == []
     assert ticks[2] == ["group stop", "act stop", "story stop", "storyboard stop"]
 
 
-def test_with_a_stop_trigger_the_storyboard_outlives_its_stories(clock: Any, make: Any, task: Any) -> None:
+def test_storyboard_with_stop_trigger_continues_after_its_stories(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(1))))), stop=[NO])
     assert play(clock, root, 2)[1][-1] == "story end"
     assert root.state.name == "RUNNING"
 
 
 @pytest.mark.element("conflicting actions")
-def test_a_younger_action_ends_an_older_one_on_the_same_domain(clock: Any, make: Any, task: Any) -> None:
+def test_later_action_preempts_action_on_the_same_domain(clock: Any, make: Any, task: Any) -> None:
     slow = make.event("slow", task(9, actor="A", domain=Domain.LONGITUDINAL))
     aside = make.event("aside", task(9, actor="A", domain=Domain.LATERAL))
     other = make.event("other", task(9, actor="B", domain=Domain.LONGITUDINAL))
@@ -230,7 +226,7 @@ def test_a_younger_action_ends_an_older_one_on_the_same_domain(clock: Any, make:
     assert ticks[1] == ["fast start", "fast.0 start", "slow.0 stop", "slow end"]
 
 
-def test_who_is_displaced_in_the_step_that_would_bring_it_to_its_goal_does_not_end_but_stops(
+def test_action_preempted_in_its_last_step_stops_instead_of_ending(
     clock: Any, make: Any, task: Any, context: Any
 ) -> None:
     slow = make.event("slow", task(2, actor="A", domain=Domain.LATERAL))
@@ -240,7 +236,7 @@ def test_who_is_displaced_in_the_step_that_would_bring_it_to_its_goal_does_not_e
     assert ticks[2] == []
 
 
-def test_an_action_for_two_actors_ends_with_the_later_one(clock: Any, make: Any, task: Any) -> None:
+def test_action_of_two_actors_ends_with_the_later_one(clock: Any, make: Any, task: Any) -> None:
     action = make.action("action", task(1, actor="A"), task(2, actor="B"))
     event = EventElement(make.context, ("event",), [action], priority="parallel")
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 3)
@@ -249,7 +245,7 @@ def test_an_action_for_two_actors_ends_with_the_later_one(clock: Any, make: Any,
 
 
 @pytest.mark.element("conflicting actions")
-def test_an_init_action_gives_way_too(clock: Any, make: Any, task: Any, context: Any) -> None:
+def test_init_action_is_preempted(clock: Any, make: Any, task: Any, context: Any) -> None:
     init = InitBlock(context, [task(9, actor="A", domain=Domain.LONGITUDINAL)])
     init.start()
     event = make.event("event", task(9, actor="A", domain=Domain.LONGITUDINAL))
@@ -257,7 +253,7 @@ def test_an_init_action_gives_way_too(clock: Any, make: Any, task: Any, context:
     assert init.running == []
 
 
-def test_a_removed_actor_ends_what_it_was_doing(clock: Any, make: Any, task: Any, context: Any) -> None:
+def test_removed_actor_stops_its_actions(clock: Any, make: Any, task: Any, context: Any) -> None:
     event = make.event("event", task(9, actor="A", domain=Domain.LATERAL))
     root = make.storyboard(make.act(make.group(make.maneuver(event))))
     play(clock, root, 1)

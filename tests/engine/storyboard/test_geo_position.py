@@ -1,4 +1,4 @@
-"""Places on the globe: a street along the middle meridian of a UTM zone, and one above another."""
+"""Geographic positions on a road along the central meridian of a UTM zone, with another road above it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NORTHING = 5_316_300.0
 
 @pytest.fixture
 def globe(context: RuntimeContext) -> RuntimeContext:
-    """A street to the north from about (0, 0), z = 10, below another one, z = 17, in shifted coordinates."""
+    """Road to the north from about (0, 0) at z = 10, below another one at z = 17, in shifted coordinates."""
     road = """<road name="" length="400" id="{number}" junction="-1"><link/>
       <planView><geometry s="0" x="0" y="0" hdg="1.5707963267948966" length="400"><line/></geometry></planView>
       <elevationProfile><elevation s="0" a="{z}" b="0" c="0" d="0"/></elevationProfile>
@@ -39,8 +39,8 @@ def at(context: Any, **frame: Any) -> tuple[Pose, Any]:
 
 
 @pytest.mark.element("GeoPosition")
-def test_a_meter_on_the_globe_is_a_meter_on_the_street(globe: RuntimeContext) -> None:
-    """On the middle meridian x is the false easting, and the map is smaller than the globe by 0.9996."""
+def test_geographic_distance_equals_distance_on_the_road(globe: RuntimeContext) -> None:
+    """On the central meridian x is the false easting, and the scale factor is 0.9996."""
     first, location = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     assert first.x == pytest.approx(4.0, abs=1e-6)
     assert (location.road, location.lane) == ("1", -1)
@@ -58,20 +58,22 @@ def test_missing_and_relative_angles_refer_to_the_lane(globe: RuntimeContext) ->
     assert at(globe, **place, orientation=absolute)[0].h == pytest.approx(0.3)
 
 
-def test_the_ground_the_level_or_the_altitude_say_how_high(globe: RuntimeContext) -> None:
+def test_height_follows_ground_level_or_altitude(globe: RuntimeContext) -> None:
     place = {"latitude_deg": LATITUDE, "longitude_deg": 9.0}
     assert at(globe, **place)[0].z == pytest.approx(10.0)
     pose, location = at(globe, **place, vertical_road_selection=1)
-    assert (pose.z, location.road) == (pytest.approx(17.0), "2")
+    assert location.road == "2"
+    assert pose.z == pytest.approx(17.0)
     pose, location = at(globe, **place, altitude=118.0)
-    assert (pose.z, location.road) == (pytest.approx(18.0), "2")
+    assert location.road == "2"
+    assert pose.z == pytest.approx(18.0)
     assert at(globe, **place, height=111.0)[0].z == pytest.approx(11.0)
     with pytest.raises(ScenarioError, match="road level does not exist; got 2; expected 0 to 1"):
         at(globe, **place, vertical_road_selection=2)
 
 
 @pytest.mark.element("GeoPosition")
-def test_before_1_2_angles_are_radians_and_degrees_are_recognized(globe: RuntimeContext) -> None:
+def test_angles_before_version_1_2_are_radians_or_recognized_degrees(globe: RuntimeContext) -> None:
     expected, _ = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     old, _ = at(globe, latitude=math.radians(LATITUDE), longitude=math.radians(9.0))
     assert old[:3] == pytest.approx(expected[:3], abs=1e-6)
@@ -81,21 +83,22 @@ def test_before_1_2_angles_are_radians_and_degrees_are_recognized(globe: Runtime
     assert "are read as degrees" in str(globe.warnings[0])
 
 
-def test_a_latitude_beyond_the_pole(globe: RuntimeContext) -> None:
+def test_invalid_or_missing_latitude_is_rejected(globe: RuntimeContext) -> None:
     with pytest.raises(ScenarioError, match="latitudes within"):
         at(globe, latitude_deg=91.0, longitude_deg=9.0)
     with pytest.raises(ScenarioError, match="latitude or longitude is missing"):
         at(globe, latitude_deg=48.0)
 
 
-def test_a_place_far_from_all_roads_is_still_a_place(globe: RuntimeContext) -> None:
+def test_position_far_from_roads_is_resolved(globe: RuntimeContext) -> None:
     pose, location = at(globe, latitude_deg=48.1, longitude_deg=9.0)
     assert location is None
-    assert (pose.x, pose.z, pose.h) == (pytest.approx(4.0, abs=1e-6), 0.0, 0.0)
+    assert pose.x == pytest.approx(4.0, abs=1e-6)
+    assert (pose.z, pose.h) == (0.0, 0.0)
 
 
-def test_a_file_of_1_1_with_radians_loads() -> None:
-    """The attributes of that version are required there; those of today are unknown to it."""
+def test_file_of_version_1_1_with_radians_loads() -> None:
+    """Version 1.1 requires its own attributes and does not define later ones."""
     frame = '<GeoPosition latitude="0.8" longitude="0.1" height="3"/>'
     text = f"""<OpenSCENARIO>
       <FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" description="x" author="y"/>

@@ -13,7 +13,7 @@ from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnal
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.openscenario.validation.storyboard_names import ReferenceMatch, is_suffix
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.tree.elements import StoryElement
+from eidrive_scenario.storyboard.state.states import ElementState
 from eidrive_scenario.storyboard.tree.events import EventElement
 
 FILE = """<OpenSCENARIO>
@@ -33,7 +33,7 @@ BEHIND = """<StoryboardElementStateCondition storyboardElementType="event" story
 
 
 def chain(length: int, order: Callable[[list[int]], Any], reference: str = "event {}") -> bytes:
-    """Each event starts by the end of the one before; written down in some order."""
+    """Return events of which each starts by the end of the previous one, in a given order."""
     conditions = [AT.format(time=0.5), *(BEHIND.format(reference=reference.format(n)) for n in range(length - 1))]
     events = [EVENT.format(number=n, priority="parallel", condition=conditions[n]) for n in range(length)]
     return FILE.format(events="".join(events[number] for number in order(list(range(length))))).encode()
@@ -44,27 +44,35 @@ def zigzag(numbers: list[int]) -> list[int]:
 
 
 @pytest.mark.parametrize("order", [list, reversed, zigzag])
-def test_times_of_a_chain_are_found_by_looking_at_each_link_a_few_times(
+def test_interval_analysis_of_chain_has_linear_cost(
     monkeypatch: pytest.MonkeyPatch, order: Callable[[list[int]], Any]
 ) -> None:
-    looked = []
+    looked: list[Any] = []
     advance = ReachabilityAnalysis._advance
-    monkeypatch.setattr(ReachabilityAnalysis, "_advance", lambda self, node: looked.append(node) or advance(self, node))
+
+    def counted(self: ReachabilityAnalysis, node: Any) -> Any:
+        looked.append(node)
+        return advance(self, node)
+
+    monkeypatch.setattr(ReachabilityAnalysis, "_advance", counted)
     outline = Outline(load_scenario(chain(60, order)))
     reach = ReachabilityAnalysis(outline)
     assert all(reach.start[node] == pytest.approx(0.5, abs=1e-5) for node in outline.nodes if "event" in node.path[-1])
     assert len(looked) < 6 * len(outline.nodes)
 
 
-def test_an_event_that_overrides_asks_nobody_who_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_overriding_event_reads_running_events_only(monkeypatch: pytest.MonkeyPatch) -> None:
     events = "".join(
         EVENT.format(number=n, priority="override", condition=AT.format(time=0.01 * n)) for n in range(200)
     )
     scenario = load_scenario(FILE.format(events=events).encode())
-    asked = []
-    state = StoryElement.state.fget
-    assert state is not None
-    monkeypatch.setattr(EventElement, "state", property(lambda self: asked.append(1) or state(self)))
+    asked: list[EventElement] = []
+
+    def counted(self: EventElement) -> ElementState | None:
+        asked.append(self)
+        return self.record.state
+
+    monkeypatch.setattr(EventElement, "state", property(counted))
     with Simulation(scenario, settings=RunSettings(dt=1.0)) as simulation:
         simulation.tick()
         simulation.tick()
@@ -74,7 +82,7 @@ def test_an_event_that_overrides_asks_nobody_who_rests(monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("reference", ["event {}", "maneuver::event {}", "act/event {}", "story::group/event {}"])
-def test_references_may_leave_levels_out_and_be_written_with_slashes(reference: str) -> None:
+def test_reference_may_omit_levels_and_use_slashes(reference: str) -> None:
     with Simulation(load_scenario(chain(3, list, reference)), settings=RunSettings(dt=0.5)) as simulation:
         end = None
         while end is None:
@@ -84,7 +92,7 @@ def test_references_may_leave_levels_out_and_be_written_with_slashes(reference: 
         assert simulation.storyboard.context.variables["Count"] == "3"
 
 
-def test_what_a_reference_means_is_found_as_by_trying_all() -> None:
+def test_reference_match_equals_exhaustive_search() -> None:
     names = ["a", "b", "a/b", "b::a", "a::", ""]
     paths = [tuple(path) for length in (1, 2, 3) for path in product(names, repeat=length)]
     meant = ReferenceMatch((path, path) for path in paths)

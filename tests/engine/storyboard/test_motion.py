@@ -1,4 +1,4 @@
-"""Scripted motion, by hand: on the street (lane -1 along y = -2 towards +x, lane 1 along y = 2 towards -x)."""
+"""Scripted motion with values by hand: lane -1 along y = -2 towards +x, lane 1 along y = 2 towards -x."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def on_lane(roads: Any, lane: Any, s: Any, *, heading: Any = 0.0, offset: Any = 
     return motion
 
 
-def test_without_roads_it_goes_straight_on() -> None:
+def test_motion_without_roads_is_straight() -> None:
     motion = Motion(None)
     motion.teleport(ResolvedPosition(Pose(1.0, 2.0, 0.5, math.pi / 2, 0.0, 0.0)))
     motion.initialize()
@@ -29,7 +29,7 @@ def test_without_roads_it_goes_straight_on() -> None:
     assert (placement.x, placement.y, placement.z) == pytest.approx((1.0, 3.0, 0.5))
 
 
-def test_the_next_view_shows_a_teleported_actor_where_it_was_put() -> None:
+def test_teleported_actor_is_at_its_position_in_the_next_view() -> None:
     motion = Motion(None)
     motion.teleport(ResolvedPosition(Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
     motion.set_speed(10.0)
@@ -47,7 +47,7 @@ def test_the_next_view_shows_a_teleported_actor_where_it_was_put() -> None:
         (-1, 0.0, -10.0, 99.0, 0.0),
     ],
 )
-def test_it_follows_its_lane_where_it_points(
+def test_actor_follows_its_lane_in_its_direction(
     street: Any, lane: Any, heading: Any, speed: Any, x: Any, yaw: Any
 ) -> None:
     motion = on_lane(street, lane, 100.0, heading=heading)
@@ -58,7 +58,7 @@ def test_it_follows_its_lane_where_it_points(
     assert placement.y == pytest.approx(2.0 if lane > 0 else -2.0)
 
 
-def test_in_a_bend_speed_is_that_of_the_actor_and_not_of_the_reference_line(bend: Any) -> None:
+def test_speed_in_bend_is_that_of_the_actor(bend: Any) -> None:
     """Lane -1 is a circle of 52 m: 10 m are 10/52 rad of it."""
     motion = on_lane(bend, -1, 0.0)
     motion.set_speed(10.0)
@@ -71,7 +71,7 @@ def test_in_a_bend_speed_is_that_of_the_actor_and_not_of_the_reference_line(bend
     assert not placement.across, "it goes where it points, although the chord of a step points elsewhere"
 
 
-def test_it_stops_where_the_road_ends(street: Any) -> None:
+def test_actor_stops_at_the_end_of_the_road(street: Any) -> None:
     motion = on_lane(street, -1, 199.5)
     motion.set_speed(10.0)
     placement = motion.step(0.1)
@@ -100,7 +100,7 @@ def section(s: int, number: int, link: str = "") -> str:
 def test_step_beyond_the_end_of_a_lane_stops_there(
     sections: str, lane: int, start: float, speed: float, end: float
 ) -> None:
-    """Lanes that end inside their road, and one that has another number in the last section before the road's end."""
+    """Lanes that end inside their road, and a lane with another id in the last section."""
     text = f"""<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="200" id="1" junction="-1"><link/>
       <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
       <lanes>{sections}</lanes></road></OpenDRIVE>"""
@@ -113,8 +113,8 @@ def test_step_beyond_the_end_of_a_lane_stops_there(
 
 
 @pytest.mark.parametrize(("lane", "y"), [(-1, -1.4), (1, 1.4)])
-def test_steering_moves_left_of_the_lane_and_takes_its_share_of_the_way(street: Any, lane: Any, y: Any) -> None:
-    """0.6 m to the left and 0.8 m along make the 1 m that the speed covers."""
+def test_lateral_step_moves_left_and_shortens_the_distance(street: Any, lane: Any, y: Any) -> None:
+    """Steps of 0.6 m to the left and 0.8 m along the lane are 1 m in total."""
     motion = on_lane(street, lane, 100.0)
     motion.set_speed(10.0)
     motion.set_lateral_step(LateralStep(0.6))
@@ -125,7 +125,7 @@ def test_steering_moves_left_of_the_lane_and_takes_its_share_of_the_way(street: 
     assert math.sin(placement.yaw - along) == pytest.approx(0.6)
 
 
-def test_a_place_may_be_expressed_by_the_oncoming_lane(street: Any) -> None:
+def test_reference_lane_may_be_the_oncoming_lane(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     assert motion.set_reference_lane(1).offset == pytest.approx(-4.0)
     assert motion.direction == -1
@@ -133,7 +133,7 @@ def test_a_place_may_be_expressed_by_the_oncoming_lane(street: Any) -> None:
     assert motion.step(0.1).x == pytest.approx(101.0)
 
 
-def test_who_points_across_the_road_walks_across_it(street: Any) -> None:
+def test_actor_pointing_across_the_road_crosses_it(street: Any) -> None:
     motion = on_lane(street, -1, 100.0, heading=math.pi / 2)
     motion.set_speed(2.0)
     for _ in range(10):
@@ -141,7 +141,7 @@ def test_who_points_across_the_road_walks_across_it(street: Any) -> None:
     assert (placement.x, placement.y) == pytest.approx((100.0, 0.0), abs=1e-9)
 
 
-def test_after_a_free_pose_it_looks_for_its_lane(street: Any) -> None:
+def test_actor_snaps_to_its_lane_after_free_pose(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     motion.set_speed(10.0)
     motion.move_to(Pose(120.0, -6.5, 0.0, 0.0, 0.0, 0.0), land=True)
@@ -151,7 +151,7 @@ def test_after_a_free_pose_it_looks_for_its_lane(street: Any) -> None:
     assert motion.location.lane == -2
 
 
-def test_who_is_carried_along_moves_by_that_distance_in_one_step(street: Any) -> None:
+def test_move_along_lane_covers_the_distance_in_one_step(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     motion.set_speed(10.0)
     motion.move_along_lane(4.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ JOINED = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
     contactPoint="end"/></link>
     <planView><geometry s="0" x="200" y="0" hdg="0" length="200"><line/></geometry></planView>
     <lanes><laneSection s="0">{third}</laneSection></lanes></road></OpenDRIVE>"""
-"""Two roads in a row; the first one has two lane sections."""
+"""Two connected roads; the first one has two lane sections."""
 
 
 def right(*widths: float, link: str = "") -> str:
@@ -110,7 +111,7 @@ def relative(h: Any) -> Any:
         (model.RelativeLanePosition(entity_ref="B", d_lane=1, ds=10, offset=0.5), 90, -1.5, 0.0),
     ],
 )
-def test_frames(on_street: Any, frame: Any, x: Any, y: Any, h: Any) -> None:
+def test_position_types_resolve_to_expected_pose(on_street: Any, frame: Any, x: Any, y: Any, h: Any) -> None:
     names = {
         model.WorldPosition: "world_position",
         model.RelativeWorldPosition: "relative_world_position",
@@ -145,7 +146,7 @@ def waypoint(lane: Any, s: Any) -> Any:
         ({"from_current_entity": model.PositionOfCurrentEntity(entity_ref="A")}, 50, -2),
     ],
 )
-def test_a_route_position_counts_from_the_first_waypoint(on_street: Any, within: Any, x: Any, y: Any) -> None:
+def test_route_position_counts_from_the_first_waypoint(on_street: Any, within: Any, x: Any, y: Any) -> None:
     route = model.Route(closed=False, name="way", waypoint=(waypoint(-1, 10.0), waypoint(-1, 100.0)))
     frame = model.RoutePosition(
         route_ref=model.RouteRef(route=route), in_route_position=model.InRoutePosition(**within)
@@ -154,7 +155,7 @@ def test_a_route_position_counts_from_the_first_waypoint(on_street: Any, within:
 
 
 @pytest.mark.element("TrajectoryPosition")
-def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: Any) -> None:
+def test_trajectory_position_has_s_and_t_of_the_trajectory(on_street: Any) -> None:
     corners = tuple(
         model.Vertex(position=model.Position(world_position=model.WorldPosition(x=x, y=y)))
         for x, y in ((0, 50), (0, 90))
@@ -174,18 +175,20 @@ def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: A
         ({"geo_position": model.GeoPosition(latitude_deg=1, longitude_deg=2)}, "has no geoReference; add"),
     ],
 )
-def test_a_place_that_is_not_there_is_an_error(on_street: Any, frame: Any, text: Any) -> None:
+def test_unresolvable_position_is_rejected(on_street: Any, frame: Any, text: Any) -> None:
     with pytest.raises(ScenarioError, match=text):
         resolve_position(model.Position(**frame), on_street)
 
 
-def test_beyond_the_end_of_a_road_its_end_is_meant(on_street: Any) -> None:
+def test_position_beyond_road_end_is_limited_with_warning(on_street: Any) -> None:
     frame = model.LanePosition(road_id="1", lane_id="-1", s=300)
-    assert resolve_position(model.Position(lane_position=frame), on_street).location.s == 200.0
+    location = resolve_position(model.Position(lane_position=frame), on_street).location
+    assert location is not None
+    assert location.s == 200.0
     assert "got s = 300; expected 0 to 200.00" in str(on_street.warnings[-1])
 
 
-def test_nobody_is_placed_beside_who_is_not_there(on_street: Any) -> None:
+def test_position_relative_to_absent_entity_raises_error(on_street: Any) -> None:
     on_street.remove_actor("B")
     with pytest.raises(EntityAbsentError):
         resolve_position(
@@ -196,7 +199,7 @@ def test_nobody_is_placed_beside_who_is_not_there(on_street: Any) -> None:
 @pytest.mark.parametrize(
     ("lane", "steps", "target"), [(-1, 1, 1), (1, -1, -1), (-2, 1, -1), (-2, 3, 2), (2, -3, -2), (-1, 0, -1)]
 )
-def test_counting_lanes_leaves_out_the_one_that_is_none(lane: Any, steps: Any, target: Any) -> None:
+def test_lane_count_skips_lane_zero(lane: Any, steps: Any, target: Any) -> None:
     assert count_lanes(lane, steps) == target
 
 
@@ -215,15 +218,13 @@ def test_counting_lanes_leaves_out_the_one_that_is_none(lane: Any, steps: Any, t
         ("entity", "euclidianDistance", True, math.hypot(22, 2)),
     ],
 )
-def test_distances_from_a_to_b_who_comes_towards(
-    on_street: Any, frame: Any, kind: Any, freespace: Any, expected: Any
-) -> None:
+def test_distances_to_oncoming_actor(on_street: Any, frame: Any, kind: Any, freespace: Any, expected: Any) -> None:
     """Both reach 4 m ahead of their reference point, 1 m behind it and 1 m to each side."""
     found = distance(on_street, "A", "B", frame=frame, kind=kind, freespace=freespace)
     assert found == pytest.approx(expected)
 
 
-def test_behind_and_right_are_negative(on_street: Any) -> None:
+def test_distances_behind_and_right_are_negative(on_street: Any) -> None:
     here = on_street.roads.location("1", -2, 20.0)
     on_street.add_actor("B", ResolvedPosition(on_street.roads.pose(here), here))
     assert distance(on_street, "A", "B", frame="road", kind="longitudinal", freespace=False) == pytest.approx(-30.0)
@@ -231,23 +232,23 @@ def test_behind_and_right_are_negative(on_street: Any) -> None:
     assert distance(on_street, "A", "B", frame="road", kind="longitudinal", freespace=True) == pytest.approx(-25.0)
 
 
-def test_boxes_side_by_side_leave_no_gap_along(on_street: Any) -> None:
+def test_boxes_side_by_side_have_no_longitudinal_free_space(on_street: Any) -> None:
     on_street.add_actor("B", ResolvedPosition(Pose(52.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
     assert distance(on_street, "A", "B", frame="entity", kind="longitudinal", freespace=True) == 0.0
 
 
-def test_a_straight_distance_is_one_in_space(on_street: Any) -> None:
+def test_euclidean_distance_is_three_dimensional(on_street: Any) -> None:
     """B on a bridge 8 m above the street, 6 m beside A: 10 m; boxes 2 m wide and 1.5 m high leave 4 m and 6.5 m."""
     on_street.add_actor("B", ResolvedPosition(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0)))
-    straight = {"frame": "entity", "kind": "euclidianDistance"}
-    assert distance(on_street, "A", "B", freespace=False, **straight) == pytest.approx(10.0)
-    assert distance(on_street, "A", "B", freespace=True, **straight) == pytest.approx(math.hypot(4.0, 6.5))
+    straight = partial(distance, on_street, "A", frame="entity", kind="euclidianDistance")
+    assert straight("B", freespace=False) == pytest.approx(10.0)
+    assert straight("B", freespace=True) == pytest.approx(math.hypot(4.0, 6.5))
     above = ResolvedPosition(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0))
-    assert distance(on_street, "A", above, freespace=False, **straight) == pytest.approx(10.0)
-    assert distance(on_street, "A", above, freespace=True, **straight) == pytest.approx(math.hypot(5.0, 6.5))
+    assert straight(above, freespace=False) == pytest.approx(10.0)
+    assert straight(above, freespace=True) == pytest.approx(math.hypot(5.0, 6.5))
 
 
-def test_in_a_bend_the_road_is_longer_than_the_sight(context: Any, bend: Any) -> None:
+def test_road_distance_in_bend_exceeds_euclidean_distance(context: Any, bend: Any) -> None:
     """A quarter circle of the reference line's 50 m lies between the two; both drive in lane -1, a circle of 52 m."""
     made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
     for name, s in (("A", 0.0), ("B", 25 * math.pi)):
@@ -269,7 +270,7 @@ def test_in_a_bend_the_road_is_longer_than_the_sight(context: Any, bend: Any) ->
         ("entity", "euclidianDistance", (20.0 - 8.0) * math.cos(0.6)),
     ],
 )
-def test_in_a_bend_two_come_nearer_as_their_distance_is_measured(
+def test_closing_speed_in_bend_follows_the_measured_distance(
     context: Any, bend: Any, frame: str, kind: str, expected: float
 ) -> None:
     """A drives 20 m/s at the start of the bend, B 8 m/s after 60 m of road (1.2 rad); 52 m of lane are 50 m of road."""

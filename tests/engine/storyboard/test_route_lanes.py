@@ -1,4 +1,4 @@
-"""Scripted actors change lanes where their route asks for it, and nowhere else."""
+"""Lane changes of scripted actors that their route requires."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def link(tag: str, number: str) -> str:
 
 @pytest.fixture
 def fork() -> RoadNetwork:
-    """Road a, 200 m along x: lane -1 goes straight on to b, lane -2 turns right to c."""
+    """Road a, 200 m along x: lane -1 continues straight to b, lane -2 turns right to c."""
     connections = "".join(
         f'<connection id="{name}" incomingRoad="a" connectingRoad="{name}" contactPoint="start">'
         f'<laneLink from="{number}" to="-1"/></connection>'
@@ -91,7 +91,7 @@ def driven(motion: Motion, seconds: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("s", [20.0, 185.0], ids=["far before the fork", "close before it"])
-def test_it_changes_to_the_lane_that_leads_to_the_next_road(fork: RoadNetwork, s: float) -> None:
+def test_actor_changes_to_the_lane_of_its_route(fork: RoadNetwork, s: float) -> None:
     motion = on_its_way(fork, -1, s, "c")
     track = driven(motion, (200.0 - s + TURN + 30.0) / 20.0)
     assert motion.location is not None
@@ -107,7 +107,7 @@ def test_it_changes_to_the_lane_that_leads_to_the_next_road(fork: RoadNetwork, s
 
 
 @pytest.mark.parametrize(("start", "destination", "y"), [(-1, "b", -2.0), (-2, "c", -6.0)])
-def test_it_keeps_a_lane_that_leads_on(fork: RoadNetwork, start: int, destination: str, y: float) -> None:
+def test_actor_keeps_lane_that_continues_the_route(fork: RoadNetwork, start: int, destination: str, y: float) -> None:
     motion = on_its_way(fork, start, 20.0, destination)
     track = driven(motion, 8.9)
     assert track[:, 1] == pytest.approx(np.full(len(track), y))
@@ -116,17 +116,18 @@ def test_it_keeps_a_lane_that_leads_on(fork: RoadNetwork, start: int, destinatio
     assert motion.location.road == destination
 
 
-def test_who_is_steered_by_an_action_is_left_alone(fork: RoadNetwork) -> None:
+def test_lateral_action_suppresses_lane_change_of_route(fork: RoadNetwork) -> None:
     motion = on_its_way(fork, -1, 20.0, "c")
     for _ in range(230):
         motion.set_lateral_step(LateralStep(0.5))
         motion.step(0.05)
     assert motion.location is not None
-    assert (motion.location.road, motion.pose.y) == ("b", pytest.approx(-1.5))
+    assert motion.location.road == "b"
+    assert motion.pose.y == pytest.approx(-1.5)
 
 
-def test_who_is_put_elsewhere_begins_no_change_there(fork: RoadNetwork) -> None:
-    """The change before the fork is over where it was; on a road that the route does not pass, none is known."""
+def test_teleport_ends_lane_change_of_route(fork: RoadNetwork) -> None:
+    """The lane change before the junction ends; on a road outside of the route there is none."""
     motion = on_its_way(fork, -1, 170.0, "c")
     assert driven(motion, 0.5)[-1, 1] < -2.0
     for road_id, s in (("a", 20.0), ("b", 80.0)):

@@ -54,7 +54,7 @@ def course(found: Signals, times: list[float], name: str = "c1") -> list[str | N
     return shown
 
 
-def test_phases_follow_each_other_and_begin_again() -> None:
+def test_phases_are_cyclic() -> None:
     found = signals(controller(*CYCLE))
     assert course(found, [0, 9.95, 10, 12.95, 13, 19.95, 20, 29.95, 30, 193]) == [
         *("go", "go", "caution", "caution", "stop", "stop", "go", "go", "caution", "stop")
@@ -62,13 +62,13 @@ def test_phases_follow_each_other_and_begin_again() -> None:
     assert found.state("7") == "red"
 
 
-def test_phases_change_in_the_tick_of_their_time_though_ticks_are_no_binary_numbers() -> None:
+def test_phases_change_in_their_tick_despite_rounding() -> None:
     found = signals(controller(*(phase(f"p{number}", 0.1) for number in range(3))))
     assert course(found, [tick * 0.1 for tick in range(3000)]) == [f"p{tick % 3}" for tick in range(3000)]
 
 
 @pytest.mark.element("TrafficSignalController")
-def test_who_refers_to_another_is_behind_it_from_the_start() -> None:
+def test_delayed_controller_follows_its_reference_from_the_start() -> None:
     found = signals(controller(*CYCLE), controller(*CYCLE, name="c2", reference="c1", delay=5))
     assert course(found, [0, 4.95, 5, 14.95, 15, 18, 25], "c2") == [
         *("stop", "stop", "go", "go", "caution", "stop", "go")
@@ -81,7 +81,7 @@ def test_who_refers_to_another_is_behind_it_from_the_start() -> None:
     assert course(chain, [0, 5, 15], "c3") == ["stop", "go", "caution"]
 
 
-def test_an_action_begins_a_phase_and_the_cycle_goes_on_from_there() -> None:
+def test_action_starts_a_phase_and_the_cycle_continues() -> None:
     found = signals(controller(*CYCLE), controller(*SILENT, name="c2", reference="c1", delay=5))
     found.advance(0.0)
     found.set_phase("c1", "stop", 4.0)
@@ -94,7 +94,7 @@ def test_an_action_begins_a_phase_and_the_cycle_goes_on_from_there() -> None:
     assert course(found, [31], "c1") == ["go"]
 
 
-def test_a_phase_without_end_stays() -> None:
+def test_phase_without_end_is_kept() -> None:
     endless = (phase("go", 2), phase("dark", math.inf), phase("never", 1))
     found = signals(controller(*endless), controller(*endless, name="late", reference="c1", delay=3))
     assert course(found, [0, 2, 1e6]) == ["go", "dark", "dark"]
@@ -103,13 +103,13 @@ def test_a_phase_without_end_stays() -> None:
     assert course(found, [7.5, 8, 10]) == ["never", "go", "dark"]
 
 
-def test_phases_of_no_length_are_passed_over() -> None:
+def test_phases_without_duration_are_skipped() -> None:
     found = signals(controller(phase("none", 0), phase("go", 2), phase("nothing", 0)))
     assert course(found, [0, 1, 2, 3]) == ["go"] * 4
     assert course(signals(controller(phase("a", 0), phase("b", 0))), [0, 5]) == ["a", "a"]
 
 
-def test_what_is_set_by_hand_holds_until_the_next_phase() -> None:
+def test_state_set_by_action_holds_until_the_next_phase() -> None:
     found = signals(controller(*CYCLE))
     found.advance(0.0)
     found.set_state("7", "flashing")
@@ -119,7 +119,7 @@ def test_what_is_set_by_hand_holds_until_the_next_phase() -> None:
     assert found.state("7") == "yellow"
 
 
-def test_a_group_is_what_the_road_network_says_and_single_signals_win() -> None:
+def test_group_state_holds_for_its_signals_unless_set_individually() -> None:
     roads = RoadNetwork.parse(ROAD)
     found = signals(controller(phase("go", 5, group="green", s8="red")), roads=roads)
     found.advance(0.0)
@@ -135,7 +135,7 @@ def test_a_group_is_what_the_road_network_says_and_single_signals_win() -> None:
     assert old.states == {"7": "red;off", "8": "red;off"}
 
 
-def test_the_states_are_one_object_until_something_changes() -> None:
+def test_states_are_the_same_object_without_a_change() -> None:
     found = signals(controller(*CYCLE))
     found.advance(0.0)
     before = found.states
@@ -146,8 +146,8 @@ def test_the_states_are_one_object_until_something_changes() -> None:
     assert (found.states["7"], before["7"]) == ("red", "green")
 
 
-def test_signals_by_the_spellings_of_scenario_runner() -> None:
-    """CARLA's y points to the right: the signal at (50, -5) stands at 50,5 there."""
+def test_signal_names_of_scenario_runner_are_resolved() -> None:
+    """The y axis of CARLA points to the right: the signal at (50, -5) has the coordinates 50,5."""
     found = signals(roads=RoadNetwork.parse(ROAD))
     assert found.identify("id=8") == "8"
     assert found.identify("pos=50.5,4.0") == "7"
@@ -159,7 +159,7 @@ def test_signals_by_the_spellings_of_scenario_runner() -> None:
     assert not found.must_stop("8")
 
 
-def test_an_unknown_signal_is_told_with_the_nearest_one() -> None:
+def test_unknown_signal_warning_suggests_the_nearest_name() -> None:
     roads = RoadNetwork.parse(ROAD.replace('id="7" name', 'id="north" name').replace('Id="7"', 'Id="north"'))
     found = signals(roads=roads)
     element = model.TrafficSignalStateAction(name="nord", state="red")
@@ -179,7 +179,9 @@ def test_an_unknown_signal_is_told_with_the_nearest_one() -> None:
         ),
     ],
 )
-def test_declarations_that_make_no_sense(controllers: list[model.TrafficSignalController], expected: str) -> None:
+def test_invalid_controller_declaration_is_an_error(
+    controllers: list[model.TrafficSignalController], expected: str
+) -> None:
     assert any(expected in str(diagnostic) for diagnostic in signals(*controllers).errors)
 
 
@@ -192,7 +194,9 @@ def test_declarations_that_make_no_sense(controllers: list[model.TrafficSignalCo
         ([controller(*CYCLE), controller(phase("go", 5), name="c2", reference="c1", delay=1)], "cycle of 5 s, but"),
     ],
 )
-def test_declarations_that_are_odd(controllers: list[model.TrafficSignalController], expected: str) -> None:
+def test_questionable_controller_declaration_is_a_warning(
+    controllers: list[model.TrafficSignalController], expected: str
+) -> None:
     found = signals(*controllers)
     assert found.errors == ()
     assert any(expected in str(diagnostic) for diagnostic in found.warnings)

@@ -1,4 +1,4 @@
-"""What the standard says of every storyboard, under random trees, priorities, counts and triggers."""
+"""Invariants of the standard for storyboards with random trees, priorities, counts and triggers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.domains import Domain
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
@@ -84,15 +85,15 @@ ACTS = st.lists(st.builds(Act, start=TRIGGERS, stop=TRIGGERS, groups=GROUPS), mi
 
 
 class Tree:
-    """A storyboard made from a plan, and its course."""
+    """Storyboard of a plan, with its state changes."""
 
     def __init__(
         self, plan: list[Act], stop: list[list[Condition]] | None, context: RuntimeContext, script: Any, task: Any
     ) -> None:
-        self.stage, self._script, self._task = context, script, task
+        self.context, self._script, self._task = context, script, task
         self.scripts: list[Any] = []
         self.rivals: dict[str, list[str]] = {}
-        """The other events of its maneuver, by event."""
+        """Other events of the same maneuver, by event."""
         acts = [self._act(act, f"act{number}") for number, act in enumerate(plan)]
         self.root = StoryboardElement(
             context, ("storyboard",), [StoryNode(context, ("story",), acts)], stop=self._wait(stop)
@@ -111,35 +112,36 @@ class Tree:
                 for script, one in zip(scripts, group, strict=True)
             )
             made.append(ConditionGroup(tuple(monitors)))
-        return WaitForTrigger("trigger", Trigger(made), self.stage)
+        return WaitForTrigger("trigger", Trigger(made), self.context)
 
     def _act(self, act: Act, name: str) -> ActElement:
         groups = []
         for number, (limit, maneuvers) in enumerate(act.groups):
             path = f"{name}.{number}"
             children = [self._maneuver(events, f"{path}.{index}") for index, events in enumerate(maneuvers)]
-            groups.append(ManeuverGroupElement(self.stage, (path,), children, limit=limit))
-        return ActElement(self.stage, (name,), groups, start=self._wait(act.start), stop=self._wait(act.stop))
+            groups.append(ManeuverGroupElement(self.context, (path,), children, limit=limit))
+        return ActElement(self.context, (name,), groups, start=self._wait(act.start), stop=self._wait(act.stop))
 
     def _maneuver(self, plans: list[Event], name: str) -> ManeuverElement:
         events = [self._event(plan, f"{name}.{number}") for number, plan in enumerate(plans)]
         EventElement.resolve_priorities(events)
         self.rivals |= {event.name: [other.name for other in events if other is not event] for event in events}
-        return ManeuverElement(self.stage, (name,), events)
+        return ManeuverElement(self.context, (name,), events)
 
     def _event(self, plan: Event, name: str) -> EventElement:
         actions = []
         for number, (ticks, actor, domain) in enumerate(plan.tasks):
             behaviour = self._task(ticks, actor=actor, domain=domain)
-            make = {actor: [behaviour]}.__getitem__
-            actions.append(ActionElement(self.stage, (f"{name}.{number}",), make, [actor]))
+            behaviours: dict[str | None, list[ActionBehaviour]] = {actor: [behaviour]}
+            make = behaviours.__getitem__
+            actions.append(ActionElement(self.context, (f"{name}.{number}",), make, [actor]))
         return EventElement(
-            self.stage, (name,), actions, priority=plan.priority, start=self._wait(plan.start), limit=plan.limit
+            self.context, (name,), actions, priority=plan.priority, start=self._wait(plan.start), limit=plan.limit
         )
 
     def tick(self) -> list[StateChange]:
         self.root.tick_tree()
-        return list(self.stage.progress.changes)
+        return list(self.context.progress.changes)
 
 
 def below(element: StoryElement) -> Iterator[StoryElement]:
@@ -166,14 +168,14 @@ RANDOM = settings(
 def test_every_change_is_a_legal_transition(plan: Any, stop: Any, fresh: Any) -> None:
     for tree, changes in play(plan, stop, fresh):
         for change in changes:
-            assert change.time == tree.stage.time
+            assert change.time == tree.context.time
             if change.transition is not None:
                 assert (change.before, change.after) in LEGAL[change.transition]
 
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_nothing_runs_or_waits_under_what_does_not_run(plan: Any, stop: Any, fresh: Any) -> None:
+def test_children_are_active_only_in_running_parents(plan: Any, stop: Any, fresh: Any) -> None:
     for tree, _ in play(plan, stop, fresh):
         for element in tree.elements.values():
             if element.state is not ElementState.RUNNING:
@@ -184,7 +186,7 @@ def test_nothing_runs_or_waits_under_what_does_not_run(plan: Any, stop: Any, fre
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_an_element_ends_when_all_below_has_come_to_its_end(plan: Any, stop: Any, fresh: Any) -> None:
+def test_element_ends_when_all_children_are_complete(plan: Any, stop: Any, fresh: Any) -> None:
     states: dict[str, ElementState] = {}
     for tree, changes in play(plan, stop, fresh):
         for change in changes:
@@ -196,14 +198,14 @@ def test_an_element_ends_when_all_below_has_come_to_its_end(plan: Any, stop: Any
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_nothing_is_executed_more_often_than_it_may(plan: Any, stop: Any, fresh: Any) -> None:
+def test_executions_do_not_exceed_the_execution_count(plan: Any, stop: Any, fresh: Any) -> None:
     for tree, _ in play(plan, stop, fresh):
         assert all(element.executions <= element.limit for element in tree.elements.values())
 
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_priorities_bind_the_events_of_a_maneuver(plan: Any, stop: Any, fresh: Any) -> None:
+def test_priorities_apply_to_the_events_of_a_maneuver(plan: Any, stop: Any, fresh: Any) -> None:
     states: dict[str, ElementState] = {}
     for tree, changes in play(plan, stop, fresh):
         for change in changes:
@@ -220,7 +222,7 @@ def test_priorities_bind_the_events_of_a_maneuver(plan: Any, stop: Any, fresh: A
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_no_two_actions_control_one_domain_of_an_actor(plan: Any, stop: Any, fresh: Any) -> None:
+def test_one_action_controls_a_domain_of_an_actor(plan: Any, stop: Any, fresh: Any) -> None:
     for tree, _ in play(plan, stop, fresh):
         held: list[tuple[str | None, Domain]] = []
         for element in tree.elements.values():
@@ -231,7 +233,7 @@ def test_no_two_actions_control_one_domain_of_an_actor(plan: Any, stop: Any, fre
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_a_running_action_has_something_to_do(plan: Any, stop: Any, fresh: Any) -> None:
+def test_running_action_has_running_behaviours(plan: Any, stop: Any, fresh: Any) -> None:
     for tree, _ in play(plan, stop, fresh):
         for element in tree.elements.values():
             if isinstance(element, ActionElement):
@@ -240,14 +242,14 @@ def test_a_running_action_has_something_to_do(plan: Any, stop: Any, fresh: Any) 
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_conditions_are_asked_at_most_once_a_tick(plan: Any, stop: Any, fresh: Any) -> None:
+def test_conditions_are_evaluated_at_most_once_per_tick(plan: Any, stop: Any, fresh: Any) -> None:
     for number, (tree, _) in enumerate(play(plan, stop, fresh), start=1):
         assert all(script.asked <= number for script in tree.scripts)
 
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_a_stopped_storyboard_stays_as_it_is(plan: Any, stop: Any, fresh: Any) -> None:
+def test_stopped_storyboard_does_not_change(plan: Any, stop: Any, fresh: Any) -> None:
     over = False
     for tree, changes in play(plan, stop, fresh):
         assert not (over and changes)
@@ -256,6 +258,6 @@ def test_a_stopped_storyboard_stays_as_it_is(plan: Any, stop: Any, fresh: Any) -
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_the_same_plan_takes_the_same_course(plan: Any, stop: Any, fresh: Any) -> None:
+def test_equal_plans_have_equal_changes(plan: Any, stop: Any, fresh: Any) -> None:
     first = [changes for _, changes in play(plan, stop, fresh)]
     assert first == [changes for _, changes in play(plan, stop, fresh)]

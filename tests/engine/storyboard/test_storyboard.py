@@ -1,4 +1,4 @@
-"""The storyboard as a whole, from a file: what it commands, how it ends, what it refuses, how it prints."""
+"""Storyboards from files: commands, end of the run, rejected scenarios."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STARTS = TELEPORT.format(position=AT.format(x=5)) + SPEED.format(shape="step", v
 
 
 def view_of(placements: Any, tick: Any, like: Any) -> Any:
-    """The view of cars that are where they were put."""
+    """Return the view of cars at their placements."""
     count = len(placements)
     rows = list(placements.values())
     zeros = np.zeros((count, 3))
@@ -50,7 +50,7 @@ def view_of(placements: Any, tick: Any, like: Any) -> Any:
 
 
 def play(storyboard: Any, ticks: Any) -> Any:
-    """The commands of each tick, in a world that obeys."""
+    """Return the commands of each tick in a world that executes them."""
     placements = dict(storyboard.initial().spawns)
     answers = []
     for tick in range(ticks):
@@ -63,35 +63,35 @@ def play(storyboard: Any, ticks: Any) -> Any:
     return answers
 
 
-def test_init_holds_before_the_first_view_and_only_who_has_a_place_is_there(build: Any) -> None:
+def test_init_is_executed_before_the_first_view(build: Any) -> None:
     commands = build(STARTS).initial()
     assert list(commands.spawns) == ["A"]
     assert (commands.spawns["A"].x, commands.spawns["A"].speed) == (5.0, 10.0)
     assert commands.driven == frozenset()
 
 
-def test_the_order_of_init_does_not_matter_where_one_is_placed_beside_another(build: Any) -> None:
+def test_relative_positions_in_init_are_independent_of_order(build: Any) -> None:
     beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
     storyboard = build(beside + '</Private><Private entityRef="B">' + TELEPORT.format(position=AT.format(x=30)))
     assert storyboard.initial().spawns["A"].x == 32.0
 
 
-def test_who_is_placed_beside_nobody_is_an_error(build: Any) -> None:
+def test_position_relative_to_unplaced_entity_in_init_is_rejected(build: Any) -> None:
     beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
     with pytest.raises(ScenarioError, match="entity without a position"):
         build(beside).initial()
 
 
 @pytest.mark.element("SimulationTimeCondition")
-def test_a_step_of_speed_moves_the_actor_in_the_step_in_which_it_starts(build: Any) -> None:
-    """At 10 m/s from x = 5; the event at 0.2 s (the first time above 0.15 s) makes it 20 m/s."""
+def test_speed_step_moves_the_actor_in_its_step(build: Any) -> None:
+    """Speed 10 m/s from x = 5; the event at 0.2 s (the first time above 0.15 s) sets 20 m/s."""
     trigger = AFTER.format(kind="Start", edge="rising", value=0.15)
     event = EVENT.format(name="go", action=SPEED.format(shape="step", value=0, speed=20), trigger=trigger)
     answers = play(build(STARTS, event), 4)
     assert [round(a.placements["A"].x, 6) for a in answers] == [6.0, 7.0, 9.0, 11.0]
 
 
-def test_a_linear_change_of_speed_ends_at_the_end_of_its_last_step(build: Any) -> None:
+def test_linear_speed_change_ends_with_its_last_step(build: Any) -> None:
     event = EVENT.format(name="go", action=SPEED.format(shape="linear", value=0.3, speed=13), trigger="")
     storyboard = build(STARTS, event)
     answers = play(storyboard, 4)
@@ -101,30 +101,32 @@ def test_a_linear_change_of_speed_ends_at_the_end_of_its_last_step(build: Any) -
 
 
 @pytest.mark.element("SimulationTimeCondition", "Storyboard StopTrigger")
-def test_the_stop_trigger_ends_the_run(build: Any) -> None:
+def test_stop_trigger_ends_the_run(build: Any) -> None:
     storyboard = build(STARTS, stop=AFTER.format(kind="Stop", edge="none", value=0.25))
+    ended = []
     play(storyboard, 3)
-    assert storyboard.ended is None
+    ended.append(storyboard.ended)
     storyboard.tick(replace(storyboard.context.view, time=0.3, tick=3))
-    assert storyboard.ended == "stop trigger"
+    ended.append(storyboard.ended)
+    assert ended == [None, "stop trigger"]
     assert storyboard.changes[-1].why == "simulation time 0.30 s > 0.25 s"
 
 
-def test_criteria_in_the_stop_trigger_stop_nothing(build: Any) -> None:
+def test_criteria_in_the_stop_trigger_do_not_stop_the_run(build: Any) -> None:
     stop = AFTER.format(kind="Stop", edge="none", value=-1).replace('"later"', '"criteria_CollisionTest"')
     storyboard = build(STARTS, stop=stop)
     play(storyboard, 2)
     assert storyboard.ended is None
 
 
-def test_without_a_stop_trigger_and_without_stories_it_goes_on(build: Any) -> None:
+def test_storyboard_without_stop_trigger_and_stories_continues(build: Any) -> None:
     storyboard = build(STARTS)
     play(storyboard, 5)
     assert storyboard.ended is None
 
 
 @pytest.mark.element("AddEntityAction", "DeleteEntityAction")
-def test_entities_come_and_go_on_a_trigger(build: Any) -> None:
+def test_entities_are_added_and_deleted_by_triggers(build: Any) -> None:
     entity = '<GlobalAction><EntityAction entityRef="B">{}</EntityAction></GlobalAction>'
     come = entity.format(f"<AddEntityAction><Position>{AT.format(x=50)}</Position></AddEntityAction>")
     go = entity.format("<DeleteEntityAction/>")
@@ -138,14 +140,14 @@ def test_entities_come_and_go_on_a_trigger(build: Any) -> None:
     assert "B" not in fourth.placements
 
 
-def test_all_that_cannot_be_executed_is_named_at_once_with_its_line(build: Any) -> None:
+def test_unsupported_actions_are_reported_together_with_lines(build: Any) -> None:
     swarm = "<GlobalAction><TrafficAction><TrafficStopAction/></TrafficAction></GlobalAction>"
     all_but_one = [point for point in entry_points(group="eidrive_scenario.actions") if "Stop" not in point.name]
     with pytest.raises(ScenarioError) as caught:
         build(
             STARTS,
             EVENT.format(name="odd", action=swarm, trigger=""),
-            everywhere=swarm,
+            global_actions=swarm,
             registered=Registry("actions", all_but_one),
         )
     messages = [diagnostic.message for diagnostic in caught.value.diagnostics]
@@ -153,7 +155,7 @@ def test_all_that_cannot_be_executed_is_named_at_once_with_its_line(build: Any) 
     assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
 
 
-def test_a_reference_to_no_element_is_an_error_with_the_nearest_name(build: Any) -> None:
+def test_reference_to_unknown_element_suggests_the_nearest_name(build: Any) -> None:
     trigger = """<StartTrigger><ConditionGroup><Condition name="state" delay="0" conditionEdge="none"><ByValueCondition>
       <StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="goo" state="endTransition"/>
       </ByValueCondition></Condition></ConditionGroup></StartTrigger>"""
@@ -179,10 +181,8 @@ WATCH = """<StartTrigger><ConditionGroup><Condition name="watch" delay="0" condi
         ("event", "first", "completeState", 0.3),
     ],
 )
-def test_starts_and_ends_are_seen_in_the_step_in_which_they_happen(
-    build: Any, kind: Any, name: Any, state: Any, when: Any
-) -> None:
-    """The first event's action takes from 0 s to 0.3 s: it ends with its third step."""
+def test_transitions_are_observed_in_their_step(build: Any, kind: Any, name: Any, state: Any, when: Any) -> None:
+    """The action of the first event takes from 0 s to 0.3 s and ends with its third step."""
     events = EVENT.format(name="first", action=SPEED.format(shape="linear", value=0.3, speed=12), trigger="")
     watch = WATCH.format(kind=kind, name=f"{name} action" if kind == "action" else name, state=state)
     events += EVENT.format(name="second", action=SPEED.format(shape="step", value=0, speed=5), trigger=watch)
@@ -190,7 +190,7 @@ def test_starts_and_ends_are_seen_in_the_step_in_which_they_happen(
     assert starts(storyboard, "second") == pytest.approx([when])
 
 
-def test_a_transition_is_seen_once(build: Any) -> None:
+def test_transition_is_observed_once(build: Any) -> None:
     events = EVENT.format(name="first", action=SPEED.format(shape="step", value=0, speed=20), trigger="")
     watch = WATCH.format(kind="event", name="first", state="endTransition")
     second = EVENT.format(name="second", action=SPEED.format(shape="step", value=0, speed=5), trigger=watch)
@@ -199,7 +199,7 @@ def test_a_transition_is_seen_once(build: Any) -> None:
 
 
 def starts(storyboard: Any, event: str) -> list[float]:
-    """When an event starts within 10 ticks [s]."""
+    """Return the start of an event within 10 ticks [s]."""
     placements, moments = dict(storyboard.initial().spawns), []
     for tick in range(10):
         commands = storyboard.tick(view_of(placements, tick, storyboard.context.view))

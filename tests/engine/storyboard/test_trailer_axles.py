@@ -1,4 +1,4 @@
-"""A trailer with several axles rolls as on one, which lies behind their middle."""
+"""Equivalent single axle of trailers with several axles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REACH = 6.0
 
 
 def vehicle(*axles: tuple[float, float], **parts: Any) -> model.Vehicle:
-    """Axles by place and largest steering angle; the first is the rear axle."""
+    """Return a vehicle with axles by position and maximum steering angle; the first is the rear axle."""
     rear, *extra = [
         model.Axle(max_steering=angle, position_x=x, position_z=0.5, track_width=2.0, wheel_diameter=1.0)
         for x, angle in axles
@@ -33,7 +33,7 @@ def vehicle(*axles: tuple[float, float], **parts: Any) -> model.Vehicle:
     )
 
 
-def test_the_bar_is_longer_than_to_the_middle_of_the_axles() -> None:
+def test_equivalent_axle_is_behind_the_middle_of_the_axles() -> None:
     assert bar(vehicle((0.0, 0.0)), REACH) == REACH
     assert bar(vehicle((0.0, 0.0), (-1.4, 0.0)), REACH) == pytest.approx((6.0**2 + 7.4**2) / 13.4)
     # The middle one of three, and the axles on both sides of it: 6 + 2/3 · 1.3² / 6.
@@ -44,8 +44,8 @@ def test_the_bar_is_longer_than_to_the_middle_of_the_axles() -> None:
 
 
 @pytest.mark.parametrize("axles", [((0.0, 0.0),), ((0.0, 0.0), (-1.4, 0.0), (-2.8, 0.0))])
-def test_in_a_long_turn_it_rolls_on_the_circle_of_its_bar(axles: tuple[tuple[float, float], ...]) -> None:
-    """Where it rolls without slip it is abreast of the turn's center: at √(R² - bar²) from it."""
+def test_trailer_in_long_turn_follows_circle_of_its_equivalent_axle(axles: tuple[tuple[float, float], ...]) -> None:
+    """The equivalent axle rolls without slip beside the center of the turn: at the distance √(R² - bar²)."""
     trailer = vehicle(*axles, trailer_coupler=model.TrailerCoupler(dx=REACH))
     truck = vehicle((0.0, 0.0), trailer_hitch=model.TrailerHitch(dx=0.0))
     front, back = Actor("Truck", truck, (), None), Actor("Trailer", trailer, (), None)

@@ -1,4 +1,4 @@
-"""Trajectories against what geometry says of them."""
+"""Trajectories compared with geometry."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def polyline(*points: Any, closed: Any = False) -> Any:
 
 
 @pytest.mark.element("Polyline")
-def test_a_polyline_turns_at_its_corners() -> None:
+def test_polyline_heading_turns_at_corners() -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None))
     assert way.length == 7.0
     assert way.at(1.0)[:4] == pytest.approx((1.0, 0.0, 0.0, 0.0))
@@ -40,12 +40,12 @@ def test_a_polyline_turns_at_its_corners() -> None:
     assert way.times is None
 
 
-def test_given_headings_change_from_corner_to_corner() -> None:
+def test_given_headings_are_interpolated_between_vertices() -> None:
     way = polyline((0, 0, None, 0.0), (10, 0, None, 1.0))
     assert way.at(5.0).h == pytest.approx(0.5)
 
 
-def test_a_closed_polyline_comes_back_to_its_start() -> None:
+def test_closed_polyline_returns_to_its_start() -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None), closed=True)
     assert way.length == 12.0
     assert way.at(14.0)[:2] == pytest.approx((2.0, 0.0))
@@ -55,25 +55,25 @@ def test_a_closed_polyline_comes_back_to_its_start() -> None:
     ("point", "place"),
     [((1, 1), (1, 1)), ((2, 3), (6, 1)), ((4, 2), (5, -1)), ((-2, 1), (-2, 1)), ((2.5, 9), (12, 0.5))],
 )
-def test_a_point_is_seen_beside_its_nearest_place(point: tuple[float, float], place: tuple[float, float]) -> None:
+def test_point_is_projected_onto_the_nearest_position(point: tuple[float, float], place: tuple[float, float]) -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None))
     assert way.project(*point) == pytest.approx(place)
 
 
-def test_beside_a_closed_polyline_there_is_no_beyond() -> None:
+def test_closed_polyline_is_not_extended() -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None), closed=True)
     assert way.project(-1, 0)[0] in (0.0, pytest.approx(12.0))
 
 
 @pytest.mark.element("Timing")
-def test_times_are_kept_at_the_corners_at_constant_speed_between() -> None:
+def test_times_at_vertices_are_kept_at_constant_speed_between() -> None:
     way = polyline((0, 0, 1.0, None), (10, 0, 3.0, None), (10, 30, 5.0, None))
     assert [way.at_time(t) for t in (0.0, 1.0, 2.0, 3.0, 4.0, 9.0)] == pytest.approx([0, 0, 5, 10, 25, 40])
     assert way.time_at(25.0) == pytest.approx(4.0)
 
 
-def test_times_are_kept_at_the_corners_with_speeds_that_change_linearly() -> None:
-    """From 10 m/s, 5 m in 1 s end at 0 m/s: half way in time 3.75 m are done."""
+def test_times_at_vertices_are_kept_with_linear_speeds() -> None:
+    """From 10 m/s, 5 m in 1 s end at 0 m/s: after 0.5 s the distance is 3.75 m."""
     way = polyline((0, 0, 0.0, None), (5, 0, 1.0, None), (9, 0, 2.0, None))
     speeds = way.speeds_from(10.0)
     assert way.at_time(0.5, speeds) == pytest.approx(3.75)
@@ -82,14 +82,14 @@ def test_times_are_kept_at_the_corners_with_speeds_that_change_linearly() -> Non
 
 
 @pytest.mark.element("Clothoid")
-def test_a_clothoid_without_change_of_curvature_is_an_arc() -> None:
+def test_clothoid_of_constant_curvature_is_an_arc() -> None:
     shape = model.Clothoid(curvature=0.1, length=5 * math.pi, curvature_prime=0.0, position=at(0, 0))
     way = sample_trajectory(trajectory(clothoid=shape), resolve)
     assert way.at(way.length)[:4] == pytest.approx((10.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
 
 
 @pytest.mark.element("Clothoid")
-def test_a_clothoid_turns_by_its_mean_curvature() -> None:
+def test_clothoid_turns_by_its_mean_curvature() -> None:
     shape = model.Clothoid(
         curvature=0.0, length=20.0, curvature_prime=0.01, start_time=1.0, stop_time=3.0, position=at(0, 0)
     )
@@ -99,7 +99,7 @@ def test_a_clothoid_turns_by_its_mean_curvature() -> None:
 
 
 @pytest.mark.element("ClothoidSpline")
-def test_a_clothoid_spline_goes_on_where_the_piece_before_ended() -> None:
+def test_clothoid_spline_segments_are_continuous() -> None:
     pieces = (
         model.ClothoidSplineSegment(curvature_start=0.0, curvature_end=0.0, length=10.0, position_start=at(0, 0)),
         model.ClothoidSplineSegment(curvature_start=0.1, curvature_end=0.1, length=5 * math.pi),
@@ -110,8 +110,8 @@ def test_a_clothoid_spline_goes_on_where_the_piece_before_ended() -> None:
 
 
 @pytest.mark.element("ClothoidSpline")
-def test_a_clothoid_spline_takes_the_times_that_its_pieces_say() -> None:
-    """10, 10 and 20 m: the first piece begins at 0 s as it says nothing, the second at 5 s, the end is at 11 s."""
+def test_clothoid_spline_has_the_times_of_its_segments() -> None:
+    """Segments of 10, 10 and 20 m: the first starts at 0 s by default, the second at 5 s, the end is at 11 s."""
     lengths = ((10.0, None), (10.0, 5.0), (20.0, None))
     pieces = tuple(
         model.ClothoidSplineSegment(curvature_start=0.0, curvature_end=0.0, length=length, time_start=time)
@@ -126,7 +126,7 @@ def test_a_clothoid_spline_takes_the_times_that_its_pieces_say() -> None:
 
 
 @pytest.mark.element("Nurbs")
-def test_a_rational_spline_makes_an_exact_circle() -> None:
+def test_rational_spline_is_an_exact_circle() -> None:
     """The quarter circle of Piegl and Tiller: weights 1, 1/√2, 1."""
     points = ((10, 0, 1.0), (10, 10, math.sqrt(0.5)), (0, 10, 1.0))
     shape = model.Nurbs(
@@ -142,7 +142,7 @@ def test_a_rational_spline_makes_an_exact_circle() -> None:
 
 
 @pytest.mark.element("Nurbs")
-def test_control_points_with_headings_say_where_a_spline_looks() -> None:
+def test_headings_of_control_points_define_headings_of_spline() -> None:
     """Half way the quadratic Bernstein polynomials are 1/4, 1/2, 1/4: 0.25 · 3.0 + 0.5 · 3.2 + 0.25 · 3.0 = 3.1 rad, as
     -3.083 is 3.2 less a whole turn."""
     points = ((0, 0, 3.0), (10, 0, 3.2 - 2 * math.pi), (20, 0, 3.0))
@@ -158,8 +158,8 @@ def test_control_points_with_headings_say_where_a_spline_looks() -> None:
 
 
 @pytest.mark.element("Nurbs")
-def test_the_time_of_a_control_point_holds_where_its_basis_function_peaks() -> None:
-    """In the middle of three: at half of the parameter, on steps of a meter of the control polygon."""
+def test_time_of_control_point_holds_at_peak_of_its_basis_function() -> None:
+    """The peak of the second of three is at half of the parameter, in steps of 1 m of the control polygon."""
     points = ((0, 0, 0.0), (10, 0, 2.0), (20, 0, 6.0))
     shape = model.Nurbs(
         order=3,

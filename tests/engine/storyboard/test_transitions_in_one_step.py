@@ -1,4 +1,4 @@
-"""What happens at one instant: ends are seen in their own step, and chains of elements fall through it."""
+"""Transitions at one instant: ends are observed in their step, and chains of elements need one step."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ CONDITION = """<Condition name="c" delay="{delay}" conditionEdge="{edge}">
 
 
 def when(*whats: str, kind: str = "Start", edge: str = "none", delay: float = 0.0) -> str:
-    """A trigger of one group."""
+    """Return a trigger of one group."""
     conditions = "".join(CONDITION.format(what=what, edge=edge, delay=delay) for what in whats)
     return f"<{kind}Trigger><ConditionGroup>{conditions}</ConditionGroup></{kind}Trigger>"
 
 
 def event(name: str, trigger: str = "", action: str | None = None, limit: int = 1) -> str:
-    """An event; its action takes no time unless given."""
+    """Return an event; by default its action takes no time."""
     return EVENT.format(name=name, action=action or NOTE.format(text=name), trigger=trigger, limit=limit)
 
 
@@ -45,7 +45,7 @@ def ended(of: str, state: str = "endTransition") -> str:
 
 
 def course(storyboard: Any, ticks: int) -> list[list[str]]:
-    """By tick of 0.1 s, what started and ended, in order."""
+    """Return starts and ends in order, by tick of 0.1 s."""
     storyboard.initial()
     seen = []
     for tick in range(ticks):
@@ -59,7 +59,7 @@ def course(storyboard: Any, ticks: int) -> list[list[str]]:
 @pytest.mark.element("StoryboardElementStateCondition")
 @pytest.mark.parametrize("state", ["endTransition", "completeState"])
 @pytest.mark.parametrize("edge", ["none", "rising"])
-def test_a_chain_falls_through_one_step_whatever_the_order_of_the_file(build: Any, state: str, edge: str) -> None:
+def test_chain_transitions_in_one_step_in_any_order(build: Any, state: str, edge: str) -> None:
     events = event("third", when(ended("second", state), edge=edge)) + event(
         "second", when(ended("first", state), edge=edge)
     )
@@ -70,14 +70,14 @@ def test_a_chain_falls_through_one_step_whatever_the_order_of_the_file(build: An
 
 
 @pytest.mark.element("StoryboardElementStateCondition")
-def test_an_action_that_takes_time_ends_when_its_goal_is_reached_and_the_next_starts_there(build: Any) -> None:
+def test_next_action_starts_when_the_goal_is_reached(build: Any) -> None:
     events = event("slow", action=RAMP.format(time=0.3)) + event("next", when(ended("slow")))
     ticks = course(build(PLACE, events), 4)
     assert ticks[:3] == [["storyboard starts", "slow starts"], [], []]
     assert ticks[3] == ["slow ends", "next starts", "next ends", "storyboard ends"]
 
 
-def test_who_waits_for_each_other_in_a_circle_goes_round_once_a_step(build: Any) -> None:
+def test_cyclic_triggers_start_once_per_step(build: Any) -> None:
     kick = CONDITION.format(what=TIME.format(value=0.05), edge="rising", delay=0)
     either = when(ended("b")).replace("</Start", f"<ConditionGroup>{kick}</ConditionGroup></Start")
     ticks = course(build(PLACE, event("a", either, limit=4) + event("b", when(ended("a")), limit=4)), 6)
@@ -85,21 +85,21 @@ def test_who_waits_for_each_other_in_a_circle_goes_round_once_a_step(build: Any)
     assert [sum("starts" in entry for entry in tick) for tick in ticks[1:]] == [2, 2, 2, 2, 0]
 
 
-def test_an_edge_meets_what_comes_true_at_the_same_instant(build: Any) -> None:
+def test_edge_coincides_with_condition_of_the_same_instant(build: Any) -> None:
     both = when(TIME.format(value=0.05), ended("first"), edge="rising")
     ticks = course(build(PLACE, event("both", both) + event("first", when(TIME.format(value=0.05), edge="rising"))), 3)
     assert ticks[1][:4] == ["first starts", "first ends", "both starts", "both ends"]
 
 
 @pytest.mark.element("Storyboard StopTrigger")
-def test_a_stop_trigger_sees_an_end_of_its_own_step(build: Any) -> None:
+def test_stop_trigger_observes_end_in_its_step(build: Any) -> None:
     events = event("slow", action=RAMP.format(time=0.2)) + event("other", when(TIME.format(value=9)))
     storyboard = build(PLACE, events, stop=when(ended("slow"), kind="Stop"))
     assert course(storyboard, 3)[2] == ["slow ends", "other stops", "storyboard stops"]
     assert storyboard.ended == "stop trigger"
 
 
-def test_the_delay_counts_from_the_step_of_the_end(build: Any) -> None:
+def test_delay_counts_from_the_step_of_the_end(build: Any) -> None:
     events = event("slow", action=RAMP.format(time=0.2)) + event("late", when(ended("slow"), edge="rising", delay=0.3))
     ticks = course(build(PLACE, events), 6)
     assert ticks[2] == ["slow ends"]
@@ -107,7 +107,7 @@ def test_the_delay_counts_from_the_step_of_the_end(build: Any) -> None:
 
 
 @pytest.mark.element("VariableSetAction")
-def test_a_value_is_seen_in_its_own_step_by_triggers_further_up(build: Any) -> None:
+def test_value_is_observed_in_its_step_by_earlier_triggers(build: Any) -> None:
     events = event("reader", when(VARIABLE.format(value="7"), edge="rising")) + event(
         "writer", when(TIME.format(value=0.15)), action=SET.format(value="7")
     )
@@ -119,14 +119,12 @@ def test_a_value_is_seen_in_its_own_step_by_triggers_further_up(build: Any) -> N
     assert ticks[2][:4] == ["writer starts", "writer ends", "reader starts", "reader ends"]
 
 
-def test_an_event_that_is_executed_again_starts_in_the_next_step(build: Any) -> None:
+def test_repeated_event_starts_in_the_next_step(build: Any) -> None:
     ticks = course(build(PLACE, event("again", limit=3)), 4)
     assert [tick.count("again starts") for tick in ticks] == [1, 1, 1, 0]
 
 
-def test_conditions_that_look_at_the_view_are_asked_once_however_many_turns_a_step_takes(
-    clock: Any, script: Any, context: Any
-) -> None:
+def test_view_conditions_are_evaluated_once_per_step(clock: Any, script: Any, context: Any) -> None:
     watching, looking = script([False, True, True]), script([False, True, True])
     looking.instant = True
     clock.step()

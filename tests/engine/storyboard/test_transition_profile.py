@@ -1,4 +1,4 @@
-"""Shapes of TransitionDynamics by hand: from 10 to 20 over 4."""
+"""Shapes of TransitionDynamics with values by hand: from 10 to 20 over 4."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from eidrive_scenario.storyboard.kinematics.transition_profile import Transition
         (DynamicsShape.STEP, 20.0, 20.0),
     ],
 )
-def test_values_along_the_way(shape: Any, quarter: Any, half: Any) -> None:
+def test_transition_values_match_shape(shape: Any, quarter: Any, half: Any) -> None:
     transition = TransitionProfile(shape, 10.0, 20.0, 4.0)
     assert transition.advance(1.0) == pytest.approx(quarter)
     assert transition.advance(1.0) == pytest.approx(half)
@@ -32,7 +32,7 @@ def test_values_along_the_way(shape: Any, quarter: Any, half: Any) -> None:
     ("shape", "extent"),
     [(DynamicsShape.LINEAR, 5.0), (DynamicsShape.CUBIC, 7.5), (DynamicsShape.SINUSOIDAL, 2.5 * math.pi)],
 )
-def test_a_rate_is_the_steepest_slope(shape: Any, extent: Any) -> None:
+def test_rate_is_the_maximum_slope(shape: Any, extent: Any) -> None:
     transition = TransitionProfile.from_rate(shape, 10.0, 20.0, -2.0)
     assert transition.extent == pytest.approx(extent)
     transition.advance(extent / 2 - 1e-4)
@@ -40,12 +40,12 @@ def test_a_rate_is_the_steepest_slope(shape: Any, extent: Any) -> None:
     assert (transition.advance(2e-4) - before) / 2e-4 == pytest.approx(2.0, rel=1e-4)
 
 
-def test_a_bend_is_the_largest_second_derivative() -> None:
+def test_second_derivative_limit_is_the_maximum() -> None:
     """Cubic: 6 Δ / T² = 0.6 at the ends, so T = 10."""
     assert TransitionProfile.from_second_derivative(DynamicsShape.CUBIC, 0.0, 10.0, 0.6).extent == pytest.approx(10.0)
 
 
-def test_a_limit_stretches_what_is_too_steep_and_leaves_steps_alone() -> None:
+def test_rate_limit_extends_steep_transitions_except_steps() -> None:
     linear = TransitionProfile(DynamicsShape.LINEAR, 0.0, 20.0, 1.0)
     linear.limit_rate(10.0)
     assert linear.extent == pytest.approx(2.0)
@@ -55,7 +55,7 @@ def test_a_limit_stretches_what_is_too_steep_and_leaves_steps_alone() -> None:
 
 
 @pytest.mark.parametrize("shape", [DynamicsShape.LINEAR, DynamicsShape.CUBIC, DynamicsShape.SINUSOIDAL])
-def test_the_slope_is_the_derivative_of_the_value(shape: Any) -> None:
+def test_slope_is_the_derivative_of_the_value(shape: Any) -> None:
     for place in (0.4, 1.0, 2.0, 3.7):
         before, here, after = (TransitionProfile(shape, 10.0, 20.0, 4.0) for _ in range(3))
         numeric = (after.advance(place + 1e-5) - before.advance(place - 1e-5)) / 2e-5

@@ -1,4 +1,4 @@
-"""What the rules call unreachable never starts in a run, whatever the triggers: random storyboards, played."""
+"""Elements that the rules report as unreachable never start: runs of random storyboards."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ STATES = (
 
 
 class Storyteller:
-    """Makes up stories of two acts with a handful of events."""
+    """Generator of random stories with two acts and a few events."""
 
     def __init__(self, seed: int) -> None:
         self.chance = random.Random(seed)
@@ -98,7 +98,7 @@ class Storyteller:
 
 
 def starts(storyboard: Storyboard) -> dict[tuple[str, ...], float]:
-    """When each element first starts."""
+    """Return the first start of each element [s]."""
     storyboard.initial()
     first: dict[tuple[str, ...], float] = {}
     for tick in range(TICKS):
@@ -110,7 +110,7 @@ def starts(storyboard: Storyboard) -> dict[tuple[str, ...], float]:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_nothing_starts_before_its_earliest_time(build: Callable[..., Storyboard], seed: int) -> None:
+def test_elements_start_not_before_their_earliest_time(build: Callable[..., Storyboard], seed: int) -> None:
     unreachable = reached = 0
     for number in range(30):
         storyboard = build(PLACE, stop=f"{Storyteller(1000 * seed + number).story()}<StopTrigger/>")
