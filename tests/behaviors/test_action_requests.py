@@ -26,7 +26,7 @@ def assigned_attributes(tree: ast.AST) -> list[tuple[int, str]]:
                 continue
             owner = ast.unparse(target.value).split("[")[0]
             if not STATE.isdisjoint(owner.split(".")):
-                found.append((node.lineno, ast.unparse(target)))
+                found.append((target.lineno, ast.unparse(target)))
     return found
 
 
