@@ -1,4 +1,4 @@
-"""The agent of one station: detect, fuse, plan, control, and say what it saw."""
+"""Agent of one station: detection, fusion, planning, control and message generation."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, Stat
 from eidrive_scenario.world.actor import ActorSpec, Control
 
 EGO_BODY_MARGIN = 0.9
-"""A reported box whose center lies this near to the own outline is the own body: half the width of a car, so that the
-center of another car can come as near only after a collision [m]."""
+"""Maximum distance of a reported box center from the ego outline at which the box is the ego body [m]. It is half the
+width of a car: the center of another car is closer only after a collision."""
 
 SENDER_REPORT_SUFFIX = " itself"
-"""What a station says of itself counts as the report of one more station: it is not among the objects that it sees."""
+"""Suffix of the reports of a station about itself, which are kept as those of another station."""
 
 
 class Agent:
-    """One station. It sees its readings and its inbox, nothing else.
+    """Agent of one station. Its only inputs are sensor readings, received messages and the goal.
 
-    Of each sender it keeps the newest report until that is too old (`report_timeout`). It sends its own detections,
-    never fused ones: a box that came back to its first reporter would count twice.
+    It keeps the newest report of each sender until `report_timeout`. It transmits its own detections, not fused ones,
+    which avoids data incest.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Agent:
         self._planner_checked = planner is not None and not is_built_in(type(planner))
         self.controller = controller
         self.receives_messages = receives_messages
-        """Whether the station uses messages; a station that does not drive may transmit only."""
+        """Whether the station receives messages; a station that does not drive may only transmit."""
         self.points = points
         self._speaker = speaker
         self._clock = settings.clock
@@ -78,7 +78,7 @@ class Agent:
         self._reports: dict[str, Report] = {}
         self._usual_lifetime = settings.lifetime(complete=True)
         self._lifetimes: dict[str, float] = {}
-        """How long the reports of each station count [s]."""
+        """Lifetime of the reports of each station [s]."""
         self._own_places: deque[tuple[float, float, float, float, float]] = deque(
             maxlen=math.ceil(settings.lifetime(complete=False) / dt) + 2
         )
@@ -158,7 +158,7 @@ class Agent:
         self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
 
     def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float, own_perception: bool) -> None:
-        """Keep the newest report of each sender that counts, and forget the old ones."""
+        """Store the newest report of each sender, and delete reports that exceed their lifetime."""
         for received in inbox:
             message = self._clock.with_local_timestamps(received.message, now)
             sender = message.sender
@@ -179,16 +179,16 @@ class Agent:
                 del self._reports[station]
 
     def _assembled_detections(self, message: Message) -> Detections:
-        """What the sender of a message that does not list all its objects has said of them by now."""
+        """Return all known objects of the sender of a message that lists a part of them."""
         memory = self._partial.get(message.sender)
         if memory is None:
             memory = self._partial[message.sender] = PartialReportAssembler(self.settings.lifetime(complete=False))
         return self._without_own_body(memory.update(message))
 
     def _accept_report(self, report: Report, completed: Detections | None = None) -> None:
-        """Fusion hears every report; a late one does not replace a newer one.
+        """Pass a report to the fusion method, and store it unless a newer one of its station is stored.
 
-        A report that does not say all is kept together with what its station said before, `completed`.
+        An incomplete report is stored with all known objects of its station, `completed`.
         """
         self.fusion.add_report(report)
         if completed is not None:
@@ -198,9 +198,9 @@ class Agent:
             self._reports[report.station] = report
 
     def _without_own_body(self, detections: Detections) -> Detections:
-        """A report of others without the box that is this station itself: the vehicle must not brake for itself.
+        """Return received detections without the box of the ego body, for which the vehicle must not brake.
 
-        Judged against where this station was when the report was measured, so that delay does not matter.
+        The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
         """
         if not len(detections):
             return detections
@@ -215,14 +215,14 @@ class Agent:
         return detections if len(others) == len(detections) else detections.subset(others)
 
     def _own_place(self, time: float) -> tuple[float, float, float, float]:
-        """Center, height and heading of the own body at the last instant up to `time`, or the earliest known."""
+        """Return center, height and heading of the ego body at the last instant up to `time`, or at the first one."""
         for held in reversed(self._own_places):
             if held[0] <= time + TIME_TOLERANCE:
                 return held[1:]
         return self._own_places[0][1:]
 
     def _own_body(self, time: float) -> Array:
-        """(7,) box of the own outline with a margin, as high as anything on it, at that time."""
+        """Return the box (7,) of the ego outline at that time, with a margin that covers objects on the body."""
         x, y, z, yaw = self._own_place(time)
         length, width, height = self.spec.size
         return np.array([x, y, z, length + EGO_BODY_MARGIN, width + EGO_BODY_MARGIN, 4.0 * height, yaw])
@@ -248,7 +248,7 @@ class Agent:
 
 
 def _numbered(message: Message) -> Detections:
-    """What a message says, with the sender's numbers of its objects as those of tracks, unless it has such."""
+    """Return the detections of a message, with the object ids of the sender as track numbers if it has none."""
     if message.objects is None or message.detections.tracks:
         return message.detections
     return replace(message.detections, tracks=message.objects)

@@ -1,4 +1,4 @@
-"""Building an agent and its rig from what a controller's properties say."""
+"""Construction of the agent and the sensors of a station from its settings."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from eidrive_scenario.world.actor import ActorSpec
 
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
-    """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
+    """Return the sensors of a station. Raise SettingError if the settings omit a sensor that the detector needs."""
     kind: type[Detector] = _detector_class(settings.detector)
     return Rig(spec, settings.rig_sensors(kind.needs, kind.default_sensors), seed=seed)
 
 
 def _detector_class(name: str) -> type[Detector]:
-    """The class of a detector. Raises RegistryError if what it declares cannot be used."""
+    """Return the class of a detector. Raise RegistryError if its declarations are invalid."""
     kind: type[Detector] = registry("detectors").load(name, Detector)
     sensors = frozenset(registry("sensors"))
     if not isinstance(kind.needs, frozenset | set) or not kind.needs <= sensors:
@@ -51,14 +51,14 @@ def _check_settings_type(kind: str, name: str, settings_type: object) -> None:
 
 
 def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
-    """The detector that the settings name. Raises SettingError, with this place, if its own settings are wrong."""
+    """Build the detector of a station. Raise SettingError with this location if its settings are invalid."""
     kind: type[Detector] = _detector_class(settings.detector)
     given = settings.detector_settings
     if kind.settings_type is not None:
         own = parse_settings(kind.settings_type, given, source=source, line=line)
         return construct(kind, own)  # type: ignore[no-any-return]
     if given:
-        message = f"detector {settings.detector!r} has no settings of its own"
+        message = f"detector {settings.detector!r} has no settings"
         raise SettingError(Diagnostic(message, "remove the property 'detector_settings'", source, line))
     return construct(kind)  # type: ignore[no-any-return]
 
@@ -66,16 +66,19 @@ def build_detector(settings: AgentSettings, *, source: str = "", line: int | Non
 def build_fusion(
     settings: AgentSettings, detector: Detector, *, source: str = "", line: int | None = None
 ) -> FusionMethod:
-    """The fusion method that the settings name. Raises SettingError, with this place, if its own settings are wrong,
-    or if it joins points and the detector looks at none."""
+    """Build the fusion method of a station.
+
+    Raise SettingError with this location if its settings are invalid, or if it shares points that the detector does not
+    read.
+    """
     kind: type[FusionMethod] = registry("fusion").load(settings.fusion, FusionMethod)
     _check_settings_type("fusion", settings.fusion, kind.settings_type)
     given = settings.fusion_settings
     if given and kind.settings_type is None:
-        message = f"fusion {settings.fusion!r} has no settings of its own"
+        message = f"fusion {settings.fusion!r} has no settings"
         raise SettingError(Diagnostic(message, "remove the property 'fusion_settings'", source, line))
     if kind.shares_points and "lidar" not in detector.needs:
-        message = f"fusion {settings.fusion!r} joins points, and detector {settings.detector!r} looks at none"
+        message = f"fusion {settings.fusion!r} shares points, which detector {settings.detector!r} does not read"
         raise SettingError(Diagnostic(message, "give it a detector for LiDAR: lidar", source, line))
     if kind.settings_type is None:
         return construct(kind)  # type: ignore[no-any-return]
@@ -111,13 +114,10 @@ def build_agent(
     detector: Detector | None = None,
     encoder: Asn1Encoder | None = None,
 ) -> Agent:
-    """The agent of the station on this body. Extensions are built as `Detector()` or `Detector(detector_settings)`,
-    `FusionMethod()` or `FusionMethod(fusion_settings)`, and `Planner(settings, spec, roads, dt=dt, seed=seed)`;
-    `detector` gives one that is built already.
+    """Build the agent of a station. `detector` is an instance that is built already.
 
-    A body with wheels follows a route if the settings name no planner; one without drives never. A station that does
-    not drive hears others where its settings name them.
-    Raises SettingError if a planner is asked of a body without wheels.
+    A vehicle without a planner in its settings follows a route. A station that does not drive receives messages only if
+    its settings select senders. Raise SettingError if an actor without wheels has a planner.
     """
     wheels = spec.wheelbase > 0.0
     planner = settings.planner or (DEFAULT_PLANNER if wheels else NO_PLANNER)
@@ -160,7 +160,7 @@ def _vehicle_controller(settings: AgentSettings, spec: ActorSpec, dt: float) -> 
 
 
 def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception:
-    """What looks for objects in the points of all stations: as the station's own, on readings that are located."""
+    """Build the perception of merged points: that of the station, without localization."""
     detector = build_detector(settings)
     detector.setup(installation)
     return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
@@ -177,6 +177,6 @@ def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | No
 
 
 def _localizer(name: str, seed: int, sensors: Mapping[str, SensorSettings]) -> Localizer:
-    """A filter that knows the data sheet of the station's inertial unit."""
+    """Build the localization filter with the noise of the IMU of the station."""
     units = [sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings)]
     return Localizer(name, seed, noise=motion_noise(units[0]))

@@ -1,4 +1,4 @@
-"""Stations that drive, and hardly move."""
+"""Detection of driving stations that do not move."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.world.view import WorldView
 
 LEAST = 1.0
-"""Distance from the start that a station which drives is expected to reach [m]."""
+"""Minimum distance from the start that a driving station is expected to reach [m]."""
 PATIENCE = 2.0
-"""Time for it [s]; of a station that drove for less, nothing can be said: most start from rest."""
+"""Minimum driving time before a warning [s]: most stations start from rest."""
 
 
 class MotionlessStations:
-    """Watches stations until they are `LEAST` [m] away from where they were first seen.
+    """Observer of driving stations until they are `LEAST` [m] away from their start.
 
-    `watching` is False as soon as there is none left, so that a tick costs nothing.
+    `watching` is False if no station is left, which saves the call in each tick.
     """
 
     def __init__(self, names: Iterable[str]) -> None:
@@ -28,7 +28,7 @@ class MotionlessStations:
         self.watching = bool(self._starts)
 
     def observe(self, view: WorldView, drivers: Collection[str]) -> None:
-        """Take one view, and the names of the stations that drive by themselves in this tick."""
+        """Process a view; `drivers` are the stations that drive in this tick."""
         for name, start in list(self._starts.items()):
             row = view.rows.get(name)
             if row is None:
@@ -40,13 +40,13 @@ class MotionlessStations:
                 self._since.setdefault(name, view.time)
                 self._reached[name] = max(self._reached.get(name, 0.0), math.hypot(x - start[0], y - start[1]))
             elif name not in self._reached:
-                self._starts[name] = None  # It is scripted so far: it counts from where it begins to drive.
+                self._starts[name] = None  # The start of a scripted station is where it begins to drive
             if self._reached.get(name, 0.0) >= LEAST:
                 del self._starts[name]
                 self.watching = bool(self._starts)
 
     def warnings(self, scenario: Scenario, time: float) -> Iterator[Diagnostic]:
-        """Yield a warning for each station that drove and did not leave its place until the end of the run [s]."""
+        """Yield a warning for each driving station that did not move until the end of the run at `time` [s]."""
         entities = scenario.document.entities
         lines = {one.name: one.line for one in entities.scenario_object} if entities is not None else {}
         for name in self._starts:

@@ -89,7 +89,7 @@ def split_planner_settings(
     for key in [key for key in rest if key not in station_settings]:
         other = _model_with(key)
         if other is not None:
-            _parse(other, {key: rest.pop(key)}, source, lines.get(key, line), lines, diagnostics, partial=True)
+            _parse(other, {key: rest.pop(key)}, source, lines.get(key, line), lines, diagnostics, incomplete=True)
     place = lines.get("planner_settings", lines.get("planner", line))
     found = _parse(model, {**own, **nested}, source, place, lines, diagnostics)
     return rest, found or PlannerSettings()
@@ -103,11 +103,11 @@ def _parse(
     lines: Mapping[str, int],
     diagnostics: list[Diagnostic],
     *,
-    partial: bool = False,
+    incomplete: bool = False,
 ) -> PlannerSettings | None:
     """Return the settings, or None after their errors are added to `diagnostics`.
 
-    A missing setting is no error if the settings are partial, or if its property has an error of its own.
+    A missing setting is no error if the settings are incomplete, or if its property is invalid.
     """
     try:
         return parse_settings(model, given, source=source, line=line, lines=lines)
@@ -117,7 +117,7 @@ def _parse(
             diagnostics += error.diagnostics
             return None
         for diagnostic, found in zip(error.diagnostics, cause.errors(include_url=False), strict=False):
-            if found["type"] != "missing" or not (partial or found["loc"][0] in lines):
+            if found["type"] != "missing" or not (incomplete or found["loc"][0] in lines):
                 diagnostics.append(diagnostic)
         return None
 

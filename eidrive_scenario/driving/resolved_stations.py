@@ -17,7 +17,7 @@ _WITH_SETTINGS = (
     ("fusion", "fusion"),
     ("vehicle_controllers", "vehicle_controller"),
 )
-"""Registries and properties of the extensions that have a mapping of settings of their own."""
+"""Registries and properties of the extensions whose settings are in a property `NAME_settings`."""
 
 
 def resolved_stations(

@@ -1,4 +1,4 @@
-"""Checks of what planners and controllers return."""
+"""Checks of the results of planners and vehicle controllers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.result_checks import LARGEST, are_within, describe, raise_not_finite, raise_outside
 
 FASTEST = 1e4
-"""Largest magnitude of a planned speed [m/s], as of the property `target_speed`, and of an acceleration [m/s²]."""
+"""Maximum magnitude of a planned speed [m/s], as of `target_speed`, and of an acceleration [m/s²]."""
 
 
 def check_plan(planner: Planner, plan: object) -> None:
@@ -50,7 +50,7 @@ def check_plan(planner: Planner, plan: object) -> None:
 
 
 def check_followed(planner: Planner, plan: Plan) -> None:
-    """Raise InvalidResult if the controller can find no control for a plan because of the plan itself."""
+    """Raise InvalidResult if a plan is the reason for which the controller fails."""
     check_plan(planner, plan)
     steps = np.hypot(*np.diff(plan.points, axis=0).T)
     if (equal := np.flatnonzero(steps == 0.0)).size:
@@ -60,7 +60,7 @@ def check_followed(planner: Planner, plan: Plan) -> None:
 
 
 def _is_in_range(plan: Plan) -> bool:
-    """Return whether all numbers of a plan are surely in their ranges; each line is False for NaN."""
+    """Return True if all numbers of a plan are in their ranges; each comparison is False for NaN."""
     return bool(
         are_within(plan.points, LARGEST)
         and are_within(plan.speeds, FASTEST)

@@ -1,4 +1,4 @@
-"""What a Controller's Properties may say about a station: the typed table, and its reading."""
+"""Settings of a station in the Properties of its controller, and their parser."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.v2x.messages.clock import StationClock
 
 MODULE = "eidrive"
-"""The value of the property `module` by which a controller is one of ours."""
+"""Value of the property `module` of a controller of this project."""
 
 _TEXTS = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})
 """Properties whose values are names, not YAML."""
@@ -38,19 +38,19 @@ _SELECTED = {
 """Registry of the extension that each of these properties names."""
 
 LOCALIZING = ("gnss", "imu")
-"""The kinds of sensors by which a station finds out where it is."""
+"""Kinds of sensors for localization."""
 
 _OF_THE_TRUTH_SENSOR = ("range", "field_of_view", "visibility", "mount")
 
 PARTIAL_LIFETIME = 1.5
-"""How long a report counts that leaves out what has not changed [s]; as `max_age` of covariance intersection."""
+"""Lifetime of a report that omits unchanged objects [s]; as `max_age` of covariance intersection."""
 
 MAX_TIME = 1e4
-"""Largest latency, lifetime and clock error [s]."""
+"""Maximum latency, lifetime and clock error [s]."""
 
 
 def _names(value: Any) -> Any:
-    """Names as a list, or as a text with commas; `all` is None, `none` is ()."""
+    """Return names given as a list or as a text with commas; `all` is None, `none` is ()."""
     if value is None or value == "all":
         return None
     if isinstance(value, str):
@@ -61,7 +61,7 @@ def _names(value: Any) -> Any:
 
 
 def _sensors(value: Any) -> Any:
-    """Sensors as names of their kinds, or as a mapping from a name to its settings; the kind may be the name."""
+    """Return a mapping from names to settings of sensors, also from names of kinds; the name may be the kind."""
     if isinstance(value, str):
         value = [part.strip() for part in value.split(",") if part.strip()]
     if isinstance(value, Mapping):
@@ -86,35 +86,35 @@ _Sensor = Annotated[SerializeAsAny[SensorSettings], BeforeValidator(parse_sensor
 
 
 class AgentSettings(Settings):
-    """One station. Lengths in m, speeds in m/s, times in s, angles in degrees, rates in Hz; world frame.
+    """Settings of one station. Lengths in m, speeds in m/s, times in s, angles in degrees, rates in Hz; world frame.
 
-    detector, fusion, planner   names of extensions; planner `none` parks a vehicle, and is all that a mast can have
-    detector_settings  what the detector itself may be told
-    detector_latency   how long the detector computes: what it saw at t is known from t + latency on
-    fusion_settings    what the fusion method itself may be told
-    tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks what has no velocities
-    localization    `oracle`, or `ekf`: the station finds out by GNSS and IMU where it is
+    detector, fusion, planner   names of extensions; planner `none` parks a vehicle. A mast has no other planner
+    detector_settings  settings of the detector
+    detector_latency   computing time of the detector: detections of time t are available from t + latency on
+    fusion_settings    settings of the fusion method
+    tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks detections without velocities
+    localization    `oracle`, or `ekf`: pose estimation by GNSS and IMU
     obey_signals    whether the vehicle stops at red traffic lights and stop signs
-    sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the
-                    detector usually has
-    range, field_of_view, mount, visibility   of the truth sensor, where `sensors` does not say them
-    cooperates_with senders whose messages count; None is all. A station that does not drive hears those whom it names
-                    here, and without this property nobody
-    message_rate    how often the station sends what it sees, None is each tick
-    report_timeout  a report older than this is forgotten. Where it is not given: 1 s for a list of all that its sender
-                    sees; 1.5 s for CAMs and for CPMs by the rules of ETSI, which repeat what stands still once a second
-                    (T_GenCamMax, T_GenCpmMax), so that a message may be half a second late
-    antenna_height  over the reference point; None is the roof
-    messages        what it sends: `cpm` (the objects that it perceives), `cam` (itself)
-    generation      `each_tick`, `rate` (message_rate), or `etsi`: by the triggers of EN 302 637-2 and TS 103 324; None
-                    is one of the first two
-    mtu             largest message by the rules of ETSI [bytes];  security_bytes  of the envelope, in every CPM
-    clock_offset    how much the station's clock is ahead;  clock_drift  how fast it gains [parts per million]
-    asn1_files      ASN.1 modules that say how large a message is, relative to the scenario file
-    target_speed    where the storyboard asks for none; None keeps the first one
-    vehicle_controller  name of the controller that follows the trajectories of the planner, and
-    vehicle_controller_settings  its own settings
-    planner_settings  of the selected planner; each may also be a property of its own
+    sensors         kinds (`truth, camera`), or a mapping from names to settings; None uses the defaults of the detector
+    range, field_of_view, mount, visibility   of the truth sensor, unless `sensors` sets them
+    cooperates_with senders whose messages are received; None: all. A station that does not drive receives messages
+                    only with this property
+    message_rate    rate of CPMs; None: one in each tick
+    report_timeout  lifetime of a report. Default: 1 s for a complete list of objects; 1.5 s for CAMs and CPMs by the
+                    ETSI rules, which repeat stationary objects once per second (T_GenCamMax, T_GenCpmMax), so that a
+                    message may be delayed by 0.5 s
+    antenna_height  above the reference point; None: on the roof
+    messages        kinds of sent messages: `cpm` (perceived objects), `cam` (ego state)
+    generation      `each_tick`, `rate` (message_rate), or `etsi`: by the rules of EN 302 637-2 and TS 103 324; None
+                    selects one of the first two
+    mtu             maximum size of a message by the ETSI rules [bytes]
+    security_bytes  size of the security envelope of every CPM [bytes]
+    clock_offset    lead of the station clock; clock_drift  its rate error [parts per million]
+    asn1_files      ASN.1 modules that determine the sizes of messages, relative to the scenario file
+    target_speed    speed without a request of the storyboard; None keeps the initial speed
+    vehicle_controller  name of the controller that follows the trajectories of the planner
+    vehicle_controller_settings  settings of the vehicle controller
+    planner_settings  settings of the selected planner; a property with the name of a setting is accepted as well
     """
 
     module: Literal["eidrive"] = "eidrive"
@@ -167,34 +167,34 @@ class AgentSettings(Settings):
     def _in_time(self) -> AgentSettings:
         if self.detector_latency >= self.report_timeout:
             raise ValueError(
-                f"detections {self.detector_latency:g} s late are forgotten at once: "
-                f"report_timeout is {self.report_timeout:g} s"
+                f"detector_latency is not below report_timeout (got {self.detector_latency:g} s and "
+                f"{self.report_timeout:g} s)"
             )
         return self
 
     @property
     def restricts_senders(self) -> bool:
-        """Whether it was said whom to hear, be it all; a station that drives hears all without a word."""
+        """Whether the settings select senders, which may be all; driving stations receive from all by default."""
         return "cooperates_with" in self.model_fields_set and self.cooperates_with != ()
 
     def lifetime(self, *, complete: bool) -> float:
-        """How long a report counts [s]; `complete` where it tells all that its sender sees at that time."""
+        """Return the lifetime of a report [s]; `complete` if it lists all objects in sight of its sender."""
         given = "report_timeout" in self.model_fields_set
         return self.report_timeout if complete or given else PARTIAL_LIFETIME
 
     @property
     def clock(self) -> StationClock:
-        """The station's own."""
+        """Clock of the station."""
         return StationClock(self.clock_offset, self.clock_drift * 1e-6)
 
     def rig_sensors(
         self, needs: frozenset[str], usual: Mapping[str, SensorSettings] = MappingProxyType({})
     ) -> dict[str, SensorSettings]:
-        """The sensors of this station, for a detector that reads these kinds; those to localize by are added.
+        """Return the sensors of this station for a detector that reads these kinds, with those for localization.
 
-        `usual` are those of a station that says nothing of them; where empty, it has one of each kind.
+        usual  default sensors of the detector; if empty, one sensor of each kind that it needs
 
-        Raises SettingError if the settings leave one out that the detector needs.
+        Raise SettingError if the settings omit a sensor that the detector needs.
         """
         sensors: dict[str, Any] = dict(usual) or {kind: default_sensor(kind) for kind in sorted(needs)}
         if self.sensors is not None:
@@ -215,15 +215,15 @@ class AgentSettings(Settings):
 
 
 def is_agent_controller(controller: Controller) -> bool:
-    """Whether this controller is one of ours."""
+    """Return True if this controller has `module=eidrive`."""
     found = controller.properties.property if controller.properties is not None else ()
     return any(entry.name == "module" and entry.value == MODULE for entry in found)
 
 
 def agent_settings(controller: Controller) -> AgentSettings:
-    """The settings in a controller's Properties; values other than names are YAML.
+    """Return the settings in the Properties of a controller. Values other than names are YAML.
 
-    Raises SettingError with file and line of each property that is unknown, doubled or wrong.
+    Raise SettingError with file and line of each unknown, duplicate or invalid property.
     """
     entries = controller.properties.property if controller.properties is not None else ()
     source = controller.source

@@ -1,4 +1,4 @@
-"""What the controllers of a scenario say of its stations: settings, detectors, encoders, checked before the run."""
+"""Settings, detectors and encoders that the controllers of a scenario declare, checked before the run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from eidrive_scenario.world.specs import actor_spec
 def declared_settings(
     scenario: Scenario, detector: str | None, cooperate: tuple[str, ...] | None
 ) -> dict[str, AgentSettings]:
-    """The settings of every entity with a controller of ours, options applied; all that is wrong in one error."""
+    """Return the settings of every station, with options applied. Raise SettingError with all diagnostics."""
     if detector is not None and detector not in registry("detectors"):
         hint = suggestion(detector, registry("detectors"))
         raise SettingError(Diagnostic(f"unknown detector {detector!r}", hint, "--detector"))
@@ -59,12 +59,12 @@ def declared_settings(
 
 
 def possible_drivers(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> list[str]:
-    """The stations that drive by themselves while their controller is active."""
+    """Return the stations that drive while their controller is active."""
     return [name for name, station in settings.items() if _drives(scenario, name, station)]
 
 
 def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
-    """What a detector by option changes: the settings in the file are those of the detector in the file."""
+    """Return the changes by a detector option; `detector_settings` of the file apply to the detector of the file."""
     if detector is None:
         return {}
     return {"detector": detector} | ({} if detector == settings.detector else {"detector_settings": {}})
@@ -86,8 +86,10 @@ def declared_detectors(
     load_weights: bool = True,
     allow_torchscript: bool = False,
 ) -> dict[str, Detector]:
-    """The detector of every station, with its weights unless `load_weights` is False. Raises SettingError with all that
-    is wrong with any of them, their sensors or their methods of fusion."""
+    """Build the detector of every station, and load its weights if `load_weights`.
+
+    Raise SettingError with all diagnostics of detectors, sensors, fusion methods and vehicle controllers.
+    """
     diagnostics: list[Diagnostic] = []
     found: dict[str, Detector] = {}
     for name, station in settings.items():
@@ -116,7 +118,7 @@ def declared_detectors(
 
 
 def torchscript_warnings(scenario: Scenario) -> list[Diagnostic]:
-    """A warning for each controller whose detector names TorchScript weights, which a run may refuse."""
+    """Return a warning for each controller whose detector has TorchScript weights, which a run may reject."""
     warnings = []
     for controller in dict.fromkeys(one for assigned in scenario.controllers.values() for one in assigned):
         entries = controller.properties.property if controller.properties is not None else ()
@@ -133,7 +135,7 @@ def torchscript_warnings(scenario: Scenario) -> list[Diagnostic]:
 
 
 def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> dict[str, Asn1Encoder]:
-    """The encoder of every station that has ASN.1 modules. Raises SettingError, with the place of the property."""
+    """Build the encoder of every station with ASN.1 modules. Raise SettingError with the location of the property."""
     found = {}
     folder = Path(scenario.path).parent if scenario.path is not None else Path()
     for name, station in settings.items():
@@ -147,7 +149,7 @@ def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings])
 
 
 def _line(controller: Controller, *properties: str) -> int:
-    """The line of the first of these properties that a controller has, else its own."""
+    """Return the line of the first of these properties that a controller has; else that of the controller."""
     entries = controller.properties.property if controller.properties is not None else ()
     lines = {entry.name: entry.line for entry in entries}
     return next((lines[name] for name in properties if name in lines), controller.line)

@@ -1,4 +1,4 @@
-"""What a station's agent is asked to do, and what it did in one tick."""
+"""Trajectory of a planner, and the step of an agent in one tick."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from eidrive_scenario.world.actor import Control
 @fast_frozen
 @dataclass(frozen=True)
 class Plan:
-    """A trajectory: points (M, 2) [m] and the speed at each (M,) [m/s], and why it looks as it does."""
+    """Trajectory: points (M, 2) [m], the speed at each point (M,) [m/s], and the reason for them."""
 
     points: Array
     speeds: Array
     reason: str
     acceleration: float = 0.0
-    """With which the first speed is changing [m/s²]."""
+    """Rate of change of the first speed [m/s²]."""
     braking: float | None = None
-    """A deceleration to apply whatever the speeds say [m/s²]."""
+    """Deceleration that overrides the speeds [m/s²]."""
     objects: tuple[int, ...] = ()
-    """The objects that make it look so, as rows of those that the planner was given."""
+    """Objects that are the reason for the plan, as rows of the objects passed to the planner."""
 
 
 @fast_frozen
 @dataclass(frozen=True)
 class AgentStep:
-    """One tick of one station: what it saw, heard, concluded, planned and did."""
+    """Step of one station: detections, received messages, fused objects, plan, control and sent messages."""
 
     detections: Detections
     inbox: tuple[ReceivedMessage, ...]
@@ -41,4 +41,4 @@ class AgentStep:
     """None for a station that does not drive (a roadside unit)."""
     outbox: tuple[Message, ...]
     estimate: EgoState | None = None
-    """Its own motion as it takes it to be, where that is not the truth."""
+    """Estimated ego state; None if the station uses its true state."""

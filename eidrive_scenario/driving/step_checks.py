@@ -1,4 +1,4 @@
-"""Delays that the step of a run cannot show."""
+"""Warnings about delays shorter than the time step."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def short_channel_delay(
 ) -> Iterator[Diagnostic]:
     """Yield a warning if most messages of a channel are delayed by less than one step `dt` [s], but by more than 0.
 
-    Without a delay a message arrives in the next tick too; that is the channel's rule, and no warning.
+    A message without delay arrives in the next tick by definition of the channel, which is no warning.
     """
     delay: Any = getattr(profile, "delay", None)
     if profile is None or not hasattr(delay, "quantile"):

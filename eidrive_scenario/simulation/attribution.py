@@ -1,7 +1,8 @@
-"""Attribution of errors to extensions: which one was running when an exception arose, for whom, and at which line.
+"""Attribution of errors to extensions: the extension that raised an exception, its station or actor, and the line.
 
-The stack of the exception shows it: the frame of an extension's method has the extension as its first argument, and the
-frames around it belong to the station, action or condition that called it. Runs without errors take no extra time.
+The stack of the exception contains this information: the frame of a method of an extension has the extension as first
+argument, and the outer frames belong to the station, action or condition that called it. Runs without errors need no
+additional time.
 """
 
 from __future__ import annotations

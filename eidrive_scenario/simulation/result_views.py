@@ -81,7 +81,7 @@ def result_row(result: Result) -> dict[str, Scalar]:
 
 
 def typed(text: str) -> Scalar:
-    """The number that a parameter's text is, or the text itself; `007` and words stay texts."""
+    """Return the text of a parameter as a number if it is one; `007` and words remain texts."""
     if _WHOLE.fullmatch(text):
         return int(text)
     if _NUMBER.fullmatch(text) and not re.match(r"[+-]?0\d", text):

@@ -1,4 +1,4 @@
-"""What is asked of a run, what it comes to, and who may watch it."""
+"""Settings, result and observers of a run."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ DEFAULT_SEED = 1
 
 @dataclass(frozen=True)
 class RunSettings:
-    """What a caller may say beside the file; None leaves it to the file.
+    """Optional settings of a run; None uses the value of the scenario file.
 
-    channel         profile name or file; 'none' is no cooperation
+    channel         profile name or file; 'none' disables cooperation
     detector        for all stations
-    cooperate       the senders whom listening stations hear; () is nobody
-    parameters      values for parameters of the scenario; an Assignment knows the file and line that gave the value
-    dt              step [s]
-    controllers     who stands in for controllers of other tools, by the controller's name; without an entry its entity
-                    keeps lane and speed
-    time_limit      [s] of simulated time, above 0, for files that do not end by themselves
-    weather         preset or file; it wins over all that the file says of weather and road
-    user_values     for UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
+    cooperate       senders whose messages the receiving stations use; () disables reception
+    parameters      values of scenario parameters; an Assignment contains the file and line of the value
+    dt              time step [s]
+    controllers     controller models of controllers of other tools, by the name of the controller; without an entry the
+                    entity keeps lane and speed
+    time_limit      maximum simulated time [s], above 0, for scenarios without an end
+    weather         preset or file; it overrides weather and road condition of the scenario
+    user_values     of UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
     allow_torchscript   whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
     """
 
@@ -56,13 +56,13 @@ class RunSettings:
     allow_torchscript: bool = False
 
     def __post_init__(self) -> None:
-        """Bring values of parameters and user-defined values to texts, as a command line has them.
+        """Convert values of parameters and user-defined values to texts, as on a command line.
 
-        Raises SettingError for values of a wrong type, and for a time limit that ends no run.
+        Raise SettingError for values of a wrong type, and for a time limit that is not positive.
         """
         for name, types, expected in _TYPES:
             value = getattr(self, name)
-            # A bool is a number to Python, but True is no number of seconds.
+            # bool is a subclass of int, but True is not a number of seconds
             if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
                 raise SettingError(Diagnostic(f"{name} is {quoted(value)}", f"give {expected}"))
         object.__setattr__(self, "cooperate", _senders(self.cooperate))
@@ -79,17 +79,17 @@ _TYPES: tuple[tuple[str, tuple[type, ...], str], ...] = (
     ("detector", (str, type(None)), "the name of a detector"),
     ("parameters", (Mapping,), "a mapping of names to values"),
     ("user_values", (Mapping,), "a mapping of names to values"),
-    ("controllers", (Mapping,), "a mapping of controllers to who stands in for them"),
+    ("controllers", (Mapping,), "a mapping of controllers to controller models"),
     ("dt", (Real,), "a number of seconds"),
     ("time_limit", (Real,), "a number of seconds"),
-    # A text such as "no" would be true.
+    # A text such as "no" would be true
     ("allow_torchscript", (bool,), "True or False"),
 )
-"""Types of the settings of a run, and what a message states of them."""
+"""Types of the settings of a run, and the expected values in messages."""
 
 
 def _senders(given: Any) -> tuple[str, ...] | None:
-    """Names of stations as a tuple, those of a set in order."""
+    """Return names of stations as a tuple; those of a set are sorted."""
     if given is None:
         return None
     if isinstance(given, str):
@@ -102,7 +102,7 @@ def _senders(given: Any) -> tuple[str, ...] | None:
 
 
 def _texts(setting: str, values: Mapping[Any, Any]) -> dict[str, str | Assignment]:
-    """Names with values as texts; an Assignment stays what it is."""
+    """Return names with values as texts; Assignments are unchanged."""
     texts: dict[str, str | Assignment] = {}
     for name, value in values.items():
         if not isinstance(name, str):
@@ -112,9 +112,9 @@ def _texts(setting: str, values: Mapping[Any, Any]) -> dict[str, str | Assignmen
 
 
 def as_setting_text(what: str, value: object) -> str:
-    """Return the value of a parameter, or a user-defined value, as a file or a command line writes it.
+    """Return the value of a parameter or a user-defined value as the text in a file or on a command line.
 
-    Raises SettingError for what is neither a text nor a number, truth value or path.
+    Raise SettingError unless it is a text, number, truth value or path.
     """
     if isinstance(value, str):
         return value
@@ -126,7 +126,7 @@ def as_setting_text(what: str, value: object) -> str:
 
 
 def checked_seed(seed: SupportsIndex) -> int:
-    """Return a seed as an int, such as an entry of an array. Raise SettingError if it is no integer."""
+    """Return a seed, such as an entry of an array, as an int. Raise SettingError if it is not an integer."""
     try:
         return index(seed)
     except TypeError:
@@ -135,14 +135,14 @@ def checked_seed(seed: SupportsIndex) -> int:
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run came to."""
+    """Result of a run."""
 
     scenario: str
     seed: int
     channel: str
     passed: bool
     end_reason: str
-    """stop trigger, storyboard complete, criterion: NAME, or time limit"""
+    """Reason for the end: stop trigger, storyboard complete, criterion: NAME, command: NAME, or time limit."""
     exit_code: int
     criteria: tuple[Verdict, ...]
     metrics: Mapping[str, float]
@@ -151,22 +151,22 @@ class RunResult:
     wall_s: float
     warnings: tuple[str, ...] = ()
     parameters: Mapping[str, str] = field(default_factory=dict)
-    """Of the scenario as a whole, with the values that counted."""
+    """Parameters of the scenario, with the values of the run."""
     run: int | None = None
-    """Its number among the runs of a parameter value distribution, from 0 on."""
+    """Index among the runs of a parameter value distribution, from 0."""
     links: Mapping[tuple[str, str], LinkStatistics] = field(default_factory=dict)
-    """The books of the radio, by (sender, receiver)."""
+    """Link statistics, by (sender, receiver)."""
     settings: ResolvedSettings = field(default_factory=ResolvedSettings)
-    """All settings that determined the run."""
+    """All settings that determine the run."""
     command: str = ""
-    """Command line that repeats the run; empty for a scenario without a file."""
+    """Command line that reproduces the run; empty for a scenario without a file."""
     folder: Path | None = None
-    """Folder of `result.json`, where the run has left one."""
+    """Folder of `result.json`; None if it was not written."""
     recording: Path | None = None
-    """The recording, where the run has left one."""
+    """Recording; None if it was not written."""
 
     def __str__(self) -> str:
-        """The outcome in one line."""
+        """Return the outcome in one line."""
         failed = [verdict.name for verdict in self.criteria if not verdict.passed]
         outcome = "passed" if self.passed else f"failed by {', '.join(failed)}" if failed else "not passed"
         number = "" if self.run is None else f", run {self.run}"
@@ -175,20 +175,20 @@ class RunResult:
         return f"{head}: {outcome} ({self.end_reason} at {self.simulated_s:.2f} s{warned})"
 
     def _repr_html_(self) -> str:
-        """The outcome as HTML, for notebooks; all texts are escaped."""
+        """Return the outcome as HTML for notebooks; all texts are escaped."""
         return result_html(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as one flat row: every value is a number, a text, a truth value or None.
 
-        Columns: the outcome; `parameter.NAME`, as a number where the value is one; `channel.KEY`, the content of the
+        Columns: the outcome; `parameter.NAME`, as a number if the value is one; `channel.KEY`, the content of the
         channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the metrics by their names;
         `warnings`, the number of them. `pandas.DataFrame([result.to_dict() for result in results])` is a table of runs.
         """
         return result_row(self)
 
     def as_json(self) -> dict[str, Any]:
-        """The object that `--json` prints."""
+        """Return the object that `--json` prints."""
         return {
             "scenario": self.scenario,
             **({} if self.run is None else {"run": self.run}),
@@ -224,13 +224,13 @@ class RunResult:
 
 
 class Observer(Protocol):
-    """Watches a run without changing it: a recorder, a CSV writer, a collector of pictures."""
+    """Observer of a run that does not change it, such as a recorder, a CSV writer or a collector of images."""
 
     def observe(self, frame: Frame) -> None:
-        """Take one frame."""
+        """Process one frame."""
 
     def close(self) -> None:
-        """The run is over."""
+        """Finish after the last frame."""
 
 
 def checked_observer(observer: Observer) -> Observer:

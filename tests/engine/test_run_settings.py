@@ -1,4 +1,4 @@
-"""What a caller gives to a run in Python: seeds, stations, limits."""
+"""Settings of runs in Python: seeds, stations, limits."""
 
 from __future__ import annotations
 

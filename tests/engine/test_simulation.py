@@ -82,7 +82,7 @@ def test_the_hidden_car_is_hit_without_cooperation_and_missed_with_it(name: str)
     assert alone.metrics["min_distance.Ego.Incoming.box"] == 0.0
 
 
-def test_the_ego_hears_of_the_car_before_it_can_see_it() -> None:
+def test_ego_receives_detection_of_hidden_car_before_line_of_sight() -> None:
     watch = Frames()
     play(ONE, 1, watch, channel="ideal")
 
@@ -111,7 +111,7 @@ def test_one_seed_gives_one_trace_in_any_order_and_in_another_process() -> None:
     assert elsewhere.stdout == first
 
 
-def test_a_channel_that_loses_all_is_no_cooperation_and_one_that_loses_nothing_is_ideal(tmp_path: Path) -> None:
+def test_total_loss_equals_no_cooperation_and_zero_loss_equals_ideal(tmp_path: Path) -> None:
     def trace(channel: str) -> list[tuple[float, ...]]:
         watch = Frames()
         play(ONE, 2, watch, channel=channel)
@@ -187,7 +187,7 @@ def test_an_unknown_detector_and_sender_are_told_with_their_option() -> None:
         play(channel="latency")
 
 
-def test_a_run_that_does_not_end_by_itself_runs_out_of_its_time_limit() -> None:
+def test_run_without_stop_ends_at_time_limit() -> None:
     result = play(channel="ideal", time_limit=2.0)
     assert (result.end_reason, result.exit_code, result.passed) == ("time limit", 3, False)
     assert result.simulated_s == pytest.approx(2.0)

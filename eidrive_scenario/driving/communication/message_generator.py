@@ -1,4 +1,4 @@
-"""What a station says, and when."""
+"""Generation of the messages of a station (CAM, CPM)."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from eidrive_scenario.world.actor import ActorSpec
 
 
 class MessageGenerator:
-    """Makes the messages of one station, by the rules that its settings name.
+    """Generator of the messages of one station, by the rules that its settings select.
 
-    sensors  how many the station has;  encoder  writes messages to learn their size, None: by the size model
+    sensors  number of sensors of the station
+    encoder  encodes messages to measure their size; None uses the size model
     """
 
     def __init__(
@@ -39,8 +40,8 @@ class MessageGenerator:
         self._cam_rules = CamGenerationRules()
         self._cpm_rules = CpmGenerationRules()
         self._numbering = ObjectIdAssigner()
-        self._said = dict.fromkeys(settings.messages, -math.inf)
-        """When each kind of message was last made [s]."""
+        self._last_generated = dict.fromkeys(settings.messages, -math.inf)
+        """Time of the last message of each kind [s]."""
 
     def generate(
         self,
@@ -51,21 +52,21 @@ class MessageGenerator:
         *,
         interval: float = 0.0,
     ) -> tuple[Message, ...]:
-        """The messages of this tick, none where none is due; the first CPM carries the points.
+        """Return the messages of this tick; the first CPM carries the points.
 
-        interval  least time between two messages of this station by congestion control [s]; the rules of ETSI keep to
-                  it. Of two kinds of messages then only one is made at a time, first that which was made longer ago
+        interval  minimum time between two messages under congestion control [s], respected by the ETSI rules. With two
+                  kinds of messages only the less recent kind is generated in a tick
         """
         etsi = self._settings.generation == "etsi"
-        if not etsi and not self._in_turn(now):
+        if not etsi and not self._is_due_by_rate(now):
             return ()
         interval = min(interval, LONGEST)
-        said: list[Message] = []
+        generated: list[Message] = []
         kinds = self._settings.messages
         if len(kinds) > 1:
-            kinds = tuple(sorted(kinds, key=lambda kind: (self._said[kind], kind)))
+            kinds = tuple(sorted(kinds, key=lambda kind: (self._last_generated[kind], kind)))
         for kind in kinds:
-            if etsi and interval > 0.0 and now - max(self._said.values()) < interval - EQUAL:
+            if etsi and interval > 0.0 and now - max(self._last_generated.values()) < interval - EQUAL:
                 break
             if etsi:
                 messages = self._due(kind, state, detections, now, max(interval, SHORTEST))
@@ -74,20 +75,20 @@ class MessageGenerator:
             if points is not None and messages and kind == "cpm":
                 messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
             if messages:
-                self._said[kind] = now
-            said += messages
-        return tuple([self._clock.with_station_timestamps(message, now) for message in said])
+                self._last_generated[kind] = now
+            generated += messages
+        return tuple([self._clock.with_station_timestamps(message, now) for message in generated])
 
     def _due(
         self, kind: str, state: StationState, detections: Detections, now: float, shortest: float
     ) -> list[Message]:
-        """The messages of this kind that the rules of ETSI ask for now."""
+        """Return the messages of this kind that are due by the ETSI generation rules."""
         if kind == "cpm":
             return self._triggered_cpms(state, detections, now, shortest)
         return [self._cam(state, now)] if self._cam_rules.is_due(state, now, shortest) else []
 
-    def _in_turn(self, now: float) -> bool:
-        """Each tick, or at a rate."""
+    def _is_due_by_rate(self, now: float) -> bool:
+        """Return True if a message is due in this tick, in each tick or at a rate."""
         rate = self._settings.message_rate
         if rate is None:
             return True
@@ -98,14 +99,14 @@ class MessageGenerator:
         return True
 
     def _full_cpm(self, state: StationState, detections: Detections, now: float) -> Message:
-        """All that is in sight; also where that is nothing, as that is news too."""
+        """Return a CPM with all detections. An empty CPM states that no object is in sight."""
         size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
         return self._sized(Message(self._spec.name, self._take_number(), now, state, detections, size), self._sensors)
 
     def _triggered_cpms(
         self, state: StationState, detections: Detections, now: float, shortest: float
     ) -> list[Message]:
-        """What the rules of ETSI choose, in as many messages as it needs."""
+        """Return the CPMs with the objects that the ETSI rules select, segmented by the MTU."""
         numbers = self._numbering.assign_ids(detections)
         contents = self._cpm_rules.contents(detections, numbers, now, shortest)
         if contents is None:
@@ -113,8 +114,8 @@ class MessageGenerator:
         security, mtu = self._settings.security_bytes, self._settings.mtu
         sensors = self._sensors if contents.sensors else 0
         rows = list(contents.rows)
-        said: list[Message] = []
-        while rows or not said:
+        generated: list[Message] = []
+        while rows or not generated:
             room = objects_that_fit(mtu, sensors, security)
             part, rows = rows[:room], rows[room:]
             message = Message(
@@ -126,12 +127,12 @@ class MessageGenerator:
                 cpm_size(len(part), sensors, security),
                 objects=tuple(numbers[row] for row in part),
             )
-            said.append(self._sized(message, sensors))
+            generated.append(self._sized(message, sensors))
             sensors = 0
-        return said
+        return generated
 
     def _cam(self, state: StationState, now: float) -> Message:
-        """The station itself."""
+        """Return a CAM."""
         low_frequency = self._cam_rules.low_frequency(now)
         message = Message(
             self._spec.name,
@@ -156,7 +157,7 @@ class MessageGenerator:
 
 
 def own_body(spec: ActorSpec, state: StationState) -> Detections:
-    """A station as an object that others can know of, where it says it is."""
+    """Return the detection of a station at its transmitted state."""
     cos, sin = math.cos(state.yaw), math.sin(state.yaw)
     ahead, aside, up = spec.offset
     center: Sequence[float] = (

@@ -1,4 +1,4 @@
-"""What one station has said of its objects, message by message, where no message lists all of them."""
+"""Assembly of the objects of one station from messages that each list a part of them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from eidrive_scenario.v2x.messages.message import Message
 
 
 class PartialReportAssembler:
-    """Keeps what was last said of each object, until that is `timeout` old [s]."""
+    """Store of the last report of each object for at most `timeout` [s]."""
 
     def __init__(self, timeout: float) -> None:
         self._timeout = timeout
         self._rows: dict[int, tuple[float, Detections]] = {}
 
     def update(self, message: Message) -> Detections:
-        """A message has come in: all that is known by now, moved on to the instant of the newest measurement.
+        """Add a message; return all known objects predicted to the time of the newest measurement.
 
-        Objects move at their last velocity, and stand where that is unknown.
+        Objects are predicted at their last velocity; objects of unknown velocity keep their position.
         """
         detections = message.detections
         for row, number in enumerate(message.objects or ()):
@@ -29,9 +29,9 @@ class PartialReportAssembler:
                 self._rows[number] = (detections.time, detections.subset([row]))
         newest = max([detections.time, *(time for time, _ in self._rows.values())])
         self._rows = {number: held for number, held in self._rows.items() if newest - held[0] <= self._timeout}
-        return self._picture(newest)
+        return self._predicted_objects(newest)
 
-    def _picture(self, time: float) -> Detections:
+    def _predicted_objects(self, time: float) -> Detections:
         if not self._rows:
             return Detections(time)
         numbers = sorted(self._rows)

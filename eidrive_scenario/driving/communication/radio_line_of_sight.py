@@ -1,4 +1,4 @@
-"""The world as the radio sees it: where the antennas are, and what stands between them."""
+"""Line of sight between antennas: positions of antennas, and blocking bodies between them."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from eidrive_scenario.world.view import WorldView
 Place = tuple[float, float, float]
 
 _BEYOND = 0.02
-"""How far behind a hit the ray goes on [m]: from so far inside a body pybullet hardly ever sees that body again."""
+"""Distance behind a hit at which the ray continues [m]; pybullet rarely reports the same body again from there."""
 _FEW = 8
-"""So many rays are first asked whether they meet anything but their end, which is quicker."""
+"""Maximum number of rays that are first tested for any hit, which is faster."""
 _MOST_BODIES = 16
-"""So many bodies on one ray are looked at; whatever comes after them changes no path loss."""
+"""Maximum number of bodies per ray; further bodies do not change the path loss."""
 
 
 def antenna_position(view: WorldView, spec: ActorSpec, height: float | None) -> Place:
-    """The antenna of a station: above the middle of its box, at this height over its reference point, or on the roof.
+    """Return the antenna position of a station in the world frame [m], above the center of its box.
 
-    In the world frame [m]; pitch and roll are neglected.
+    height  above the reference point [m]; None: on the roof. Pitch and roll are neglected.
     """
     row = view.rows[spec.name]
     x, y, z, yaw, *_ = view.states[row]
@@ -37,9 +37,9 @@ def antenna_position(view: WorldView, spec: ActorSpec, height: float | None) -> 
 
 
 def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
-    """What the rays between the antennas of these pairs meet; their own two bodies do not count.
+    """Return the line-of-sight state of these pairs of antennas; the bodies of the pair do not block.
 
-    A vehicle or any other actor in between makes NLOSv, a building or the ground NLOS.
+    An actor in between gives NLOSv, a building or the ground NLOS.
     """
     count = len(pairs)
     view = world.view()
@@ -68,7 +68,7 @@ def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence
                 continue
             name = view.names[row]
             if name == pairs[ray][1]:
-                continue  # the body of the other station, and nothing is between that and its antenna
+                continue  # The body of the other station: nothing is between it and its antenna
             if name != pairs[ray][0] and name not in found.get(ray, ()):
                 found.setdefault(ray, []).append(name)
                 states[ray] = NLOSV

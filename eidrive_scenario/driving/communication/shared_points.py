@@ -1,4 +1,4 @@
-"""A station that shares points with others and detects in those of all."""
+"""Sharing of lidar points: received point clouds, and detection in merged points."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 
 class PointCloudSharing:
-    """The clouds that others sent, and the search for objects in them and the own points together.
+    """Received point clouds, and detection in them together with the points of the station.
 
-    perception   for that search; one of its own, as detectors and trackers remember what they saw. None for a station
-                 that hears nobody
+    perception   separate instance for the merged points, as detectors and trackers have state; None for a station that
+                 does not receive messages
     """
 
     def __init__(self, fusion: FusionMethod, perception: Perception | None) -> None:
         self.own: PointCloud | None = None
-        """The newest points of this station, as it sends them."""
+        """Newest points of this station, as transmitted."""
         self._fusion = fusion
         self._perception = perception
-        self._heard: dict[str, tuple[float, Array]] = {}
+        self._received: dict[str, tuple[float, Array]] = {}
 
     def add_points(self, sender: str, cloud: PointCloud, body: Array) -> None:
-        """A cloud has come in; points on the own body (7,), where that was when they were measured, are left out.
+        """Store a received cloud without points on the ego body (7,) at the time of measurement.
 
-        A late cloud does not replace a newer one.
+        An out-of-sequence cloud does not replace a newer one.
         """
-        held = self._heard.get(sender)
+        held = self._received.get(sender)
         if held is None or cloud.time >= held[0]:
             points = cloud.points()
-            self._heard[sender] = (cloud.time, points[~points_in_box(points, body)])
+            self._received[sender] = (cloud.time, points[~points_in_box(points, body)])
 
     def perceive(self, readings: Readings, alone: Detections | None) -> Detections | None:
-        """The objects that become known now, `alone` being those in the own points; None if there is nothing new."""
+        """Return newly available objects in merged points, or None. `alone` are the objects in ego points."""
         self.own = self._fusion.shared_cloud(readings) or self.own
         if self._perception is None:
             return alone
         oldest = readings.time - self._fusion.max_point_age - TIME_TOLERANCE
-        self._heard = {sender: held for sender, held in self._heard.items() if held[0] >= oldest}
+        self._received = {sender: held for sender, held in self._received.items() if held[0] >= oldest}
         return self._perception.perceive(
-            self._fusion.merge_readings(readings, [points for _, (_, points) in sorted(self._heard.items())])
+            self._fusion.merge_readings(readings, [points for _, (_, points) in sorted(self._received.items())])
         )

@@ -8,7 +8,7 @@ from eidrive_scenario.world.physics.dynamics import VehicleParameters
 
 
 class ControlOverrides:
-    """The controls of one vehicle, some of which may be held. It knows where they were, as rates are limited."""
+    """Controls of one vehicle with overrides. The last controls are stored for rate limits."""
 
     def __init__(self, spec: ActorSpec, dt: float) -> None:
         self._dt = dt
@@ -18,7 +18,7 @@ class ControlOverrides:
         self._before: dict[str, float] = {}
 
     def apply(self, driver: Control, held: Overrides) -> Control:
-        """What reaches the vehicle: the driver's control, but for what is held."""
+        """Return the control of the driver with overrides applied."""
         wheel = driver.steering * self._ratio
         now = {"throttle": driver.throttle, "brake": driver.brake, "steeringWheel": wheel}
         now |= {"clutch": 0.0, "parkingBrake": 0.0}
@@ -39,7 +39,7 @@ class ControlOverrides:
         )
 
     def _moved(self, override: Override) -> float:
-        """Where a held control is after this step."""
+        """Return the value of an overridden control after this step."""
         target = override.value / self._full_brake if override.newton else override.value
         if override.control != "steeringWheel":
             target = min(max(target, 0.0), 1.0)

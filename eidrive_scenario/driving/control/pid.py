@@ -1,4 +1,4 @@
-"""A PID regulator."""
+"""PID controller."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Gains:
-    """Of the error, its integral [1/s] and its derivative [s]."""
+    """Gains of the error, its integral [1/s] and its derivative [s]."""
 
     proportional: float
     integral: float = 0.0
@@ -16,10 +16,10 @@ class Gains:
 
 
 class PID:
-    """output = kp·e + ki·∫e dt + kd·de/dt, within limits.
+    """PID controller: output = kp·e + ki·∫e dt + kd·de/dt, within limits.
 
-    Conditional integration: the integral stands still while the output is at a limit and the error would drive it
-    further, and while the error is larger than `band`, where it would only learn the way to the target.
+    Anti-windup by conditional integration: the integral is constant while the output is at a limit that the error
+    exceeds further, and while the error is larger than `band`.
     """
 
     def __init__(self, gains: Gains, *, low: float, high: float, dt: float, band: float = math.inf) -> None:
@@ -32,12 +32,12 @@ class PID:
         self._last: float | None = None
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Reset integral and derivative."""
         self._integral = 0.0
         self._last = None
 
     def update(self, error: float, feed_forward: float = 0.0) -> float:
-        """The output for the error of this tick, on top of a known part."""
+        """Return the output for the error of this tick plus a feed-forward part."""
         gains = self.gains
         slope = 0.0 if self._last is None else (error - self._last) / self.dt
         self._last = error

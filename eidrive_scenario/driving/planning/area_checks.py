@@ -1,4 +1,4 @@
-"""Conflict areas in which no vehicle can ever be, as no road lies there."""
+"""Check of the areas of planners that lie outside the road."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
 
 MARGIN = 2.0
-"""Distance from the outermost lane that still counts as on the road [m]: a bay, a verge."""
+"""Maximum distance from the outermost lane that counts as on the road [m], for bays and verges."""
 _CELLS = 12
-"""Cells along each side of an area that are examined."""
+"""Number of sample cells along each side of an area."""
 
 
 def areas_off_road(
     scenario: Scenario, settings: Mapping[str, AgentSettings], roads: RoadNetwork | None
 ) -> Iterator[Diagnostic]:
-    """Yield a warning for each conflict area of a station of which no part lies on a road."""
+    """Yield a warning for each area of a planner of which no part is on a road."""
     if roads is None:
         return
     for name, station in settings.items():
@@ -44,7 +44,7 @@ def areas_off_road(
 
 
 def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
-    """A lower bound of the distance between an area and the outermost lanes [m]; 0 if they may overlap."""
+    """Return a lower bound of the distance between an area and the outermost lanes [m]; 0 if they may overlap."""
     low = [min(point[axis] for point in area) for axis in (0, 1)]
     step = [(max(point[axis] for point in area) - low[axis]) / _CELLS for axis in (0, 1)]
     centers = [
@@ -58,7 +58,7 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
 
 
 def _place(scenario: Scenario, name: str, setting: str) -> tuple[str, int]:
-    """File and line of the property that states the areas of a station."""
+    """Return file and line of the property with the areas of a station."""
     for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
         for entry in controller.properties.property if controller.properties is not None else ():
             if entry.name in (setting, "planner_settings"):

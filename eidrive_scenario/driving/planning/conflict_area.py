@@ -72,8 +72,8 @@ class ConflictAreaPlanner(RoutePlanner):
     `conflict_hold_time` [s] after the last such instant. Objects with an existence probability below `min_existence`
     are ignored.
 
-    The rule of EI-Drive's cooperative scenarios: 35 ticks of 0.03 s from the last sighting on, brake 0.25, throttle 0,
-    the steering goes on. Which deceleration that brake gives is our choice.
+    Source: the cooperative scenarios of EI-Drive, with 35 ticks of 0.03 s after the last detection, brake 0.25 and
+    throttle 0; steering continues. The deceleration of that brake is an assumption of this project.
     """
 
     settings_type: ClassVar[type[PlannerSettings]] = ConflictAreaSettings
@@ -98,7 +98,7 @@ class ConflictAreaPlanner(RoutePlanner):
         return plan
 
     def _in_areas(self, objects: Detections) -> tuple[int, ...]:
-        """The rows of the objects in an area that exist with enough probability."""
+        """Return the rows of the objects in an area whose existence probability reaches `min_existence`."""
         found = [
             index
             for index, (x, y) in enumerate(objects.boxes[:, :2].tolist())

@@ -1,4 +1,4 @@
-"""A path: evenly spaced points, and the speed that its curves allow."""
+"""Planned path: evenly spaced points, and speed limits by curvature."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from eidrive_scenario.arrays import Array
 SPACING = 1.0
 """Distance between the points of a path [m]."""
 LATERAL_ACCELERATION = 5.0
-"""In a curve of curvature k the speed is at most sqrt(5 / |k|), as in EI-Drive [m/s²]."""
+"""Maximum lateral acceleration [m/s²]: at curvature k the speed is at most sqrt(5 / |k|), as in EI-Drive."""
 APPROACH_DECELERATION = 3.0
-"""How the speed falls towards a curve or the end [m/s²]."""
+"""Deceleration before a curve or the end [m/s²]."""
 SMOOTHING_PASSES = 4
-"""Each pass averages a point with its neighbors (1 2 1)/4; four take kinks of a polyline away and move a curve of
-radius R inwards by 1/R m² at most."""
+"""Number of smoothing passes. Each pass averages a point with its neighbors (1 2 1)/4; four passes remove kinks of a
+polyline and move a curve of radius R inwards by at most 1/R m²."""
 LEADS_AWAY = 5.0
-"""Where a path has come so much farther from a point than it was, its nearest place lies behind: what comes near again
-later is another bend, or another lap [m]."""
+"""Increase of the distance to a point that ends the search for its nearest segment [m]: a later approach of the path is
+another curve or lap."""
 
 
 class PlannedPath:
-    """points (M, 2) [m], at least two; limits (M,) [m/s] that keep lateral and approach accelerations."""
+    """Path with points (M, 2) [m], at least two, and speed limits (M,) [m/s] by lateral and approach acceleration."""
 
     def __init__(self, line: Array, *, ends: bool) -> None:
-        """From a polyline (K, 2). With `ends` its last point is where to stop; else the path goes on beyond it.
+        """Build a path from a polyline (K, 2).
 
-        Raises ValueError if the line has no length, or leads back to its start within SPACING.
+        ends  whether the vehicle stops at the last point; else the path continues beyond it
+
+        Raise ValueError if the line has no length, or returns to its start within SPACING.
         """
         self.points = _apart(_smooth(_resample(line)))
         self.ends = ends
@@ -38,15 +40,15 @@ class PlannedPath:
         step = np.diff(self.points, axis=0)
         square = np.einsum("mi,mi->m", step, step)
         self._segments: list[list[float]] = np.column_stack([self.points[:-1], step, square]).tolist()
-        """Start, way and its square of each segment."""
+        """Start, vector and squared length of each segment."""
 
     def __len__(self) -> int:
         return len(self._x)
 
     def project(self, x: float, y: float, start: int = 0, reach: int = 30) -> int:
-        """Index of the point from which the nearest segment begins, among `reach` segments from `start` on.
+        """Return the index of the nearest segment among `reach` segments from `start` on.
 
-        Those are left out that come after the path has led away from the point by LEADS_AWAY.
+        The search ends where the distance has increased by LEADS_AWAY.
         """
         best, nearest, leads_away = start, math.inf, math.inf
         end = min(start + reach, len(self._x) - 1)
@@ -65,7 +67,7 @@ class PlannedPath:
         return best
 
     def distance(self, x: float, y: float, index: int) -> float:
-        """How far a point is from the segment that begins at an index [m]; from the last one beyond that."""
+        """Return the distance of a point from the segment at an index [m]; from the last one for larger indices."""
         index = min(index, len(self._x) - 2)
         return segment_distance(x, y, self._x[index], self._y[index], self._x[index + 1], self._y[index + 1])
 
@@ -85,7 +87,7 @@ class PlannedPath:
 
 
 def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
-    """Distance of a point from a segment [m]."""
+    """Return the distance of a point from a segment [m]."""
     dx, dy = x1 - x0, y1 - y0
     square = dx * dx + dy * dy
     share = ((x - x0) * dx + (y - y0) * dy) / square if square > 0.0 else 0.0
@@ -94,7 +96,7 @@ def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: fl
 
 
 def _resample(line: Array) -> Array:
-    """(M, 2) points at equal distances of about SPACING along a polyline (K, 2), its ends included."""
+    """Return points (M, 2) at equal distances of about SPACING along a polyline (K, 2), with its ends."""
     line = _apart(np.asarray(line, dtype=float)[:, :2])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     stations = np.linspace(0.0, along[-1], max(2, round(along[-1] / SPACING) + 1))
@@ -102,7 +104,7 @@ def _resample(line: Array) -> Array:
 
 
 def _apart(points: Array) -> Array:
-    """The points (M, 2) without those that lie where the one before does: a line may turn back between two of them."""
+    """Return the points (M, 2) without consecutive duplicates: a line may turn back between two samples."""
     step = np.hypot(*np.diff(points, axis=0).T)
     kept: Array = points[np.concatenate([[True], step > 1e-6])]
     if len(kept) < 2:
@@ -111,7 +113,7 @@ def _apart(points: Array) -> Array:
 
 
 def _smooth(points: Array) -> Array:
-    """The same points without kinks; the first and the last stay."""
+    """Return smoothed points; the first and the last are unchanged."""
     for _ in range(SMOOTHING_PASSES):
         points = points.copy()
         points[1:-1] = (points[:-2] + 2.0 * points[1:-1] + points[2:]) / 4.0

@@ -1,4 +1,4 @@
-"""The route planner: along the roads to the goal, as fast as target and curves allow."""
+"""Route planner: trajectory along the roads to the goal, with speed limits by target and curves."""
 
 from __future__ import annotations
 
@@ -21,26 +21,25 @@ from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
 
 HORIZON = 60
-"""Points of a plan ahead of the vehicle."""
+"""Number of points of a plan ahead of the vehicle."""
 LOOK_AHEAD = 300
-"""Points of the lane that are followed at once where there is no destination."""
+"""Number of lane points that are computed in advance without a destination."""
 STRIDE = 10
-"""So many of them are looked up at once where the lane allows it."""
+"""Number of lane points that are computed in one step on a continuous lane."""
 TURNS = 50.0
-"""A road up to this length may lead into itself within a stride [m]."""
+"""Maximum length of a road that may lead into itself within a stride [m]."""
 STRAYED = 2.5
-"""A vehicle this far from the lane that it follows was moved by somebody else, and looks for its lane anew [m]."""
+"""Distance from the followed lane above which the vehicle was teleported, and its lane is located again [m]."""
 BEHIND = 5
-"""Points behind the vehicle that stay when the path is carried on."""
+"""Number of points behind the vehicle that are kept when the path is extended."""
 
 
 class RoutePlanner(Planner):
-    """Drives along the goal's path, or by the shortest route through its waypoints, and stops at the end.
+    """Planner along the path of the goal, or on the shortest route through its waypoints, to a stop at the end.
 
-    A lap that follows the path is driven round and round. Without path and waypoints it follows its lane straight on,
-    to the end of the road at most. Off the roads, waypoints are joined by a smooth curve.
-    Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that it has seen.
-    Raises RouteError if no road leads to a waypoint.
+    A lap after the path is repeated. Without path and waypoints the planner follows its lane, at most to the end of the
+    road. Outside roads, waypoints are connected by a smooth curve. Objects are ignored. With `obey_signals` the vehicle
+    stops at red lights and stop signs in sight. Raise RouteError if no road leads to a waypoint.
     """
 
     def __init__(
@@ -87,7 +86,7 @@ class RoutePlanner(Planner):
         return Plan(path.points[part], speeds, reason, acceleration)
 
     def _stop(self, path: PlannedPath, ego: EgoState, x: float, y: float, now: float) -> StopPoint | None:
-        """The traffic light or stop sign for which to stop next."""
+        """Return the stop point of the next traffic light or stop sign, or None."""
         if self._stops is None:
             return None
         if self._laid is not path:
@@ -129,11 +128,11 @@ class RoutePlanner(Planner):
             return self._lane_ahead(x, y, yaw)
         try:
             return PlannedPath(line, ends=True)
-        except ValueError:  # the destination is here
+        except ValueError:  # The destination is at the vehicle
             return PlannedPath(np.array([[x - math.cos(yaw), y - math.sin(yaw)], [x, y]]), ends=True)
 
     def _by_road(self, x: float, y: float, waypoints: Array) -> Array | None:
-        """The route through all waypoints, None if one of them or the vehicle itself is on no road."""
+        """Return the route through all waypoints; None if one of them or the vehicle is outside the road."""
         if self.roads is None:
             return None
         places = [self.roads.locate_at(px, py) for px, py in [(x, y), *waypoints[:, :2].tolist()]]
@@ -144,7 +143,7 @@ class RoutePlanner(Planner):
         return np.asarray(line)[:, :2]
 
     def _lane_ahead(self, x: float, y: float, yaw: float) -> PlannedPath:
-        """Along the lane and those that follow it, from where the last call left off; straight on where no lane is."""
+        """Return a path along the lane and its successors, extended from the last call; straight without a lane."""
         if self.roads is not None:
             self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(x, y, yaw)
             onward = True
@@ -158,7 +157,7 @@ class RoutePlanner(Planner):
         return PlannedPath(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 
     def _lane_here(self, x: float, y: float, yaw: float) -> list[LaneLocation]:
-        """The lane under the vehicle, if it leads where the vehicle looks."""
+        """Return the lane at the vehicle if its driving direction is that of the vehicle."""
         if self.roads is None:
             return []
         place = self.roads.locate_at(x, y)
@@ -170,7 +169,7 @@ class RoutePlanner(Planner):
 
 
 def _further(roads: RoadNetwork, place: LaneLocation) -> list[LaneLocation]:
-    """The next STRIDE places along the lane, about SPACING apart; fewer where it ends."""
+    """Return the next STRIDE positions along the lane, about SPACING apart; fewer at its end."""
     there = roads.advance(place, STRIDE * SPACING)
     if there is not None and there[:2] == place[:2]:
         road, step = roads.road(place.road), (there.s - place.s) / STRIDE
@@ -184,7 +183,7 @@ def _further(roads: RoadNetwork, place: LaneLocation) -> list[LaneLocation]:
 
 
 def _with_laps(line: Array, lap: Array) -> PlannedPath:
-    """The line and as many laps after it as are looked at ahead."""
+    """Return the path of the line and as many laps as LOOK_AHEAD requires."""
     length = float(np.hypot(*np.diff(lap[:, :2], axis=0).T).sum())
     laps = [lap[1:, :2]] * math.ceil(LOOK_AHEAD * SPACING / length)
     return PlannedPath(np.concatenate([line[:, :2], *laps]), ends=False)
@@ -197,7 +196,7 @@ def _same(first: Array | None, second: Array | None) -> bool:
 
 
 def _curve(x: float, y: float, yaw: float, waypoints: Array) -> Array:
-    """A smooth line from here through the waypoints, (K, 2); it leaves along the heading."""
+    """Return a smooth line (K, 2) from the vehicle, along its heading, through the waypoints."""
     nose = [x + SPACING * math.cos(yaw), y + SPACING * math.sin(yaw)]
     knots = np.array([[x, y], nose, *waypoints[:, :2].tolist()])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(knots, axis=0).T))])

@@ -15,28 +15,28 @@ from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
 BEFORE_LINE = 1.5
-"""Where the front comes to a stand before the line [m]."""
+"""Distance between the front of a stopped vehicle and the stop line [m]."""
 TOO_LATE = 5.0
-"""A vehicle that would have to brake harder than this passes a light that has just turned [m/s²]."""
+"""Maximum deceleration for a light that has just changed [m/s²]; a vehicle that would need more passes."""
 STANDING = 0.1
-"""Slower than this a vehicle has stopped [m/s]."""
+"""Maximum speed of a stopped vehicle [m/s]."""
 AT_LINE = 2.0
-"""It has done so for the sign if its front is this near to where it should be [m]."""
+"""Maximum distance of the front from its stop point at which a stop counts for the sign [m]."""
 ANOTHER = 5.0
-"""A stop line that lies this much farther ahead than it did is that of another visit, on another lap [m]."""
+"""Minimum increase of the distance of a stop line that indicates the next lap [m]."""
 WAIT = 3.0
-"""How long a vehicle stands at a stop sign: EI-Drive's 60 ticks of 0.05 s [s]."""
+"""Waiting time at a stop sign [s]: 60 ticks of 0.05 s, as in EI-Drive."""
 
 
 class StopPoint(NamedTuple):
-    """Where to stand, as a distance along the path [m], and why."""
+    """Stop point: distance along the path [m], and reason."""
 
     place: float
     reason: str
 
 
 class SignalStops:
-    """Which signal stops the vehicle next. At a stop sign it waits and goes; it does not look for others there."""
+    """Stops for traffic lights and stop signs. At a stop sign the vehicle waits and continues, regardless of others."""
 
     def __init__(self, roads: RoadNetwork | None, spec: ActorSpec) -> None:
         self.signals = SignalsAhead(roads)
@@ -46,16 +46,16 @@ class SignalStops:
         self._standing_since: dict[str, float] = {}
         self._served: set[str] = set()
         self._distances: dict[str, float] = {}
-        """How far ahead the next stop line of each signal was last [m]."""
+        """Last distance of the next stop line of each signal [m]."""
         self._along = np.zeros(1)
 
     def follow(self, path: Array) -> None:
-        """A path (M, 2) is followed from now on."""
+        """Set the path (M, 2) of the vehicle."""
         self.signals.follow(path)
         self._along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
 
     def next(self, along: float, speed: float, now: float) -> StopPoint | None:
-        """The stop ahead of a vehicle whose reference point is `along` the path, None where nothing stops it."""
+        """Return the next stop of a vehicle at distance `along` of the path [m]; None if no signal requires one."""
         found: StopPoint | None = None
         ahead: dict[str, SignalAhead] = {}
         for signal in self.signals.ahead(along):
@@ -73,18 +73,18 @@ class SignalStops:
         return found
 
     def _forget(self, name: str) -> None:
-        """The vehicle has left a signal behind, whatever it did there."""
+        """Delete the state of a signal that the vehicle has passed."""
         self._stopping.discard(name)
         self._too_late.discard(name)
         self._served.discard(name)
         self._standing_since.pop(name, None)
 
     def limits(self, stop: StopPoint, part: slice) -> Array:
-        """The speeds at points of the path with which the vehicle comes to a stand there [m/s]."""
+        """Return the maximum speeds at points of the path with which the vehicle stops there [m/s]."""
         return np.sqrt(2.0 * APPROACH_DECELERATION * np.maximum(stop.place - self._along[part], 0.0))
 
     def place_of(self, index: int, path: Array, x: float, y: float) -> float:
-        """Where along the path a point is, whose nearest segment begins at an index [m]."""
+        """Return the distance of a point along the path [m]; its nearest segment begins at `index`."""
         index = min(index, len(path) - 2)
         (x0, y0), (x1, y1) = path[index].tolist(), path[index + 1].tolist()
         length = math.hypot(x1 - x0, y1 - y0)

@@ -83,7 +83,7 @@ def known(step: AgentStep) -> list[Place]:
     return sorted((round(x, 6), round(y, 6)) for x, y in step.fused.boxes[:, :2].tolist())
 
 
-def test_what_the_other_sees_is_known_one_tick_later_on_an_ideal_channel(car: ActorSpec) -> None:
+def test_ideal_channel_delivers_detections_of_others_in_next_tick(car: ActorSpec) -> None:
     talk = Conversation(car, "{model: composed}")
     assert known(talk.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]) == [OPEN]
     assert known(talk.step({"Ego": (OPEN,), "RSU": ()})["Ego"]) == [OPEN, HIDDEN]
@@ -165,7 +165,7 @@ def test_a_late_message_does_not_replace_a_newer_one(car: ActorSpec) -> None:
     assert known(step) == [(30.0, 21.0)]
 
 
-def test_only_those_it_cooperates_with_count(car: ActorSpec) -> None:
+def test_cooperates_with_selects_receivers(car: ActorSpec) -> None:
     for names, expected in ((["RSU"], [HIDDEN]), (["Spectator"], []), ([], []), (None, [HIDDEN])):
         talk = Conversation(car, "{model: composed}", cooperates_with=names)
         talk.step({"RSU": (HIDDEN,)})
@@ -174,7 +174,7 @@ def test_only_those_it_cooperates_with_count(car: ActorSpec) -> None:
         assert len(step.inbox) == len(expected)
 
 
-def test_a_station_says_what_it_saw_itself_and_nothing_it_heard(car: ActorSpec) -> None:
+def test_outbox_contains_own_detections_only(car: ActorSpec) -> None:
     """Otherwise a box would come back to its first reporter and count twice."""
     talk = Conversation(car, "{model: composed}")
     for _ in range(5):
@@ -240,7 +240,7 @@ def test_what_drives_and_what_does_not(car: ActorSpec) -> None:
         agent(RSU, planner="route")
 
 
-def test_a_heard_object_in_the_area_brakes_exactly_as_asked(car: ActorSpec) -> None:
+def test_received_object_in_conflict_area_brakes_with_conflict_deceleration(car: ActorSpec) -> None:
     talk = Conversation(
         car,
         "{model: composed}",

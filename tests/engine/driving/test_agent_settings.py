@@ -25,7 +25,7 @@ def settings(*entries: tuple[str, str]) -> AgentSettings:
     return agent_settings(controller(("module", "eidrive"), *entries))
 
 
-def test_the_defaults() -> None:
+def test_defaults_of_agent_settings() -> None:
     found = settings()
     assert (found.detector, found.planner, found.cooperates_with) == ("oracle", None, None)
     assert found.fusion == "covariance_intersection"
@@ -34,7 +34,7 @@ def test_the_defaults() -> None:
     assert found.rig_sensors(frozenset({"camera"})) == {"camera": CameraSettings()}
 
 
-def test_what_a_detector_usually_has_gives_way_to_what_the_station_says() -> None:
+def test_sensors_of_the_station_replace_default_sensors_of_the_detector() -> None:
     """The learned detectors want a camera, and usually have a LiDAR to lift by as well."""
     usual = {"camera": CameraSettings(width=512, height=384, rate=10.0), "lidar": LidarSettings(rate=10.0)}
     needs = frozenset({"camera"})
@@ -44,7 +44,7 @@ def test_what_a_detector_usually_has_gives_way_to_what_the_station_says() -> Non
         settings(("sensors", "lidar")).rig_sensors(needs, usual)
 
 
-def test_which_controllers_are_ours() -> None:
+def test_is_agent_controller_requires_module_eidrive() -> None:
     assert is_agent_controller(controller(("module", "eidrive")))
     assert not is_agent_controller(controller(("module", "other")))
     assert not is_agent_controller(controller(("esminiController", "SumoController")))
@@ -150,14 +150,14 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("entries", "message"), WRONG, ids=[str(row[0]) for row in WRONG])
-def test_a_wrong_property_says_where_and_what_would_be_right(entries: list[tuple[str, str]], message: str) -> None:
+def test_invalid_property_is_reported_with_line_and_hint(entries: list[tuple[str, str]], message: str) -> None:
     with pytest.raises(SettingError) as caught:
         settings(*entries)
     assert message in str(caught.value)
     assert "s.xosc:" in str(caught.value)
 
 
-def test_all_findings_come_at_once() -> None:
+def test_all_diagnostics_are_reported_at_once() -> None:
     with pytest.raises(SettingError) as caught:
         settings(("detector", "x"), ("color", "red"), ("range", "-1"))
     assert [diagnostic.line for diagnostic in caught.value.diagnostics] == [12, 14, 13]

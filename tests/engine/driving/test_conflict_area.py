@@ -42,27 +42,27 @@ def braking_ticks(rule: ConflictAreaPlanner, sightings: set[int], ticks: int = 8
     return found
 
 
-def test_it_brakes_from_the_sighting_until_1_05_seconds_after_the_last(car: ActorSpec) -> None:
+def test_braking_lasts_1_05_s_after_the_last_detection(car: ActorSpec) -> None:
     """Seen at 0.50 s only: 0.50 to 1.50 s, 21 ticks of 0.05 s, as the paper's 35 of 0.03 s."""
     assert braking_ticks(planner(car), {10}) == list(range(10, 31))
 
 
-def test_each_sighting_begins_the_time_anew(car: ActorSpec) -> None:
+def test_each_detection_restarts_the_hold_time(car: ActorSpec) -> None:
     assert braking_ticks(planner(car), {10, 11, 12, 28}) == list(range(10, 49))
     assert braking_ticks(planner(car), {10, 40}) == [*range(10, 31), *range(40, 61)]
 
 
-def test_never_without_a_sighting_and_at_once_in_the_first_tick(car: ActorSpec) -> None:
+def test_no_detection_no_braking_and_immediate_braking_in_first_tick(car: ActorSpec) -> None:
     assert braking_ticks(planner(car), set()) == []
     assert braking_ticks(planner(car), {0}) == list(range(21))
 
 
 @pytest.mark.parametrize(("hold", "last"), [(0.0, 10), (0.05, 10), (0.1, 11), (0.3, 15), (2.0, 49)])
-def test_hold(car: ActorSpec, hold: float, last: int) -> None:
+def test_conflict_hold_time_sets_duration_of_braking(car: ActorSpec, hold: float, last: int) -> None:
     assert braking_ticks(planner(car, conflict_hold_time=hold), {10}) == list(range(10, last + 1))
 
 
-def test_the_plan_goes_on_and_says_why_it_brakes(car: ActorSpec) -> None:
+def test_braking_plan_keeps_points_and_states_reason(car: ActorSpec) -> None:
     rule = planner(car, conflict_deceleration=4.0)
     free = rule.plan(EGO, objects(0.0, SEEN_OUT), None, 0.0)
     braked = rule.plan(EGO, objects(0.05, SEEN_OUT, SEEN_IN, kind="truck"), None, 0.05)
@@ -75,7 +75,7 @@ def test_the_plan_goes_on_and_says_why_it_brakes(car: ActorSpec) -> None:
     np.testing.assert_array_equal(braked.speeds, free.speeds)
 
 
-def test_the_center_counts_not_the_outline(car: ActorSpec) -> None:
+def test_object_is_in_area_by_its_center(car: ActorSpec) -> None:
     """A car whose center is 0.1 m outside reaches 2.3 m into the area, and is not in it."""
     assert planner(car).plan(EGO, objects(0.0, (28.9, 7.0)), None, 0.0).braking is None
     assert planner(car).plan(EGO, objects(0.0, (29.1, 7.0)), None, 0.0).braking == 5.0
@@ -96,12 +96,12 @@ def test_inside_a_polygon_that_is_not_convex() -> None:
     assert not inside(5.0, 1.0, arrow)
 
 
-def test_without_an_area_there_is_no_such_planner(car: ActorSpec) -> None:
+def test_planner_without_area_raises_setting_error(car: ActorSpec) -> None:
     with pytest.raises(SettingError, match="setting 'conflict_area' is missing"):
         ConflictAreaPlanner(AgentSettings(), car, None, dt=0.05, seed=0)
 
 
-def test_it_comes_through_its_entry_point() -> None:
+def test_planner_is_registered_by_entry_point() -> None:
     assert registry("planners").load("conflict_area") is ConflictAreaPlanner
 
 

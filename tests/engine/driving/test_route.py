@@ -101,7 +101,7 @@ def distance_from_lane(points: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(x < 100, straight, np.where(y < 30, arc, after)))
 
 
-def test_without_a_goal_it_follows_its_lane_to_the_end_of_the_road(car: ActorSpec, roads: RoadNetwork) -> None:
+def test_route_without_goal_follows_lane_to_end_of_road(car: ActorSpec, roads: RoadNetwork) -> None:
     route = planner(car, roads, target_speed=20.0)
     plan = route.plan(ego(5.0, -1.7), NOTHING, None, 0.0)
     assert plan.points[0] == pytest.approx((5.0, -1.75), abs=1e-6)

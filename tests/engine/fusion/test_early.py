@@ -145,7 +145,7 @@ def test_early_fusion_uses_boxes_of_stations_without_points() -> None:
 
 
 def test_early_fusion_without_lidar_detector_raises() -> None:
-    with pytest.raises(SettingError, match=r"fusion 'early' joins points, and detector 'oracle' looks at none"):
+    with pytest.raises(SettingError, match=r"fusion 'early' shares points, which detector 'oracle' does not read"):
         agent(EGO, detector="oracle")
 
 
@@ -167,7 +167,7 @@ EARLY = ('name="fusion" value="average"/>', 'name="fusion" value="early"/>')
 @pytest.mark.parametrize(
     ("replacement", "expected"),
     [
-        (EARLY, "detector 'oracle' looks at none"),
+        (EARLY, "detector 'oracle' does not read"),
         ((EARLY[0], 'name="fusion" value="erly"/>'), "did you mean 'early'"),
         (
             (EARLY[0], EARLY[1].replace("early", "covariance_intersection") + '<Property name="fusion_settings" '
