@@ -1,1 +1,1 @@
-"""Repetitions, statistics, and the paper's tables."""
+"""Experiments: single runs with output files, repetitions, statistics, and the tables of the paper."""

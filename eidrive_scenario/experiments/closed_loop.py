@@ -1,9 +1,9 @@
-"""The paper's scenarios driven by learned detectors: collisions, false tracks and brakings without a cause.
+"""Scenarios of the paper with learned detectors in closed loop: collisions, false tracks, brakings without a cause.
 
 python -m eidrive_scenario.experiments.closed_loop --out reports
 
-Writes closed_loop.jsonl, a line per run as soon as its seed is done, and the table closed_loop.md. Runs that the first
-file holds already are not repeated.
+The output is closed_loop.jsonl, with one line per run, written after each seed, and the table closed_loop.md. Runs of
+an existing closed_loop.jsonl are not repeated.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CHANNELS = ("none", "ideal")
 
 @dataclass(frozen=True)
 class Row:
-    """One run. Distance [m] between the bodies, 0 where they touched; false tracks per simulated minute."""
+    """One run. `distance` is between the bodies [m], 0 after a contact; `false_tracks` per simulated minute."""
 
     scenario: str
     detector: str
@@ -43,7 +43,7 @@ class Row:
 
 
 def jobs(detectors: Sequence[str], channels: Sequence[str], seed: int) -> list[Job]:
-    """Return all runs of one seed; the arm is `detector channel`."""
+    """Return all runs of one seed; the arm is named `detector channel`."""
     return [
         Job(scenario, f"{detector} {channel}", seed, RunSettings(channel=channel, detector=detector))
         for scenario in SCENARIOS
@@ -53,7 +53,7 @@ def jobs(detectors: Sequence[str], channels: Sequence[str], seed: int) -> list[J
 
 
 def row_of(job: Job) -> Row:
-    """Run a job and return what the table needs of it."""
+    """Run a job and return its row of the table."""
     result = run_file(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings)
     detector, channel = job.arm.split(" ", 1)
     metrics = result.metrics
@@ -81,10 +81,10 @@ def table(rows: Sequence[Row]) -> str:
         mine = [row for row in rows if (row.detector, row.scenario, row.channel) == (detector, scenario, channel)]
         free = wilson(sum(row.collisions == 0 for row in mine), len(mine))
         false = sum(row.false_tracks for row in mine) / len(mine)
-        causeless, brakings = sum(row.without_cause for row in mine), sum(row.brakings for row in mine)
+        without_cause, brakings = sum(row.without_cause for row in mine), sum(row.brakings for row in mine)
         lines.append(
             f"| `{detector}` | {scenario.removeprefix('coop/')} | `{channel}` | {free.successes} of {len(mine)} | "
-            f"{free.low:.2f} to {free.high:.2f} | {false:.1f} | {causeless} of {brakings} |"
+            f"{free.low:.2f} to {free.high:.2f} | {false:.1f} | {without_cause} of {brakings} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -92,7 +92,7 @@ def table(rows: Sequence[Row]) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("reports"))
-    parser.add_argument("--seeds", type=int, default=20, help="from 1 on")
+    parser.add_argument("--seeds", type=int, default=20, help="number of seeds, from 1")
     parser.add_argument("--detectors", default=",".join(DETECTORS))
     parser.add_argument("--channels", default=",".join(CHANNELS))
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
@@ -104,12 +104,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console = Console(stderr=True)
     for seed in range(1, options.seeds + 1):
         done = {(row.scenario, f"{row.detector} {row.channel}", row.seed) for row in rows}
-        wanted = jobs(options.detectors.split(","), options.channels.split(","), seed)
-        left = [job for job in wanted if (job.scenario, job.arm, job.seed) not in done]
-        found = run_jobs(left, row_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
+        requested = jobs(options.detectors.split(","), options.channels.split(","), seed)
+        left = [job for job in requested if (job.scenario, job.arm, job.seed) not in done]
+        added = run_jobs(left, row_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
         with record.open("a", encoding="utf-8") as lines:
-            lines.writelines(json.dumps(asdict(row)) + "\n" for row in found)
-        rows += found
+            lines.writelines(json.dumps(asdict(row)) + "\n" for row in added)
+        rows += added
     rows.sort(key=lambda row: (row.detector, row.scenario, row.channel, row.seed))
     result = table(rows)
     (options.out / "closed_loop.md").write_text(result, encoding="utf-8")

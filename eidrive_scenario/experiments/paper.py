@@ -1,8 +1,8 @@
-"""Table II of the EI-Drive paper: the minimal distance between the ego and the car that it cannot see in time.
+"""Table II of the EI-Drive paper: minimum distance between the ego and an occluded car.
 
-Four arms in two places: no cooperation, cooperation, cooperation with 0.3 s of latency, cooperation with 30 % of the
-frames lost. Each is run under two rules, as the paper's text puts the channel between stations, while its code also
-delays and drops the ego's own detections.
+The table has four arms in two scenarios: no cooperation, cooperation, cooperation with a latency of 0.3 s, cooperation
+with a loss of 30 % of the frames. Each arm has two model variants. In the text of the paper the channel acts on links
+between stations; its code also delays and drops the ego's own detections.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ SCENARIOS = {"coop/scenario_1": "Scenario 1, roadside unit", "coop/scenario_2": 
 
 @dataclass(frozen=True)
 class ExperimentArm:
-    """One row of the table: the channel profile under each rule, `links` and `own`."""
+    """Row of the table with the channel profile of each model variant, `links` and `own`."""
 
     name: str
     title: str
     links: str
     own: str
 
-    def channel(self, rule: ModelVariant) -> str:
-        """The name of the profile under a rule."""
-        return self.own if rule.own_perception else self.links
+    def channel(self, variant: ModelVariant) -> str:
+        """Return the name of the channel profile of a variant."""
+        return self.own if variant.own_perception else self.links
 
 
 @dataclass(frozen=True)
 class ModelVariant:
-    """What the channel acts upon."""
+    """Variant of the channel model: links only, or links and own detections."""
 
     name: str
     title: str
@@ -59,12 +59,12 @@ ARMS = (
 
 LINKS = ModelVariant("links", "the channel acts on links only", False)
 OWN = ModelVariant("own_perception", "the ego's own detections too, as the paper's code has it", True)
-RULES = (LINKS, OWN)
+VARIANTS = (LINKS, OWN)
 
 
 @dataclass(frozen=True)
 class Published:
-    """What the paper's table prints (mean ± sd), and the five episodes behind it [m]."""
+    """Published mean, standard deviation and distances of the five episodes [m]."""
 
     mean: float
     sd: float
@@ -84,15 +84,17 @@ PUBLISHED = {
 
 
 def run_settings(detector: str | None = None) -> dict[str, RunSettings]:
-    """The distinct runs behind both tables, by the name of their channel; no cooperation is the same under both."""
+    """Return the distinct runs of both tables by channel. No cooperation is equal in both variants."""
     return {
-        arm.channel(rule): RunSettings(channel=arm.channel(rule), detector=detector) for rule in RULES for arm in ARMS
+        arm.channel(variant): RunSettings(channel=arm.channel(variant), detector=detector)
+        for variant in VARIANTS
+        for arm in ARMS
     }
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One arm in one place: the minimal distance of every seed [m], and how many runs stayed free of collisions."""
+    """One arm in one scenario: minimum distances of all seeds [m] and the proportion of collision-free runs."""
 
     scenario: str
     arm: ExperimentArm
@@ -104,24 +106,24 @@ class Cell:
 
     @property
     def center(self) -> Summary:
-        """Between the centers of the two cars: the paper's metric."""
+        """Distance between the centers of the two cars, the metric of the paper."""
         return summarize(self.centers)
 
     @property
     def box(self) -> Summary:
-        """Between the bodies: 0 where they touch."""
+        """Distance between the bodies, 0 for a contact."""
         return summarize(self.boxes)
 
 
 @dataclass(frozen=True)
 class Table:
-    """The table under one rule; cells in the order of SCENARIOS, then ARMS."""
+    """Table of one model variant, with cells in the order of SCENARIOS, then ARMS."""
 
-    rule: ModelVariant
+    variant: ModelVariant
     cells: tuple[Cell, ...]
 
     def cell(self, scenario: str, arm: str) -> Cell:
-        """The cell of that arm. Raise KeyError if there is none."""
+        """Return the cell of an arm. Raise KeyError if there is none."""
         for cell in self.cells:
             if cell.scenario == scenario and cell.arm.name == arm:
                 return cell
@@ -129,16 +131,16 @@ class Table:
 
     @property
     def scenarios(self) -> tuple[str, ...]:
-        """The places of this table, in order."""
+        """Scenarios of this table, in order."""
         return tuple(dict.fromkeys(cell.scenario for cell in self.cells))
 
 
-def tabulate(runs: Sequence[tuple[Job, RunResult]], rule: ModelVariant) -> Table:
-    """The table under one rule. Raise SimulationError where a run lacks one of the metrics."""
+def tabulate(runs: Sequence[tuple[Job, RunResult]], variant: ModelVariant) -> Table:
+    """Return the table of one model variant. Raise SimulationError if a run lacks one of the metrics."""
     cells = []
     for scenario in dict.fromkeys(job.scenario for job, _ in runs):
         for arm in ARMS:
-            name = arm.channel(rule)
+            name = arm.channel(variant)
             mine = sorted(
                 ((job.seed, result) for job, result in runs if job.scenario == scenario and job.arm == name),
                 key=lambda run: run[0],
@@ -155,7 +157,7 @@ def tabulate(runs: Sequence[tuple[Job, RunResult]], rule: ModelVariant) -> Table
                     published=PUBLISHED[scenario, arm.name],
                 )
             )
-    return Table(rule, tuple(cells))
+    return Table(variant, tuple(cells))
 
 
 def _metric(result: RunResult, name: str) -> float:
@@ -163,14 +165,14 @@ def _metric(result: RunResult, name: str) -> float:
         return float(result.metrics[name])
     except KeyError:
         raise SimulationError(
-            f"{result.scenario} with seed {result.seed} measured no {name}; "
-            "its file needs the criteria collision and min_distance"
+            f"{result.scenario}, seed {result.seed}: metric {name} is missing "
+            "(expected a scenario with the criteria collision and min_distance)"
         ) from None
 
 
 @dataclass(frozen=True)
 class PublishedClaim:
-    """One statement about the order of the arms, and whether these runs bear it out."""
+    """Published statement about the order of the arms, and whether these runs confirm it."""
 
     scenario: str
     statement: str
@@ -179,7 +181,7 @@ class PublishedClaim:
 
 
 def evaluate_claims(table: Table) -> tuple[PublishedClaim, ...]:
-    """The order that the paper found, in each place."""
+    """Compare the order of the arms in each scenario with the published order."""
     found = []
     for scenario in table.scenarios:
         none, cooperation, latency, error = (table.cell(scenario, arm.name) for arm in ARMS)
@@ -199,7 +201,7 @@ def _order(scenario: str, statement: str, smaller: Cell, larger: Cell) -> Publis
 
 
 def _mixture(scenario: str, latency: Cell, error: Cell, cooperation: Cell) -> PublishedClaim:
-    """Lost frames leave some runs as good as cooperation and spoil others."""
+    """Compare the error arm: lost frames degrade some runs, and others equal the cooperation arm."""
     between = latency.center.mean <= error.center.mean <= cooperation.center.mean
     wider = error.center.population_sd > cooperation.center.population_sd
     fewer = error.collision_free.share < cooperation.collision_free.share
@@ -214,18 +216,18 @@ def _mixture(scenario: str, latency: Cell, error: Cell, cooperation: Cell) -> Pu
 
 def _paired(first: Cell, second: Cell) -> PairedDifference:
     if first.seeds != second.seeds:
-        raise ValueError(f"{first.arm.name} and {second.arm.name} were not run with the same seeds")
+        raise ValueError(f"{first.arm.name} and {second.arm.name} have different seeds")
     return paired_difference(first.centers, second.centers)
 
 
 NOTEWORTHY = 0.05
-"""A change of a mean minimal distance that the sentence names [m]."""
+"""Minimum change of a mean minimum distance that the sentence states [m]."""
 
 
 def difference(links: Table, own: Table) -> str:
-    """One sentence on what delaying and dropping the ego's own detections changes, read off the two tables.
+    """Return a sentence about the effect of delaying and dropping the ego's own detections.
 
-    Latency counts as worse than no cooperation where the 95 % interval of the paired difference lies below zero.
+    Latency counts as worse than no cooperation if the 95 % interval of the paired difference is below zero.
     """
     shifts, smaller, worse = [], 0.0, {LINKS.name: 0, OWN.name: 0}
     for scenario in links.scenarios:
@@ -242,12 +244,12 @@ def difference(links: Table, own: Table) -> str:
             )
         for table in (links, own):
             latency, none = table.cell(scenario, "latency"), table.cell(scenario, "none")
-            worse[table.rule.name] += _paired(none, latency).high < 0
+            worse[table.variant.name] += _paired(none, latency).high < 0
     total = len(links.scenarios)
-    what = "; ".join(shifts) if shifts else "nothing"
+    changes = "; ".join(shifts) if shifts else "nothing"
     rest = f" (the other means by {smaller:.2f} m at most)" if shifts else f" (means by {smaller:.2f} m at most)"
     return (
-        f"Delaying and dropping the ego's own detections as well changes {what}{rest}; latency is worse than no "
-        f"cooperation in {worse[OWN.name]} of {total} places under that rule, and in {worse[LINKS.name]} of {total} "
-        "where the channel acts on links only."
+        f"Delaying and dropping the ego's own detections as well changes {changes}{rest}; latency is worse than no "
+        f"cooperation in {worse[OWN.name]} of {total} scenarios with this variant, and in {worse[LINKS.name]} of "
+        f"{total} with a channel that acts on links only."
     )

@@ -1,4 +1,4 @@
-"""How good cooperative perception is: average precision, recall by who can see, error of position."""
+"""Metrics of cooperative perception: average precision, recall by visibility, position error."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from eidrive_scenario.perception.learned.average_precision import Matches, avera
 from eidrive_scenario.recording.frame import Frame
 
 SIGHTED = 2.0
-"""A station sees an object where it reports one of its own with its center this near [m]."""
+"""Maximum distance between the centers of an object and of a detection of a station that sees it [m]."""
 
 
 @dataclass(frozen=True)
 class MetricSample:
-    """What one station knows at one instant, and what there is.
+    """Fused detections of one station at one time, and the ground truth.
 
     objects      (M, 7) true boxes
-    own_sight    (M,) which of them the station itself sees
-    other_sight  (M,) which of them another station sees
+    own_sight    (M,) True for objects that the station itself sees
+    other_sight  (M,) True for objects that another station sees
     """
 
     detections: Detections
@@ -33,22 +33,22 @@ class MetricSample:
     other_sight: Bools
 
 
-def snapshot(frame: Frame, station: str, *, reach: float) -> MetricSample:
-    """What `station` knows in a frame of all actors around it, up to `reach` [m] from its center to theirs.
+def metric_sample(frame: Frame, station: str, *, reach: float) -> MetricSample:
+    """Return fused detections of `station` and true objects of a frame within `reach` of the station's center [m].
 
-    Stations are not asked for, as they tell of themselves, and boxes of them or beyond the reach do not count: the
-    region is the same for what is known and what is there. Who sees what is told by the stations' own detections; of
-    the oracle's that is the line of sight.
+    Stations are excluded because they report their own states. Detections of stations and detections beyond the reach
+    are excluded as well, so that detections and objects refer to the same region. Visibility follows the stations' own
+    detections, which for the oracle detector are the objects in line of sight.
     """
     view, step = frame.view, frame.steps[station]
     center = view.boxes[view.row(station), :2]
-    asked = [row for name, row in view.rows.items() if name not in frame.steps]
-    objects = view.boxes[asked].reshape(-1, 7)
+    rows = [row for name, row in view.rows.items() if name not in frame.steps]
+    objects = view.boxes[rows].reshape(-1, 7)
     objects = objects[np.linalg.norm(objects[:, :2] - center, axis=1) <= reach]
     stations = view.boxes[[view.row(name) for name in frame.steps if name in view.rows]]
-    known = step.fused.boxes
-    outside = np.linalg.norm(known[:, :2] - center, axis=1) > reach
-    distinct = ~outside & ~_near(known, stations)
+    fused = step.fused.boxes
+    outside = np.linalg.norm(fused[:, :2] - center, axis=1) > reach
+    distinct = ~outside & ~_near(fused, stations)
     others = [other.detections.boxes for name, other in frame.steps.items() if name != station]
     return MetricSample(
         step.fused.subset(np.flatnonzero(distinct).tolist()),
@@ -58,70 +58,74 @@ def snapshot(frame: Frame, station: str, *, reach: float) -> MetricSample:
     )
 
 
-def precision_bev(snapshots: Iterable[MetricSample], least: float) -> float:
-    """Average precision over all snapshots, boxes seen from above that overlap by `least` (intersection over union).
+def precision_bev(samples: Iterable[MetricSample], min_iou: float) -> float:
+    """Return the average precision over all samples, for boxes from above with an intersection over union of `min_iou`.
 
-    Detections are sorted by score over the whole set, and the area is taken at all points; NaN without any object.
-    Classes are not compared.
+    Detections are sorted by score over the whole set, and the area is computed at all points. The result is NaN without
+    objects. Classes are not compared.
     """
     matches, count = [], 0
-    for entry in snapshots:
-        matches.append(_matches(entry, least))
-        count += len(entry.objects)
+    for sample in samples:
+        matches.append(_matches(sample, min_iou))
+        count += len(sample.objects)
     return average_precision(matches, count)
 
 
 @dataclass(frozen=True)
 class Recall:
-    """The share of objects that are known, by who can see them: the station itself, only others, nobody; None where
-    there is no such object."""
+    """Recall of objects in sight of the station itself, of other stations only, and of neither; None without such
+    objects."""
 
     own: Proportion | None
     others: Proportion | None
     neither: Proportion | None
 
 
-def recall_by_sight(snapshots: Iterable[MetricSample], least: float) -> Recall:
-    """Recall at an overlap of `least`, whatever the scores. What nobody sees is known from memory at best."""
+def recall_by_sight(samples: Iterable[MetricSample], min_iou: float) -> Recall:
+    """Return the recall at an intersection over union of `min_iou`, for all scores.
+
+    An object in sight of neither group can be detected from memory only.
+    """
     found, total = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
-    for entry in snapshots:
-        known = _matches(entry, least).found
-        hidden = ~entry.own_sight
-        for place, group in enumerate((entry.own_sight, hidden & entry.other_sight, hidden & ~entry.other_sight)):
-            found[place] += np.count_nonzero(known & group)
-            total[place] += np.count_nonzero(group)
-    own, others, nobody = (wilson(int(k), int(n)) if n else None for k, n in zip(found, total, strict=True))
-    return Recall(own, others, nobody)
+    for sample in samples:
+        matched = _matches(sample, min_iou).found
+        hidden = ~sample.own_sight
+        groups = (sample.own_sight, hidden & sample.other_sight, hidden & ~sample.other_sight)
+        for index, group in enumerate(groups):
+            found[index] += np.count_nonzero(matched & group)
+            total[index] += np.count_nonzero(group)
+    own, others, neither = (wilson(int(k), int(n)) if n else None for k, n in zip(found, total, strict=True))
+    return Recall(own, others, neither)
 
 
-def position_error(snapshots: Iterable[MetricSample], farthest: float = 4.0) -> float:
-    """Root mean square distance between the centers of objects and of what is known of them, seen from above [m].
+def position_error(samples: Iterable[MetricSample], max_distance: float = 4.0) -> float:
+    """Return the root mean square distance between the centers of objects and of their detections, from above [m].
 
-    Each object and the box nearest to it are a pair, nearest pairs first, up to `farthest` [m] apart: an overlap would
-    hide the larger errors. NaN where there is no pair.
+    Objects and detections are paired in order of increasing distance, up to `max_distance` [m]. An association by
+    overlap would exclude large errors. The result is NaN without pairs.
     """
     squares: list[float] = []
-    for entry in snapshots:
-        offset = entry.detections.boxes[:, None, :2] - entry.objects[None, :, :2]
+    for sample in samples:
+        offset = sample.detections.boxes[:, None, :2] - sample.objects[None, :, :2]
         distance = np.linalg.norm(offset, axis=2)
         taken: set[tuple[str, int]] = set()
         for flat in np.argsort(distance, axis=None, kind="stable").tolist():
-            box, thing = divmod(flat, len(entry.objects))
-            if distance[box, thing] > farthest:
+            box, row = divmod(flat, len(sample.objects))
+            if distance[box, row] > max_distance:
                 break
-            if ("box", box) not in taken and ("object", thing) not in taken:
-                taken |= {("box", box), ("object", thing)}
-                squares.append(float(distance[box, thing]) ** 2)
+            if ("box", box) not in taken and ("object", row) not in taken:
+                taken |= {("box", box), ("object", row)}
+                squares.append(float(distance[box, row]) ** 2)
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 
-def _matches(entry: MetricSample, least: float) -> Matches:
-    shares = iou_bev(entry.detections.boxes, entry.objects)
-    return match_by_share(shares, entry.detections.scores, np.zeros(len(entry.objects), dtype=bool), least)
+def _matches(sample: MetricSample, min_iou: float) -> Matches:
+    shares = iou_bev(sample.detections.boxes, sample.objects)
+    return match_by_share(shares, sample.detections.scores, np.zeros(len(sample.objects), dtype=bool), min_iou)
 
 
 def _near(boxes: Array, others: Array) -> Bools:
-    """(N,) whether the center of one of `others` is within SIGHTED of that of a box (N, 7)."""
+    """Return the mask (N,) of boxes (N, 7) whose center is within SIGHTED of the center of one of `others`."""
     if not len(boxes) or not len(others):
         return np.zeros(len(boxes), dtype=bool)
     distance = np.linalg.norm(boxes[:, None, :2] - others[None, :, :2], axis=2)

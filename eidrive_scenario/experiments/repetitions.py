@@ -1,4 +1,4 @@
-"""One scenario, several arms, many seeds, on all cores; the answer does not depend on how many there are."""
+"""Runs of several arms and seeds on all cores. The results do not depend on the number of cores."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Job:
-    """One run: a scenario (path or library name), the name of its arm, the seed, and what the arm sets."""
+    """One run: scenario (path or library name), name of its arm, seed, and settings of the arm."""
 
     scenario: str
     arm: str
@@ -30,12 +30,12 @@ class Job:
 
 
 def jobs_of(scenario: str, arms: dict[str, RunSettings], seeds: Sequence[int]) -> tuple[Job, ...]:
-    """Every arm with every seed. Seed by seed, so that a run that was cut short still holds pairs."""
+    """Return every arm with every seed, ordered by seed, so that an interrupted experiment contains complete pairs."""
     return tuple(Job(scenario, arm, seed, settings) for seed in seeds for arm, settings in arms.items())
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -47,15 +47,15 @@ def run_jobs(
     console: Console | None = None,
     title: str = "runs",
 ) -> tuple[T, ...]:
-    """The task's answer to every job, in the order of the jobs.
+    """Return the result of the task for every job, in the order of the jobs.
 
-    `task` is a module-level function, as it travels to other processes, and so does its answer. `workers` defaults to
-    the cores of this machine; 1 stays in this process. A progress bar is shown on `console` if one is given.
-    Raises what a task raises, and SimulationError where a worker process dies.
+    `task` is a module-level function: function and result are pickled for other processes. `workers` defaults to the
+    number of cores; 1 runs all jobs in this process. `console` shows a progress bar.
+    Raise the exceptions of the task, and SimulationError if a worker process dies.
     """
     workers = min(cores() if workers is None else workers, max(1, len(jobs)))
     if workers < 1:
-        raise ValueError(f"{workers} workers cannot run anything")
+        raise ValueError(f"workers: not a positive number (got {workers})")
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -67,18 +67,18 @@ def run_jobs(
     with Progress(*columns, console=console, disable=console is None) as progress:
         bar = progress.add_task(title, total=len(jobs))
         if workers == 1:
-            answers = []
+            results = []
             for job in jobs:
-                answers.append(task(job))
+                results.append(task(job))
                 progress.advance(bar)
-            return tuple(answers)
+            return tuple(results)
         return _in_processes(jobs, task, workers, lambda: progress.advance(bar))
 
 
 def _in_processes(
     jobs: Sequence[Job], task: Callable[[Job], T], workers: int, advance: Callable[[], None]
 ) -> tuple[T, ...]:
-    # Spawned, not forked: a child must not inherit a half-used physics client or a running progress thread.
+    # Spawned, not forked: a child process must not inherit a physics client or a running progress thread.
     pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
     try:
         futures: list[Future[T]] = [pool.submit(task, job) for job in jobs]
@@ -87,6 +87,6 @@ def _in_processes(
             advance()
         return tuple(future.result() for future in futures)
     except BrokenProcessPool as error:
-        raise SimulationError("a worker process died; run with one worker to see why") from error
+        raise SimulationError("a worker process died; run with one worker to see the error") from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

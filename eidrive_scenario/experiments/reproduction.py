@@ -1,4 +1,4 @@
-"""The command line that repeats a run."""
+"""Command line that repeats a run."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from eidrive_scenario.v2x.profile import SUFFIXES
 
 
 def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
-    """Return the `eidrive run` command that repeats this run, quoted for a shell.
+    """Return the `eidrive run` command that repeats a run, quoted for a shell.
 
-    scenario  its file; paths are absolute, so that the command works in any folder
+    scenario  file of the scenario; paths are absolute, so that the command is valid in any folder
     """
-    usual = RunSettings()
+    defaults = RunSettings()
     words: list[str] = ["eidrive", "run", _scenario(scenario)]
     for option, value in (
         ("--channel", _channel(settings.channel)),
@@ -38,8 +38,8 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
         words += _assignments(option, values)
     words += ["--seed", str(seed)]
     for option, number, default in (
-        ("--dt", settings.dt, usual.dt),
-        ("--time-limit", settings.time_limit, usual.time_limit),
+        ("--dt", settings.dt, defaults.dt),
+        ("--time-limit", settings.time_limit, defaults.time_limit),
     ):
         words += [] if number == default else [option, repr(float(number))]
     words += ["--allow-torchscript"] if settings.allow_torchscript else []
@@ -47,7 +47,7 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
 
 
 def reproduction_lines(result: RunResult) -> list[str]:
-    """The command that repeats a run that did not pass, and the path of its recording, as far as there are any."""
+    """Return the command that repeats a run and the path of its recording; empty for a passed run."""
     if result.passed:
         return []
     command = [f"reproduce: {result.command}"] if result.command else []
@@ -61,7 +61,7 @@ def _scenario(path: Path) -> str:
 
 
 def _channel(value: Any) -> str | None:
-    """A profile: its text, its name, or its file by an absolute path."""
+    """Return an inline profile as JSON, the name of a profile, or the absolute path of its file."""
     if isinstance(value, Mapping):
         return json.dumps(value)
     return _file_or_name(value) if value is None or Path(value).suffix in SUFFIXES else str(value)

@@ -1,4 +1,4 @@
-"""The folder of one run: named after all its settings, locked while the run goes on, complete or recognizably not."""
+"""Folder of one run: named after all settings, locked during the run, with partial names for incomplete files."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from eidrive_scenario.resolved_settings import ResolvedSettings
 _READABLE = 100
 """Maximum length of the readable part of a name [bytes]."""
 _LOCK = ".lock"
-_MOST_COPIES = 1000
+_MAX_COPIES = 1000
+"""Maximum number of folders with equal settings."""
 
 
 def folder_name(settings: ResolvedSettings) -> str:
-    """The name of a run's folder: scenario, channel, run of a distribution and seed, and the hash of all settings."""
+    """Return the name of a run folder: scenario, channel, run of a distribution, seed, and hash of all settings."""
     run = [] if settings.run is None else [f"run{settings.run}"]
     parts = [settings.scenario.rsplit("/", 1)[-1], settings.channel, *run, f"seed{settings.seed}"]
     readable = re.sub(r"[^\w.+=-]+", "_", "-".join(parts)).strip("._-")
@@ -31,7 +32,7 @@ def folder_name(settings: ResolvedSettings) -> str:
 
 
 class RunFolder:
-    """A locked folder. Files are written under partial names; `commit` gives all of them their own names at the end."""
+    """Locked folder of a run. Files are written under partial names, and `commit` renames them at the end."""
 
     def __init__(self, path: Path, lock: FileLock) -> None:
         self.path = path
@@ -39,25 +40,25 @@ class RunFolder:
 
     @property
     def recording(self) -> Path:
-        """Path of the recording while the run goes on."""
+        """Path of the recording during the run."""
         return partial_path(self.path / RECORDING)
 
     @property
-    def pictures(self) -> Path:
-        """Folder of the camera images while the run goes on."""
+    def images(self) -> Path:
+        """Folder of the camera images during the run."""
         return partial_path(self.path / IMAGES)
 
     def prepare(self) -> None:
-        """Remove what an earlier run has left that did not end, with the page that `eidrive view` made of it."""
+        """Remove the files of an earlier run that did not end, including its page by `eidrive view`."""
         self.recording.unlink(missing_ok=True)
         self.recording.with_suffix(".html").unlink(missing_ok=True)
-        shutil.rmtree(self.pictures, ignore_errors=True)
+        shutil.rmtree(self.images, ignore_errors=True)
 
     def commit(self, result: bytes) -> None:
         """Replace the files of an earlier run with the same settings.
 
-        A page that `eidrive view` made of the former recording goes too. The result is removed first and written last,
-        so a result always belongs to the recording beside it.
+        The page of the former recording by `eidrive view` is removed, too. The result is removed first and written
+        last, so a result always belongs to the recording in its folder.
         """
         (self.path / RESULT).unlink(missing_ok=True)
         for outdated in (self.path / RECORDING, (self.path / RECORDING).with_suffix(".html")):
@@ -65,42 +66,42 @@ class RunFolder:
         shutil.rmtree(self.path / IMAGES, ignore_errors=True)
         if self.recording.exists():
             self.recording.replace(self.path / RECORDING)
-        if self.pictures.exists():
-            self.pictures.replace(self.path / IMAGES)
+        if self.images.exists():
+            self.images.replace(self.path / IMAGES)
         unfinished = partial_path(self.path / RESULT)
         unfinished.write_bytes(result)
         unfinished.replace(self.path / RESULT)
 
     def earlier_trace(self) -> str | None:
-        """The trace hash of the result that lies there, or None if there is none."""
+        """Return the trace hash of the result in the folder, or None without a result."""
         with suppress(InputError):
             return str(read_result(self.path / RESULT)["trace_hash"])
         return None
 
     def discard(self) -> None:
-        """Leave nothing of a run that never began."""
+        """Remove all files of a run that never started."""
         with suppress(OSError):
             self.recording.unlink(missing_ok=True)
-            shutil.rmtree(self.pictures, ignore_errors=True)
+            shutil.rmtree(self.images, ignore_errors=True)
             self._lock.release()
             self.path.rmdir()
 
     def release(self) -> None:
-        """Give the folder free for other runs."""
+        """Release the folder for other runs."""
         self._lock.release()
 
 
 @contextmanager
-def run_folder(place: Path, settings: ResolvedSettings, *, own: bool) -> Iterator[RunFolder]:
-    """A folder for a run with these settings, locked until the block ends.
+def run_folder(parent: Path, settings: ResolvedSettings, *, own: bool) -> Iterator[RunFolder]:
+    """Create and lock a folder for a run with these settings until the block ends.
 
-    own  True: a folder below `place`, named after the settings. A number is appended while another run with the same
-         settings is going on, or where the name holds anything else. False: `place` itself
+    own  True: a folder below `parent`, named after the settings. A number is appended if another run with equal
+         settings is in progress, or if the folder has other content. False: `parent` itself
 
-    Wrong input leaves nothing. Raise SettingError if the folder cannot be written, or if `place` itself is in use or
-    holds the result of other settings.
+    Invalid input creates no files. Raise SettingError if the folder cannot be written, or if `parent` itself is in use
+    or contains the result of other settings.
     """
-    folder = _claim_below(place, settings) if own else _claim(place, settings)
+    folder = _claim_below(parent, settings) if own else _claim(parent, settings)
     try:
         folder.prepare()
         yield folder
@@ -115,28 +116,29 @@ def run_folder(place: Path, settings: ResolvedSettings, *, own: bool) -> Iterato
         folder.release()
 
 
-def _claim_below(place: Path, settings: ResolvedSettings) -> RunFolder:
+def _claim_below(parent: Path, settings: ResolvedSettings) -> RunFolder:
     name = folder_name(settings)
     for number in itertools.count(1):
-        path = place / (name if number == 1 else f"{name}-{number}")
+        path = parent / (name if number == 1 else f"{name}-{number}")
         lock = _lock(path)
         if lock is not None:
             if _is_free(path, settings):
                 return RunFolder(path, lock)
             lock.release()
-        if number == _MOST_COPIES:
+        if number == _MAX_COPIES:
             break
-    raise SettingError(Diagnostic(f"{_MOST_COPIES} folders of this name are taken", "choose another folder", str(path)))
+    message = f"{_MAX_COPIES} folders of this name are in use"
+    raise SettingError(Diagnostic(message, "choose another folder", str(path)))
 
 
 def _claim(path: Path, settings: ResolvedSettings) -> RunFolder:
     lock = _lock(path)
     if lock is None:
-        raise SettingError(Diagnostic("another run writes into this folder", "choose another one", str(path)))
+        raise SettingError(Diagnostic("another run writes to this folder", "choose another folder", str(path)))
     if not _is_free(path, settings):
         lock.release()
-        what = "the folder holds the result of a run with other settings"
-        raise SettingError(Diagnostic(what, "choose another one", str(path)))
+        message = "the folder contains the result of a run with other settings"
+        raise SettingError(Diagnostic(message, "choose another folder", str(path)))
     return RunFolder(path, lock)
 
 
@@ -144,14 +146,14 @@ def _lock(path: Path) -> FileLock | None:
     try:
         while True:
             path.mkdir(parents=True, exist_ok=True)
-            with suppress(FileNotFoundError):  # another process has removed the empty folder meanwhile
+            with suppress(FileNotFoundError):  # another process removed the empty folder
                 return FileLock.acquire(path / _LOCK)
     except OSError as error:
         raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "choose another folder", str(path))) from error
 
 
 def _is_free(path: Path, settings: ResolvedSettings) -> bool:
-    """Whether a folder holds no result, or that of the same settings."""
+    """True if a folder contains no result, or a result of equal settings."""
     if not (path / RESULT).exists():
         return not (path / RECORDING).exists() or (path / RECORDING).is_file()
     try:

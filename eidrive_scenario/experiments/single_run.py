@@ -1,4 +1,4 @@
-"""One run that leaves files behind: its recording, its pictures, its result, its table of motions."""
+"""Single run with output files: recording, camera images, result and CSV table."""
 
 from __future__ import annotations
 
@@ -58,22 +58,21 @@ def run_and_save(
     wall_limit: float | None = None,
     command: str = "",
 ) -> RunResult:
-    """Run a scenario, given by path, library name or as all else that load_scenario takes, or one run out of a
-    parameter value distribution.
+    """Run a scenario, given as any source of load_scenario, or one run of a parameter value distribution.
 
-    out     folder for `result.json` and, unless `record` is False, `recording.mcap` and the cameras' `pictures`
-    below   folder in which the run gets such a folder of its own, named after all its settings: see `run_folder`
-    csv     file for one row per actor and tick
-    log     file for one line per change of the storyboard, with what fired and why; `-` is standard output
-    explanations  what shall be explained afterwards; they look on
-    command     command line that repeats the run, where the scenario has no file; else it is made of the settings
-    wall_limit  of loading and run together, in wall time [s]; WallLimitError is raised when it is reached
+    out           folder of `result.json` and, unless `record` is False, of `recording.mcap` and `images`
+    below         parent of such a folder, whose name contains the hash of all settings; see `run_folder`
+    csv           file for one row per actor and tick
+    log           file for one line per storyboard transition with its reason; `-` is standard output
+    explanations  explanations that observe the run
+    command       command line that repeats the run of a scenario without a file
+    wall_limit    limit of the wall time of loading and run [s]
 
-    A run that breaks or is interrupted leaves `recording.partial.mcap` and a `.partial` table: what there is of them.
-    Its exception has notes with that recording and with the command that repeats the run.
+    An aborted or interrupted run leaves `recording.partial.mcap` and a `.partial` table. Its exception has notes with
+    the path of the recording and the command that repeats the run.
 
-    Parameters in `settings` win over those of the distribution. Raise InputError for a wrong scenario, setting or
-    place to write; ConstraintError for a run that the constraints of parameters rule out.
+    Parameters in `settings` override those of the distribution. Raise InputError for an invalid scenario, setting or
+    output path, ConstraintError for a run that violates constraints of parameters, and WallLimitError at the limit.
     """
     settings = settings or RunSettings()
     seed = checked_seed(seed)
@@ -88,10 +87,10 @@ def run_and_save(
             )
             for explanation in explanations:
                 explanation.watch(simulation.storyboard)
-            place = out if out is not None else below
+            parent = out if out is not None else below
             folder = None
-            if place is not None:
-                folder = stack.enter_context(run_folder(Path(place), simulation.resolved, own=out is None))
+            if parent is not None:
+                folder = stack.enter_context(run_folder(Path(parent), simulation.resolved, own=out is None))
             if log is not None:
                 if str(log) != STANDARD_OUTPUT:
                     stack.enter_context(exclusive(Path(log)))
@@ -116,7 +115,7 @@ def run_and_save(
 
 
 def _command(source: Scenario | Source | ConcreteRun, seed: int, settings: RunSettings) -> str:
-    """The command line that repeats the run; empty for a scenario without a file."""
+    """Return the command line that repeats the run; empty for a scenario without a file."""
     given: Mapping[str, str | Assignment] = {}
     path: Any = source
     if isinstance(source, ConcreteRun):
@@ -135,13 +134,13 @@ def _record(
     settings: RunSettings,
     command: str,
 ) -> None:
-    """Let a recorder and a writer of camera images look on."""
-    pictures = CameraImageWriter(folder.pictures)
-    pictures.watch(simulation.stack)
-    simulation.add_observer(pictures)
+    """Add a recorder and a writer of camera images to the observers."""
+    images = CameraImageWriter(folder.images)
+    images.watch(simulation.stack)
+    simulation.add_observer(images)
     scenario, resolved = simulation.scenario, simulation.resolved
-    told = _told(scenario, resolved.seed, resolved.run, settings)
-    metadata = {**told, "settings": resolved.canonical, "command": command}
+    given = _given_settings(scenario, resolved.seed, resolved.run, settings)
+    metadata = {**given, "settings": resolved.canonical, "command": command}
     text = scenario.text if scenario.text is not None else _text(source)
     simulation.add_observer(Recorder(folder.recording, metadata=metadata, attachments=_attachments(text, scenario)))
 
@@ -155,19 +154,19 @@ def _text(source: Scenario | Source | ConcreteRun) -> bytes:
 
 
 def _keep(result: RunResult, folder: RunFolder, record: bool) -> RunResult:
-    """Write the result and give all files of the run their own names."""
+    """Write the result and rename the partial files of the run."""
     earlier = folder.earlier_trace()
     folder.commit(as_json_text(result, indent=2).encode() + b"\n")
     warnings = result.warnings
     if earlier not in (None, result.trace_hash):
-        what = f"{folder.path}: the result of an earlier run with equal settings was another one, trace {earlier}; "
-        warnings = (*warnings, what + "it is replaced")
+        cause = f"an earlier run with equal settings had another trace hash ({earlier})"
+        warnings = (*warnings, f"{folder.path}: the former result is replaced: {cause}")
     recording = folder.path / RECORDING if record else None
     return replace(result, warnings=warnings, folder=folder.path, recording=recording)
 
 
 def as_json_text(result: RunResult, indent: int | None = None, *, ascii_only: bool = False) -> str:
-    """The result as JSON; a number that JSON does not have is null. `ascii_only` writes other letters as `\\u00e4`."""
+    """Return the result as JSON, with null for non-finite numbers. `ascii_only` escapes other letters: `\\u00e4`."""
     return json.dumps(_finite(result.as_json()), indent=indent, ensure_ascii=ascii_only, allow_nan=False)
 
 
@@ -179,21 +178,21 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _told(scenario: Scenario, seed: int, run: int | None, settings: RunSettings) -> dict[str, str]:
-    """What the run was told, as texts; what was left to the file is not there."""
-    told = {name: value for name, value in asdict(settings).items() if value is not None and name != "parameters"}
+def _given_settings(scenario: Scenario, seed: int, run: int | None, settings: RunSettings) -> dict[str, str]:
+    """Return the settings of the caller as texts, without settings that use the value of the file."""
+    given = {name: value for name, value in asdict(settings).items() if value is not None and name != "parameters"}
     if run is not None:
-        told["run"] = run
+        given["run"] = run
     if settings.cooperate is not None:
-        told["cooperate"] = ",".join(settings.cooperate) or "none"
-    told["controllers"] = json.dumps(settings.controllers) if settings.controllers else None
-    told["user_values"] = json.dumps(settings.user_values) if settings.user_values else None
-    texts = {name: str(value) for name, value in told.items() if value is not None}
+        given["cooperate"] = ",".join(settings.cooperate) or "none"
+    given["controllers"] = json.dumps(settings.controllers) if settings.controllers else None
+    given["user_values"] = json.dumps(settings.user_values) if settings.user_values else None
+    texts = {name: str(value) for name, value in given.items() if value is not None}
     return {"scenario": scenario.name, "seed": str(seed), **texts, "parameters": json.dumps(scenario.parameters)}
 
 
 def _attachments(text: bytes, scenario: Scenario) -> dict[str, bytes]:
-    """The scenario's own text and its road, so that a recording can be shown without the files."""
+    """Return the text of the scenario and its road, so that a replay needs no other files."""
     texts = {"scenario.xosc": text}
     if scenario.road_file is not None:
         texts["road.xodr"] = read_road_text(scenario.road_file)

@@ -1,36 +1,36 @@
-"""What a handful of runs allows one to say: means, shares with an interval, and paired comparisons."""
+"""Statistics of repeated runs: means, proportions with intervals, and paired comparisons."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
+from scipy.stats import binomtest, bootstrap
 
 from eidrive_scenario.randomness import generator
 
 
 @dataclass(frozen=True)
 class Summary:
-    """A sample in a few numbers, in the unit of its values."""
+    """Summary of a sample, in the unit of its values."""
 
     count: int
     mean: float
     population_sd: float
-    """Divided by n: what the paper's tables give."""
+    """Standard deviation with divisor n, as in the tables of the paper."""
     sample_sd: float
-    """Divided by n - 1; NaN for a single value."""
+    """Standard deviation with divisor n - 1; NaN for a single value."""
     smallest: float
     largest: float
 
 
 def summarize(values: Sequence[float]) -> Summary:
-    """The summary of at least one finite value. Raise ValueError otherwise."""
+    """Return the summary of at least one finite value. Raise ValueError otherwise."""
     sample = np.asarray(values, dtype=np.float64)
     if sample.ndim != 1 or not len(sample) or not np.isfinite(sample).all():
-        raise ValueError(f"expected a list of finite numbers, not {values!r}")
+        raise ValueError(f"sample: not a list of finite numbers (got {values!r})")
     return Summary(
         count=len(sample),
         mean=float(sample.mean()),
@@ -43,7 +43,7 @@ def summarize(values: Sequence[float]) -> Summary:
 
 @dataclass(frozen=True)
 class Proportion:
-    """k of n, and the interval in which the true share lies with the given confidence."""
+    """Proportion k/n with the confidence interval of the true proportion."""
 
     successes: int
     trials: int
@@ -53,32 +53,26 @@ class Proportion:
 
     @property
     def share(self) -> float:
-        """k / n."""
+        """Observed proportion k/n."""
         return self.successes / self.trials
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Proportion:
-    """A share with its score interval (Wilson 1927), which behaves at 0 of n and n of n where mean ± sd does not.
+    """Return a proportion with its score interval (Wilson 1927), which is valid for 0 of n and n of n, too.
 
-    Raise ValueError where `successes` is not within 0 … `trials`, or there is no trial.
+    Raise ValueError if `successes` is not within 0 … `trials`, there is no trial, or `confidence` is not within (0, 1).
     """
     if trials < 1 or not 0 <= successes <= trials:
-        raise ValueError(f"{successes} of {trials} is no share")
+        raise ValueError(f"proportion: invalid counts (got {successes} of {trials})")
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence is {confidence}, expected a number between 0 and 1")
-    z = NormalDist().inv_cdf(0.5 + confidence / 2)
-    share = successes / trials
-    center = share + z * z / (2 * trials)
-    half = z * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials * trials))
-    scale = 1 + z * z / trials
-    low = 0.0 if successes == 0 else (center - half) / scale
-    high = 1.0 if successes == trials else (center + half) / scale
-    return Proportion(successes, trials, low, high, confidence)
+        raise ValueError(f"confidence: not between 0 and 1 (got {confidence})")
+    interval = binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    return Proportion(successes, trials, float(interval.low), float(interval.high), confidence)
 
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """Second minus first of pairs that share a seed, with a bootstrap interval of the mean."""
+    """Difference, second minus first, of pairs with equal seeds, with a bootstrap interval of its mean."""
 
     pairs: int
     mean: float
@@ -86,33 +80,43 @@ class PairedDifference:
     high: float
     confidence: float
     larger: int
-    """Pairs in which the second is larger."""
+    """Number of pairs with a larger second value."""
     smaller: int
+    """Number of pairs with a smaller second value."""
 
     @property
     def clear(self) -> bool:
-        """True where the interval leaves zero out."""
+        """True if the interval excludes zero."""
         return self.low > 0.0 or self.high < 0.0
 
 
 def paired_difference(
     first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95, resamples: int = 10_000, seed: int = 0
 ) -> PairedDifference:
-    """Compare two arms run with the same seeds, given in the same order (percentile bootstrap over the pairs).
+    """Compare two arms with equal seeds in equal order (percentile bootstrap over the pairs).
 
-    Raise ValueError where the two do not pair up.
+    A single pair has an interval of zero width. Raise ValueError if the arms differ in length or are empty.
     """
     if len(first) != len(second) or not first:
-        raise ValueError(f"{len(first)} and {len(second)} values do not pair up")
+        raise ValueError(f"pairs: lengths differ or are 0 (got {len(first)} and {len(second)} values)")
     difference = np.asarray(second, dtype=np.float64) - np.asarray(first, dtype=np.float64)
-    rows = generator(seed, "paired bootstrap").integers(0, len(difference), size=(resamples, len(difference)))
-    tail = 50.0 * (1.0 - confidence)
-    low, high = np.percentile(difference[rows].mean(axis=1), [tail, 100.0 - tail])
+    mean = float(difference.mean())
+    low, high = mean, mean
+    if len(difference) > 1:
+        interval = bootstrap(
+            (difference,),
+            np.mean,
+            n_resamples=resamples,
+            confidence_level=confidence,
+            method="percentile",
+            rng=generator(seed, "paired bootstrap"),
+        ).confidence_interval
+        low, high = float(interval.low), float(interval.high)
     return PairedDifference(
         pairs=len(difference),
-        mean=float(difference.mean()),
-        low=float(low),
-        high=float(high),
+        mean=mean,
+        low=low,
+        high=high,
         confidence=confidence,
         larger=int((difference > 0).sum()),
         smaller=int((difference < 0).sum()),
@@ -121,7 +125,7 @@ def paired_difference(
 
 @dataclass(frozen=True)
 class PairedOutcomes:
-    """Pass or fail of pairs that share a seed. `p_value` is McNemar's exact two-sided test."""
+    """Outcomes of pairs with equal seeds. `p_value` is that of McNemar's exact two-sided test."""
 
     both: int
     first_only: int
@@ -131,22 +135,20 @@ class PairedOutcomes:
 
 
 def paired_outcomes(first: Sequence[bool], second: Sequence[bool]) -> PairedOutcomes:
-    """Do two arms pass equally often? Only the pairs that disagree tell (McNemar 1947, exact binomial form).
+    """Test whether two arms pass equally often, by their discordant pairs (McNemar 1947, exact binomial form).
 
-    Raise ValueError where the two do not pair up.
+    Raise ValueError if the arms differ in length or are empty.
     """
     if len(first) != len(second) or not first:
-        raise ValueError(f"{len(first)} and {len(second)} outcomes do not pair up")
+        raise ValueError(f"pairs: lengths differ or are 0 (got {len(first)} and {len(second)} outcomes)")
     counts = {(a, b): 0 for a in (True, False) for b in (True, False)}
     for a, b in zip(first, second, strict=True):
         counts[bool(a), bool(b)] += 1
-    disagree = counts[True, False] + counts[False, True]
-    fewer = min(counts[True, False], counts[False, True])
-    tail = sum(math.comb(disagree, i) for i in range(fewer + 1)) / 2**disagree
+    discordant = counts[True, False] + counts[False, True]
     return PairedOutcomes(
         both=counts[True, True],
         first_only=counts[True, False],
         second_only=counts[False, True],
         neither=counts[False, False],
-        p_value=min(1.0, 2.0 * tail),
+        p_value=float(binomtest(counts[True, False], discordant).pvalue) if discordant else 1.0,
     )

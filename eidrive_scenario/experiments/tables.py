@@ -1,4 +1,4 @@
-"""The paper's table on a terminal, within 80 columns."""
+"""Table of the paper on a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HEADINGS = (
 
 
 def row(cell: Cell) -> tuple[str, ...]:
-    """One row of the table, in the order of HEADINGS; sd is the population's, as in the paper."""
+    """Return one row of the table in the order of HEADINGS, with the population standard deviation of the paper."""
     center, box, free = cell.center, cell.box, cell.collision_free
     return (
         cell.arm.title,
@@ -38,8 +38,8 @@ def row(cell: Cell) -> tuple[str, ...]:
 
 
 def render(table: Table, found: Sequence[PublishedClaim] = ()) -> RenderableType:
-    """One grid per place, and the checks of the order below it."""
-    parts: list[RenderableType] = [Text(f"Table II, oracle; {table.rule.title}", style="bold"), Text("")]
+    """Return one grid per scenario, followed by the checks of the published order."""
+    parts: list[RenderableType] = [Text(f"Table II, oracle; {table.variant.title}", style="bold"), Text("")]
     for scenario in table.scenarios:
         grid = Grid(
             title=SCENARIOS.get(scenario, scenario),

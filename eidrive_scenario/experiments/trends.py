@@ -1,7 +1,7 @@
-"""What is known of cooperative perception over a radio, measured with this package beside what it should be.
+"""Known trends of cooperative perception over a radio channel: measured and expected values.
 
-Each function gives arrays for one picture of `make reproduce-trends`; expectations come from closed forms, not from the
-code that is measured.
+Each function returns the arrays of one figure of `make reproduce-trends`. Expected values follow from closed forms that
+are independent of the measured code.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from eidrive_scenario.world.actor import ActorSpec, Placement
 CAR = (4.5, 1.8, 1.5)
 """Length, width and height of a car [m]."""
 TRUCK = (8.5, 2.5, 3.3)
-"""Those of the firetruck."""
+"""Length, width and height of the firetruck [m]."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One measured line and what it should be: `x` (N,), `measured` (N,), `expected` (N,).
+    """Measured and expected values over `x`, each (N,).
 
-    chance  (N,) how far 95 % of the measured shares lie off the expected ones at most, where they are shares of draws
+    chance  (N,) half width of the range that contains 95 % of the measured shares of random draws; None if exact
     """
 
     label: str
@@ -52,7 +52,7 @@ class Curve:
 
 
 def largest_shift(iou: float, length: float = CAR[0]) -> float:
-    """How far a box may lie ahead of or behind its object along its length before their overlap falls below `iou` [m].
+    """Return the maximum longitudinal shift between a box and its object with an overlap of at least `iou` [m].
 
     IoU = (L - s) / (L + s) for a shift s.
     """
@@ -62,16 +62,16 @@ def largest_shift(iou: float, length: float = CAR[0]) -> float:
 def precision_by_delay(
     speed: float, iou: float, delays: Sequence[float], *, compensated: bool = False, cars: int = 20, seed: int = 1
 ) -> Curve:
-    """Average precision of what a listener knows of cars at constant speed [m/s] when messages are late [s].
+    """Return the average precision of a receiving station for cars at constant speed [m/s] over message delays [s].
 
-    Uncompensated, a box lies v tau behind its car: precision falls from 1 to 0 where that is `largest_shift`.
+    Without prediction, a box is v tau behind its car, so precision falls from 1 to 0 at `largest_shift`.
     """
     dt = 0.005
     headings = np.random.Generator(np.random.Philox(key=seed)).uniform(-math.pi, math.pi, cars)
     start = 40.0 * np.stack([np.arange(cars) % 5, np.arange(cars) // 5], axis=1)
     velocity = speed * np.stack([np.cos(headings), np.sin(headings)], axis=1)
 
-    def seen(time: float) -> Detections:
+    def true_detections(time: float) -> Detections:
         boxes = np.column_stack(
             [start + velocity * time, np.full(cars, CAR[2] / 2.0), np.tile(CAR, (cars, 1)), headings]
         )
@@ -86,68 +86,68 @@ def precision_by_delay(
         ticks = math.ceil(delay / dt - 1e-6) + 20
         for tick in range(ticks + 1):
             now = tick * dt
-            known = Detections(now)
+            fused = Detections(now)
             for received in channel.deliver("Ego", now):
                 report = Report("RSU", received.message.detections, received.arrived)
                 fusion.add_report(report)
-                known = fusion.fuse([report], now) if tick == ticks else known
-            said = seen(now)
+                fused = fusion.fuse([report], now) if tick == ticks else fused
+            detections = true_detections(now)
             state = StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0)
-            channel.send(Message("RSU", tick, now, state, said, 0), ["Ego"], now)
-        truth = said.boxes
-        found = match_by_share(iou_bev(known.boxes, truth), known.scores, np.zeros(cars, dtype=bool), iou)
+            channel.send(Message("RSU", tick, now, state, detections, 0), ["Ego"], now)
+        truth = detections.boxes
+        found = match_by_share(iou_bev(fused.boxes, truth), fused.scores, np.zeros(cars, dtype=bool), iou)
         measured.append(average_precision([found], cars))
     late = np.array([math.ceil(max(delay, dt) / dt - 1e-6) * dt for delay in delays])
     expected = np.ones(len(late)) if compensated else (speed * late <= largest_shift(iou) + 1e-9).astype(float)
-    label = f"{speed:g} m/s, IoU {iou:g}" + (", moved on to the present" if compensated else "")
+    label = f"{speed:g} m/s, IoU {iou:g}" + (", predicted to the current time" if compensated else "")
     return Curve(label, np.array(delays), np.array(measured), expected)
 
 
 def reception_by_distance(distances: Sequence[float], *, truck: bool, messages: int = 300) -> Curve:
-    """Packet reception ratio between two antennas 1.5 m high on a highway, with or without a firetruck in between.
+    """Return the packet reception ratio between two antennas at 1.5 m on a highway, with or without a firetruck.
 
-    The truck is a body in the world, and rays find it. Each message meets its own shadowing. Expected: the share of
-    shadowing (3 dB) and, behind the truck, of its loss (TR 37.885, lognormal) that leaves the signal above -85 dBm,
-    times the share of packets without error there.
+    The truck is a body in the world, which rays detect. Each message has independent shadowing. The expected value is
+    the probability that shadowing (3 dB) and, behind the truck, its blockage loss (TR 37.885, lognormal) leave the
+    signal above -85 dBm, times the packet success ratio at that power.
     """
     profile = RadioProfile.model_validate({"path_loss": {"kind": "tr37885", "environment": "highway"}, "jitter": 0.0})
     measured = []
     for distance in distances:
-        places = {"Ego": (0.0, 0.0, 1.5), "RSU": (distance, 0.0, 1.5)}
-        sight = _seen_in_the_world(places, truck)
-        kept = 0
+        antennas = {"Ego": (0.0, 0.0, 1.5), "RSU": (distance, 0.0, 1.5)}
+        states = _line_of_sight(antennas, truck)
+        delivered = 0
         for seed in range(messages):
             channel = RadioChannel(profile, seed)
-            channel.update_environment(RadioEnvironment(places, lambda pairs, seen=sight: seen))  # type: ignore[misc]
+            channel.update_environment(RadioEnvironment(antennas, lambda pairs, fixed=states: fixed))  # type: ignore[misc]
             state = StationState(0.0, distance, 0.0, 0.0, 0.0, 0.0)
             channel.transmit([(Message("RSU", 0, 0.0, state, Detections(0.0), 350), ["Ego"])], 0.0)
-            kept += len(channel.deliver("Ego", 0.05))
-        measured.append(kept / messages)
+            delivered += len(channel.deliver("Ego", 0.05))
+        measured.append(delivered / messages)
     at = np.array(distances)
-    label = "the firetruck in between" if truck else "nothing in between"
+    label = "behind the firetruck" if truck else "line of sight"
     expected = _expected_reception(at, profile, truck)
     return Curve(label, at, np.array(measured), expected, 1.96 * np.sqrt(expected * (1.0 - expected) / messages))
 
 
-def _seen_in_the_world(places: dict[str, tuple[float, float, float]], truck: bool) -> LineOfSightStates:
+def _line_of_sight(antennas: dict[str, tuple[float, float, float]], truck: bool) -> LineOfSightStates:
     with World(None) as world:
         if truck:
             spec = ActorSpec("Firetruck", "firetruck", "truck", TRUCK, (0.0, 0.0, TRUCK[2] / 2.0))
-            world.add(spec, Placement(places["RSU"][0] / 2.0, 0.0, yaw=math.pi / 2.0))
-        return line_of_sight_states(world, places, [("Ego", "RSU")])
+            world.add(spec, Placement(antennas["RSU"][0] / 2.0, 0.0, yaw=math.pi / 2.0))
+        return line_of_sight_states(world, antennas, [("Ego", "RSU")])
 
 
 def _expected_reception(distance: Array, profile: RadioProfile, truck: bool) -> Array:
-    """By the midpoint rule over both random losses."""
+    """Return the expected packet reception ratio by the midpoint rule over both random losses."""
     steps = 400
     normal = np.linspace(-5.0, 5.0, steps + 1)
     weight = np.diff(ndtr(normal))
     middle = (normal[:-1] + normal[1:]) / 2.0
     low, top = np.full(len(distance), 1.5), np.full(len(distance), TRUCK[2] if truck else -np.inf)
     mean, spread = blockage_moments(distance, low, low, top)
-    some = np.where(mean > 0.0, mean, 1.0)
-    variance = np.log1p((spread / some) ** 2)
-    exponent = np.log(some) - variance / 2.0
+    positive_mean = np.where(mean > 0.0, mean, 1.0)
+    variance = np.log1p((spread / positive_mean) ** 2)
+    exponent = np.log(positive_mean) - variance / 2.0
     extra = np.exp(exponent[:, None] + np.sqrt(variance)[:, None] * middle) * (mean > 0.0)[:, None]
     curve = CURVES["80211p_highway_nlos" if truck else "80211p_highway_los"]
     open_power = profile.radiated - highway_los(distance, profile.frequency_ghz)
@@ -160,10 +160,10 @@ def _expected_reception(distance: Array, profile: RadioProfile, truck: bool) -> 
 def age_by_burst(
     bursts: Sequence[float], *, share: float = 0.3, period: float = 0.1, delay: float = 0.02, messages: int = 150_000
 ) -> tuple[Curve, Curve]:
-    """Mean and mean peak age of information when a share of the messages is lost in bursts of this mean length.
+    """Return mean and mean peak age of information over the mean length of loss bursts, at a fixed loss ratio.
 
     Gilbert-Elliott: mean age d + T E[K²] / 2 E[K] with E[K] = 1 + p/r, E[K²] = 1 + p (2 + r) / r², r = 1 / burst,
-    p = r share / (1 - share); peak age d + T E[K], whatever the bursts.
+    p = r share / (1 - share). The peak age is d + T E[K], independent of the burst length.
     """
     mean, peak = [], []
     for burst in bursts:
@@ -175,9 +175,9 @@ def age_by_burst(
             state = StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0)
             channel.send(Message("RSU", number, now, state, Detections(now), 0), ["Ego"], now)
             channel.deliver("Ego", now + period)
-        book = channel.statistics(messages * period)["RSU", "Ego"]
-        mean.append(book.mean_age or math.nan)
-        peak.append(book.peak_age or math.nan)
+        link = channel.statistics(messages * period)["RSU", "Ego"]
+        mean.append(link.mean_age or math.nan)
+        peak.append(link.peak_age or math.nan)
     length = np.array(bursts)
     back = 1.0 / length
     into = back * share / (1.0 - share)

@@ -64,8 +64,8 @@ def write_demo(
     windows = {scenario: _window(scenario, stories) for scenario in links.scenarios}
     symbols = "".join(roads_symbol(places[name].roads, _identifier(name)) for name in links.scenarios)
     values = {
-        table.rule.name: {
-            "title": table.rule.title,
+        table.variant.name: {
+            "title": table.variant.title,
             "places": [_place(table, name, stories, places[name], windows[name], watched) for name in links.scenarios],
         }
         for table in (links, own)
@@ -81,8 +81,8 @@ def write_demo(
         seeds=len(links.cells[0].seeds),
         watched=watched,
         legend=Markup(legend()),
-        links=values[links.rule.name],
-        own=values[own.rule.name],
+        links=values[links.variant.name],
+        own=values[own.variant.name],
         sentence=difference(links, own),
         footer=footer,
     )
@@ -91,7 +91,7 @@ def write_demo(
 def _place(
     table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], place: DemoSite, window: Window, watched: int
 ) -> dict[str, Any]:
-    mine = {arm.name: stories[scenario, arm.channel(table.rule)] for arm in ARMS}
+    mine = {arm.name: stories[scenario, arm.channel(table.variant)] for arm in ARMS}
     found: Sequence[PublishedClaim] = [check for check in evaluate_claims(table) if check.scenario == scenario]
     return {
         "title": SCENARIOS.get(scenario, scenario),
@@ -101,7 +101,7 @@ def _place(
         "views": [
             {"title": view.title, "caption": view.caption, "address": png_address(view.png)} for view in place.views
         ]
-        if table.rule == LINKS
+        if table.variant == LINKS
         else [],
         "arms": [
             {

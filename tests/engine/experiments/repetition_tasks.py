@@ -1,4 +1,4 @@
-"""Tasks for test_repetitions; a module of its own, as worker processes import it by name."""
+"""Tasks of test_repetitions in a separate module, which worker processes import by name."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from eidrive_scenario.randomness import generator
 
 
 def draw(job: Job) -> tuple[str, int, float]:
-    """Stands for a run: random, but only through its seed."""
+    """Return a random number that depends only on arm and seed."""
     return job.arm, job.seed, float(generator(job.seed, job.arm).random())
 
 
 def die(job: Job) -> None:
-    """The process is gone, as after a crash of the physics."""
+    """End the process abnormally."""
     os._exit(7)
 
 
 def fail(job: Job) -> None:
-    """Raises."""
-    raise ValueError(f"seed {job.seed} is wrong")
+    """Raise ValueError."""
+    raise ValueError(f"seed {job.seed} is invalid")

@@ -1,4 +1,4 @@
-"""The table of learned detectors in closed loop."""
+"""Table of learned detectors in closed loop."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def row(seed: int, collisions: int, **given: object) -> Row:
     return Row(seed=seed, collisions=collisions, false_tracks=2.0 * seed, brakings=2, without_cause=seed % 2, **values)  # type: ignore[arg-type]
 
 
-def test_table_has_a_line_per_arm_with_counts_and_means() -> None:
-    """Wilson's 95 % interval of 1 of 2 is 0.09 to 0.91."""
+def test_table_has_one_line_per_arm_with_counts_and_means() -> None:
+    """The 95 % Wilson interval of 1 of 2 is 0.09 to 0.91."""
     lines = table([row(1, 0), row(2, 3), row(1, 0, channel="ideal")]).splitlines()
     assert lines[2:] == [
         "| `oracle` | scenario_1 | `none` | 1 of 2 | 0.09 to 0.91 | 3.0 | 1 of 4 |",
@@ -24,15 +24,15 @@ def test_table_has_a_line_per_arm_with_counts_and_means() -> None:
     ]
 
 
-def test_jobs_are_all_arms_of_a_seed() -> None:
+def test_jobs_of_seed_contain_all_arms() -> None:
     assert len(jobs(("yolov5", "ssd"), ("none", "ideal"), 1)) == 8
     assert {job.settings.detector for job in jobs(("yolov5",), ("none",), 3)} == {"yolov5"}
 
 
-def test_main_with_the_oracle_avoids_collisions_by_cooperation_only(
+def test_main_with_oracle_avoids_collisions_only_by_cooperation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The oracle takes the place of the networks; a second call adds no runs."""
+    """The oracle detector replaces the networks. A second call adds no runs."""
     arguments = ["--out", str(tmp_path), "--seeds", "1", "--detectors", "oracle", "--workers", "1"]
     main(arguments)
     main(arguments)

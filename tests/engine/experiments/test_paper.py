@@ -1,4 +1,4 @@
-"""The paper's table from given results: cells, checks of the order, the sentence, the print."""
+"""Table of the paper from given results: cells, checks of the order, sentence, terminal output."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def result(scenario: str, seed: int, center: float, box: float) -> RunResult:
 
 
 def episodes(shift_of_own: float = 0.0) -> list[tuple[Job, RunResult]]:
-    """The paper's own episodes as if they were runs of ours; a body gap of center - 3.4 m."""
+    """Return the published episodes as results of runs, with a body distance of center - 3.4 m."""
     runs = []
     for (scenario, name), published in PUBLISHED.items():
         arm = next(arm for arm in ARMS if arm.name == name)
@@ -66,8 +66,8 @@ def table() -> Table:
 
 
 @pytest.mark.parametrize("key", PUBLISHED)
-def test_raw_episodes_give_the_printed_mean_and_population_sd(key: tuple[str, str]) -> None:
-    """One mean is cut instead of rounded in print: 4.3258 m stands there as 4.32."""
+def test_published_episodes_have_published_mean_and_sd(key: tuple[str, str]) -> None:
+    """One published mean is truncated instead of rounded: 4.3258 m is printed as 4.32."""
     published = PUBLISHED[key]
     summary = summarize(published.episodes)
     assert round(summary.population_sd, 2) == published.sd
@@ -75,50 +75,50 @@ def test_raw_episodes_give_the_printed_mean_and_population_sd(key: tuple[str, st
     assert round(summary.mean, 2) == printed
 
 
-def test_every_cell_of_the_paper_is_run() -> None:
+def test_published_cells_cover_all_scenarios_and_arms() -> None:
     assert set(PUBLISHED) == {(scenario, arm.name) for scenario in SCENARIOS for arm in ARMS}
 
 
-def test_no_cooperation_is_run_once_for_both_rules() -> None:
+def test_run_settings_share_no_cooperation_between_variants() -> None:
     settings = run_settings()
     assert len(settings) == 7
     assert len({id(arm) for arm in ARMS if arm.links == arm.own}) == 1
     assert all(setting.channel == name for name, setting in settings.items())
 
 
-def test_jobs_come_seed_by_seed() -> None:
+def test_jobs_of_arms_are_ordered_by_seed() -> None:
     jobs = jobs_of("coop/scenario_1", {"a": RunSettings(), "b": RunSettings()}, [3, 4])
     assert [(job.seed, job.arm) for job in jobs] == [(3, "a"), (3, "b"), (4, "a"), (4, "b")]
 
 
-def test_cells_count_collision_free_runs(table: Table) -> None:
+def test_cell_counts_collision_free_runs(table: Table) -> None:
     cell = table.cell("coop/scenario_1", "error")
     assert (cell.collision_free.successes, cell.collision_free.trials) == (3, 5)
     assert cell.center.smallest == 1.8226
     assert cell.box.smallest == 0.0
 
 
-def test_the_table_does_not_depend_on_the_order_of_the_runs(table: Table) -> None:
+def test_tabulate_does_not_depend_on_order_of_runs(table: Table) -> None:
     assert tabulate(episodes()[::-1], LINKS).cell("coop/scenario_2", "error") == table.cell("coop/scenario_2", "error")
 
 
-def test_a_run_without_the_metric_is_named() -> None:
+def test_tabulate_of_run_without_metric_raises_error() -> None:
     (job, run), *rest = episodes()
     bare = dataclasses.replace(run, metrics={"collision.count": 0.0})
     with pytest.raises(
-        SimulationError, match=r"scenario_1 with seed 0 measured no min_distance\.Ego\.Incoming\.center"
+        SimulationError, match=r"scenario_1, seed 0: metric min_distance\.Ego\.Incoming\.center is missing"
     ):
         tabulate([(job, bare), *rest], LINKS)
 
 
-def test_the_papers_episodes_bear_out_the_papers_order(table: Table) -> None:
+def test_evaluate_claims_of_published_episodes_confirms_order(table: Table) -> None:
     found = evaluate_claims(table)
     assert len(found) == 6
     assert all(check.holds for check in found)
     assert "cooperation 3.98 m, none 3.26 m; difference per seed +0.72 m" in found[0].evidence
 
 
-def test_a_wrong_order_does_not_hold() -> None:
+def test_evaluate_claims_of_reversed_order_rejects_claims() -> None:
     runs = [(job, result(job.scenario, job.seed, 2.0, 0.0) if job.arm == "ideal" else run) for job, run in episodes()]
     verdicts = {
         check.statement: check.holds for check in evaluate_claims(tabulate(runs, LINKS)) if check.scenario[-1] == "1"
@@ -127,21 +127,21 @@ def test_a_wrong_order_does_not_hold() -> None:
     assert verdicts["latency < cooperation"] is False
 
 
-def test_the_sentence_says_what_own_perception_changes() -> None:
+def test_difference_of_variants_states_changed_arms() -> None:
     runs = episodes(shift_of_own=-1.0)
     text = difference(tabulate(runs, LINKS), tabulate(runs, OWN))
     assert "scenario 1 latency 0.3 s 2.50 → 1.50 m, collision-free 0 → 0 of 5" in text
     assert "scenario 2 error 30 % 4.33 → 3.33 m, collision-free 5 → 4 of 5" in text
-    assert "worse than no cooperation in 2 of 2 places under that rule, and in 2 of 2" in text
+    assert "worse than no cooperation in 2 of 2 scenarios with this variant, and in 2 of 2 with" in text
 
 
-def test_the_sentence_says_so_where_nothing_changes() -> None:
+def test_difference_of_equal_variants_states_no_change() -> None:
     runs = episodes()
     text = difference(tabulate(runs, LINKS), tabulate(runs, OWN))
     assert "changes nothing (means by 0.00 m at most)" in text
 
 
-def test_the_print_fits_80_columns_and_holds_the_paper_beside(table: Table) -> None:
+def test_render_fits_80_columns_with_published_values(table: Table) -> None:
     out = io.StringIO()
     Console(file=out, width=80).print(render(table, evaluate_claims(table)))
     text = out.getvalue()

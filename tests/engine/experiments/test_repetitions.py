@@ -1,4 +1,4 @@
-"""Repetitions: the order of the jobs, whatever the number of workers; a dead worker is an error, not a hang."""
+"""Repetitions: results in job order for any number of workers; a dead worker process is an error."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ def tasks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib.import_module("repetition_tasks")
 
 
-def test_one_worker_keeps_the_order_of_the_jobs(tasks: ModuleType) -> None:
-    answers = run_jobs(JOBS, tasks.draw, workers=1)
-    assert [(arm, seed) for arm, seed, _ in answers] == [(job.arm, job.seed) for job in JOBS]
+def test_run_jobs_returns_results_in_job_order(tasks: ModuleType) -> None:
+    results = run_jobs(JOBS, tasks.draw, workers=1)
+    assert [(arm, seed) for arm, seed, _ in results] == [(job.arm, job.seed) for job in JOBS]
 
 
-def test_the_answer_depends_neither_on_workers_nor_on_order(tasks: ModuleType) -> None:
+def test_run_jobs_results_depend_neither_on_workers_nor_order(tasks: ModuleType) -> None:
     alone = run_jobs(JOBS, tasks.draw, workers=1)
     assert run_jobs(JOBS, tasks.draw, workers=2) == alone
     assert sorted(run_jobs(JOBS[::-1], tasks.draw, workers=2)) == sorted(alone)
 
 
-def test_progress_is_shown_where_asked(tasks: ModuleType) -> None:
+def test_run_jobs_with_console_shows_progress(tasks: ModuleType) -> None:
     out = io.StringIO()
     run_jobs(JOBS, tasks.draw, workers=1, console=Console(file=out, width=100), title="demo")
     assert "demo" in out.getvalue()
     assert "12/12" in out.getvalue()
 
 
-def test_a_dead_worker_is_an_error(tasks: ModuleType) -> None:
+def test_run_jobs_with_dead_worker_raises_error(tasks: ModuleType) -> None:
     with pytest.raises(SimulationError, match="worker process died"):
         run_jobs(JOBS, tasks.die, workers=2)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_what_a_task_raises_comes_through(tasks: ModuleType, workers: int) -> None:
-    with pytest.raises(ValueError, match="seed 0 is wrong"):
+def test_run_jobs_raises_error_of_task(tasks: ModuleType, workers: int) -> None:
+    with pytest.raises(ValueError, match="seed 0 is invalid"):
         run_jobs(JOBS[:2], tasks.fail, workers=workers)
 
 
-def test_no_worker_is_refused(tasks: ModuleType) -> None:
-    with pytest.raises(ValueError, match="0 workers"):
+def test_run_jobs_without_worker_raises_value_error(tasks: ModuleType) -> None:
+    with pytest.raises(ValueError, match=r"workers: not a positive number \(got 0\)"):
         run_jobs(JOBS, tasks.draw, workers=0)

@@ -1,4 +1,4 @@
-"""The folders of runs: never shared, never mixed, never half written."""
+"""Run folders: never shared by different settings, never mixed, never incomplete."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_run_folder_differs_for_each_setting(tmp_path: Path, changes: dict[str, 
     assert len(results(tmp_path)) == 2
 
 
-def test_folder_name_of_odd_and_long_names_is_a_short_file_name() -> None:
+def test_folder_name_of_special_characters_is_a_short_file_name() -> None:
     odd = ResolvedSettings(scenario="a/../" + "ä b\n/" * 100, channel="../x", seed=-3, parameters={"P": "a/b\0"})
     name = folder_name(odd)
     assert len(name.encode()) <= 120
@@ -76,7 +76,7 @@ def test_folder_name_of_odd_and_long_names_is_a_short_file_name() -> None:
     assert folder_name(replace(odd, seed=-4)) != name
 
 
-def test_odd_values_of_parameters_are_kept_apart(tmp_path: Path) -> None:
+def test_run_folders_of_special_parameter_values_differ(tmp_path: Path) -> None:
     text = PASSING_BY.read_text(encoding="utf-8").replace(
         "</ParameterDeclarations>",
         '<ParameterDeclaration name="Note" parameterType="string" value=""/></ParameterDeclarations>',
@@ -90,23 +90,23 @@ def test_odd_values_of_parameters_are_kept_apart(tmp_path: Path) -> None:
     assert sorted(result["parameters"]["Note"] for result in results(tmp_path / "out")) == sorted(values)
 
 
-def test_a_second_run_with_equal_settings_replaces_the_first(tmp_path: Path) -> None:
+def test_second_run_with_equal_settings_replaces_first(tmp_path: Path) -> None:
     first, second = run(tmp_path), run(tmp_path)
     assert first.folder == second.folder
     assert second.warnings == first.warnings
     assert len(results(tmp_path)) == 1
 
 
-def test_a_result_that_differs_under_equal_settings_is_reported(tmp_path: Path) -> None:
+def test_different_result_of_equal_settings_is_reported(tmp_path: Path) -> None:
     first = run(tmp_path)
     assert first.folder is not None
     kept = first.folder / "result.json"
     kept.write_text(kept.read_text(encoding="utf-8").replace(first.trace_hash, "0" * 64), encoding="utf-8")
-    assert "it is replaced" in run(tmp_path).warnings[-1]
-    assert "it is replaced" not in "".join(run(tmp_path).warnings)
+    assert "the former result is replaced" in run(tmp_path).warnings[-1]
+    assert "the former result is replaced" not in "".join(run(tmp_path).warnings)
 
 
-def test_a_folder_with_another_result_is_never_overwritten(tmp_path: Path) -> None:
+def test_folder_with_other_content_is_not_overwritten(tmp_path: Path) -> None:
     first = run(tmp_path)
     assert first.folder is not None
     (first.folder / "result.json").write_text("{", encoding="utf-8")
@@ -115,19 +115,19 @@ def test_a_folder_with_another_result_is_never_overwritten(tmp_path: Path) -> No
     assert (first.folder / "result.json").read_text(encoding="utf-8") == "{"
 
 
-def test_an_explicit_folder_with_other_settings_is_refused(tmp_path: Path) -> None:
+def test_explicit_folder_with_other_settings_raises_setting_error(tmp_path: Path) -> None:
     run_and_save(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
     run_and_save(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
-    with pytest.raises(SettingError, match="holds the result of a run with other settings"):
+    with pytest.raises(SettingError, match="contains the result of a run with other settings"):
         run_and_save(PASSING_BY, seed=2, settings=RunSettings(**SHORT), out=tmp_path)
 
 
-def test_a_locked_folder_gets_a_neighbor_with_a_number(tmp_path: Path) -> None:
+def test_locked_folder_causes_numbered_folder(tmp_path: Path) -> None:
     settings = ResolvedSettings(scenario="x")
     with run_folder(tmp_path, settings, own=True) as first, run_folder(tmp_path, settings, own=True) as second:
         assert second.path.name == f"{first.path.name}-2"
         with (
-            pytest.raises(SettingError, match="another run writes into this folder"),
+            pytest.raises(SettingError, match="another run writes to this folder"),
             run_folder(first.path, settings, own=False),
         ):
             pass
@@ -140,7 +140,7 @@ def _hold(path: Path, ready: Any) -> None:
     time.sleep(60)
 
 
-def test_the_lock_of_a_killed_process_does_not_block(tmp_path: Path) -> None:
+def test_lock_of_killed_process_is_released(tmp_path: Path) -> None:
     path = tmp_path / ".lock"
     context = multiprocessing.get_context("spawn")
     ready = context.Event()
@@ -159,7 +159,7 @@ def test_the_lock_of_a_killed_process_does_not_block(tmp_path: Path) -> None:
     assert not path.exists()
 
 
-def test_a_run_without_recording_leaves_none_of_an_earlier_one(tmp_path: Path) -> None:
+def test_run_without_recording_removes_earlier_recording(tmp_path: Path) -> None:
     folder = run(tmp_path).folder
     assert folder is not None
     run_and_save(PASSING_BY, settings=RunSettings(**SHORT), below=tmp_path, record=False)
@@ -171,7 +171,7 @@ def _commands() -> Iterator[list[str]]:
         yield ["--channel", f"{{delay: {{kind: constant, seconds: {late}}}}}", "--time-limit", "2"]
 
 
-def test_concurrent_runs_leave_results_that_belong_to_their_recordings(tmp_path: Path) -> None:
+def test_concurrent_runs_write_consistent_results_and_recordings(tmp_path: Path) -> None:
     running = [
         subprocess.Popen(
             [*MAIN, "run", "coop/scenario_1", "--out", str(tmp_path), *options],
@@ -220,7 +220,7 @@ def test_concurrent_runs_leave_results_that_belong_to_their_recordings(tmp_path:
         ("coop/scenario_1", ["--channel", "late.yaml", "--time-limit", "1.5"]),
     ],
 )
-def test_the_printed_command_reproduces_the_run(
+def test_printed_command_reproduces_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str | Path, options: list[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -242,7 +242,7 @@ def test_the_printed_command_reproduces_the_run(
     assert printed["settings"] == kept["settings"]
 
 
-def test_a_folder_that_cannot_be_written_is_an_input_error(tmp_path: Path) -> None:
+def test_unwritable_folder_raises_setting_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(SettingError, match="cannot write"):
         run(tmp_path / "file")
@@ -250,8 +250,8 @@ def test_a_folder_that_cannot_be_written_is_an_input_error(tmp_path: Path) -> No
         run(Path("/proc/eidrive"))
 
 
-def test_a_full_disk_ends_the_run_with_its_partial_recording(tmp_path: Path) -> None:
-    """A limit on the size of files stands for the disk: writing beyond it fails alike."""
+def test_full_disk_aborts_run_with_partial_recording(tmp_path: Path) -> None:
+    """A limit of the file size replaces the full disk."""
     code = (
         "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000));"
@@ -268,7 +268,7 @@ def test_a_full_disk_ends_the_run_with_its_partial_recording(tmp_path: Path) -> 
     assert not list(tmp_path.rglob("*.lock"))
 
 
-def test_an_error_of_the_run_carries_its_command_and_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_of_run_has_notes_with_command_and_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise ZeroDivisionError("physics")
 
@@ -280,7 +280,7 @@ def test_an_error_of_the_run_carries_its_command_and_recording(tmp_path: Path, m
     assert os.path.exists(notes[1].removeprefix("recording: "))
 
 
-def test_a_page_of_a_replaced_recording_is_removed(tmp_path: Path) -> None:
+def test_page_of_replaced_recording_is_removed(tmp_path: Path) -> None:
     folder = run(tmp_path).folder
     assert folder is not None
     (folder / "recording.html").touch()
@@ -288,7 +288,7 @@ def test_a_page_of_a_replaced_recording_is_removed(tmp_path: Path) -> None:
     assert not (folder / "recording.html").exists()
 
 
-def test_page_of_an_unfinished_recording_is_removed_by_the_next_run(tmp_path: Path) -> None:
+def test_page_of_partial_recording_is_removed_by_next_run(tmp_path: Path) -> None:
     folder = run_and_save(PASSING_BY, below=tmp_path).folder
     assert folder is not None
     for name in ("recording.partial.mcap", "recording.partial.html"):
@@ -297,7 +297,7 @@ def test_page_of_an_unfinished_recording_is_removed_by_the_next_run(tmp_path: Pa
     assert sorted(path.name for path in folder.iterdir()) == ["recording.mcap", "result.json"]
 
 
-def test_a_loaded_scenario_leaves_the_same_run_as_its_file(tmp_path: Path) -> None:
+def test_run_of_loaded_scenario_equals_run_of_file(tmp_path: Path) -> None:
     loaded = load_scenario(PASSING_BY, {"OtherY": "6"})
     first = run(tmp_path, loaded)
     second = run(tmp_path, parameters={"OtherY": "6"})

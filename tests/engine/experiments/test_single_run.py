@@ -1,4 +1,4 @@
-"""One run and what it leaves behind."""
+"""Single runs and their output files."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ CRITERIA = """
 
 
 @pytest.mark.parametrize("other_y", ["5", "0", "2.5"])
-def test_a_recording_is_judged_as_the_run_was(tmp_path: Path, other_y: str) -> None:
+def test_evaluate_criteria_of_recording_equals_verdicts_of_run(tmp_path: Path, other_y: str) -> None:
     result = run_and_save(PASSING_BY, seed=4, settings=RunSettings(parameters={"OtherY": other_y}), out=tmp_path)
     recording = read_recording(tmp_path / "recording.mcap")
     assert evaluate_criteria(recording.frames(), build_criteria(parse_criteria(CRITERIA))) == result.criteria
@@ -30,23 +30,24 @@ def test_a_recording_is_judged_as_the_run_was(tmp_path: Path, other_y: str) -> N
     assert recording.frame_count == round(result.simulated_s / 0.05) + 1
 
 
-def test_the_recording_says_what_the_run_was_told(tmp_path: Path) -> None:
+def test_recording_metadata_contain_given_settings(tmp_path: Path) -> None:
     settings = RunSettings(parameters={"OtherY": "7"}, cooperate=(), channel="none")
     run_and_save(PASSING_BY, seed=4, settings=settings, out=tmp_path)
-    told = read_recording(tmp_path / "recording.mcap").metadata
-    assert (told["scenario"], told["seed"], told["channel"], told["cooperate"]) == ("passing_by", "4", "none", "none")
-    assert '"OtherY": "7"' in told["parameters"]
-    assert "weather" not in told
+    metadata = read_recording(tmp_path / "recording.mcap").metadata
+    given = [metadata[name] for name in ("scenario", "seed", "channel", "cooperate")]
+    assert given == ["passing_by", "4", "none", "none"]
+    assert '"OtherY": "7"' in metadata["parameters"]
+    assert "weather" not in metadata
 
 
-def test_two_recordings_of_one_run_are_equal(tmp_path: Path) -> None:
+def test_recordings_of_equal_runs_are_equal_files(tmp_path: Path) -> None:
     for name in ("first", "second"):
         run_and_save(PASSING_BY, seed=4, out=tmp_path / name)
     first, second = ((tmp_path / name / "recording.mcap").read_bytes() for name in ("first", "second"))
     assert first == second
 
 
-def test_results_are_found_below_folders(tmp_path: Path) -> None:
+def test_read_results_finds_each_result_below_folders_once(tmp_path: Path) -> None:
     for seed in (2, 1):
         run_and_save(PASSING_BY, seed=seed, out=tmp_path / f"seed-{seed}", record=False)
     assert [result["seed"] for result in read_results([tmp_path])] == [1, 2]
@@ -56,7 +57,7 @@ def test_results_are_found_below_folders(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"seed": 1}'])
-def test_what_is_no_result(tmp_path: Path, text: str) -> None:
+def test_read_results_of_other_file_raises_input_error(tmp_path: Path, text: str) -> None:
     (tmp_path / "result.json").write_text(text)
     with pytest.raises(InputError, match=r"result\.json: not "):
         read_results([tmp_path])

@@ -1,4 +1,4 @@
-"""The trends that `make reproduce-trends` draws, at a few points."""
+"""Trends of `make reproduce-trends` at a few points."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from eidrive_scenario.experiments.trends import (
     precision_by_delay,
     reception_by_distance,
 )
-from eidrive_scenario.reporting import trends as pictures
+from eidrive_scenario.reporting import trends as figures
 
 
-def test_the_knees_of_a_car_of_4_5_m() -> None:
+def test_largest_shift_of_car_equals_closed_form() -> None:
     assert largest_shift(0.7) == pytest.approx(0.794, abs=5e-4)
     assert largest_shift(0.5) == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize(("iou", "before", "behind"), [(0.7, 0.05, 0.055), (0.5, 0.095, 0.105)])
-def test_precision_falls_where_speed_times_delay_reaches_the_shift(iou: float, before: float, behind: float) -> None:
-    """At 15 m/s after 53 and 100 ms."""
+def test_precision_by_delay_falls_at_largest_shift(iou: float, before: float, behind: float) -> None:
+    """At 15 m/s the largest shifts are reached after 53 and 100 ms."""
     curve = precision_by_delay(15.0, iou, (0.0, before, behind, 0.3))
     assert curve.measured.tolist() == curve.expected.tolist() == [1.0, 1.0, 0.0, 0.0]
 
 
-def test_boxes_that_are_moved_on_keep_the_precision() -> None:
+def test_precision_by_delay_with_prediction_stays_1() -> None:
     curve = precision_by_delay(15.0, 0.7, (0.1, 0.3), compensated=True)
     assert curve.measured.tolist() == [1.0, 1.0]
 
 
-def test_the_truck_shortens_the_reach_as_its_loss_says() -> None:
-    """400 messages: five standard deviations of a share are at most 0.125."""
+def test_reception_by_distance_equals_expected_ratio_with_truck() -> None:
+    """Five standard deviations of a proportion of 400 messages are at most 0.125."""
     distances = (300.0, 700.0, 1200.0, 2100.0)
     clear, blocked = (reception_by_distance(distances, truck=truck, messages=400) for truck in (False, True))
     for curve in (clear, blocked):
@@ -43,7 +43,7 @@ def test_the_truck_shortens_the_reach_as_its_loss_says() -> None:
     assert clear.measured[1] - blocked.measured[1] > 0.4
 
 
-def test_mean_age_grows_with_bursts_and_peak_age_does_not() -> None:
+def test_age_by_burst_grows_in_mean_but_not_in_peak() -> None:
     mean, peak = age_by_burst((1 / 0.7, 2.0, 10.0), messages=40_000)
     assert mean.expected == pytest.approx([0.11286, 0.130, 0.370], abs=5e-4)
     assert peak.expected == pytest.approx(0.16286, abs=5e-5)
@@ -51,8 +51,8 @@ def test_mean_age_grows_with_bursts_and_peak_age_does_not() -> None:
     assert peak.measured == pytest.approx(peak.expected, rel=0.04)
 
 
-def test_pictures_are_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_main_draws_all_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, few in (("DELAYS", (0.005, 0.2)), ("DISTANCES", (500,)), ("BURSTS", (2.0,)), ("SPEEDS", (15.0,))):
-        monkeypatch.setattr(pictures, name, few)
-    pictures.main(["--out", str(tmp_path / "trends")])
-    assert {path.name for path in (tmp_path / "trends").iterdir()} == {f"{name}.png" for name in pictures.PICTURES}
+        monkeypatch.setattr(figures, name, few)
+    figures.main(["--out", str(tmp_path / "trends")])
+    assert {path.name for path in (tmp_path / "trends").iterdir()} == {f"{name}.png" for name in figures.FIGURES}

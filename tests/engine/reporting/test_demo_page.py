@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 from lxml import html
 
-from eidrive_scenario.experiments.paper import ARMS, LINKS, OWN, PUBLISHED, RULES, SCENARIOS, Cell, ModelVariant, Table
+from eidrive_scenario.experiments.paper import (
+    ARMS,
+    LINKS,
+    OWN,
+    PUBLISHED,
+    SCENARIOS,
+    VARIANTS,
+    Cell,
+    ModelVariant,
+    Table,
+)
 from eidrive_scenario.experiments.statistics import wilson
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.demo_page import CameraPicture, DemoSite, _speed, write_demo
@@ -19,7 +29,7 @@ from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 AREA = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
 
 
-def table(rule: ModelVariant) -> Table:
+def table(variant: ModelVariant) -> Table:
     cells = []
     for (scenario, name), published in PUBLISHED.items():
         arm = next(arm for arm in ARMS if arm.name == name)
@@ -27,7 +37,7 @@ def table(rule: ModelVariant) -> Table:
         boxes = tuple(max(0.0, center - 3.4) for center in centers)
         free = sum(box > 0 for box in boxes)
         cells.append(Cell(scenario, arm, (1, 2, 3, 4, 5), centers, boxes, wilson(free, 5), published))
-    return Table(rule, tuple(cells))
+    return Table(variant, tuple(cells))
 
 
 def story(frames: list[Frame]) -> Story:
@@ -41,9 +51,9 @@ def story(frames: list[Frame]) -> Story:
 def page(street: Callable[..., list[Frame]], tmp_path_factory: pytest.TempPathFactory) -> str:
     delays = {"none": None, "cooperation": 1, "latency": 6, "error": 2}
     stories = {
-        (scenario, arm.channel(rule)): story(street(delays[arm.name]))
+        (scenario, arm.channel(variant)): story(street(delays[arm.name]))
         for scenario in SCENARIOS
-        for rule in RULES
+        for variant in VARIANTS
         for arm in ARMS
     }
     view = CameraPicture("What Ego sees", "a <truck>", b"\x89PNG")
@@ -63,7 +73,7 @@ def test_the_page_loads_nothing_from_elsewhere(page: str) -> None:
 def test_every_arm_has_four_pictures_or_says_why_not(page: str) -> None:
     root = html.fromstring(page)
     strips = [strip for strip in root.iterfind(".//div[@class='strip']")]
-    assert len(strips) == len(SCENARIOS) * len(RULES) * len(ARMS)
+    assert len(strips) == len(SCENARIOS) * len(VARIANTS) * len(ARMS)
     assert all(len(strip.findall("figure")) == 4 for strip in strips)
     silent = [figure.text_content().strip() for figure in strips[0].iterfind("figure[@class='empty']")]
     assert silent == ["Ego never brakes for it"]
@@ -81,7 +91,7 @@ def test_tables_stand_beside_the_papers_numbers(page: str) -> None:
         [" ".join(cell.text_content().split()) for cell in row.iterfind("td")]
         for row in html.fromstring(page).iterfind(".//tbody/tr")
     ]
-    assert len(rows) == len(RULES) * len(PUBLISHED)
+    assert len(rows) == len(VARIANTS) * len(PUBLISHED)
     assert rows[3] == [
         *("error 30 %", "3.15", "1.07", "1.82", "0.38", "0.00", "3/5", "0.23 … 0.88", "3.15 ± 1.07"),
     ]

@@ -43,7 +43,7 @@ def test_wrong_weather_and_wrong_places_are_told(
 def test_trends_are_drawn_or_the_place_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(trends, "PICTURES", {"empty": Figure})
+    monkeypatch.setattr(trends, "FIGURES", {"empty": Figure})
     assert trends.main(["--out", str(tmp_path / "new")]) == 0
     assert (tmp_path / "new" / "empty.png").read_bytes()[1:4] == b"PNG"
     (tmp_path / "file").write_text("")
