@@ -27,7 +27,7 @@ from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window, leg
 from eidrive_scenario.reporting.page import png_address, write_page
 
 COLORS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
-DASHES = {"none": "8 8", "cooperation": "", "latency": "", "error": "8 8"}
+DASHED = {"none", "error"}
 HORIZON = 12.0
 """The chart shows the two cars while they are this near [m]."""
 
@@ -160,7 +160,7 @@ def _chart(stories: Mapping[str, Story]) -> str:
         if not story.times:
             continue
         nearest = min(range(len(story.times)), key=lambda row: (story.boxes[row], story.centers[row]))
-        lines.append(ChartSeries(arm.title, COLORS[arm.name], story.times, story.boxes, DASHES[arm.name], nearest))
+        lines.append(ChartSeries(arm.title, COLORS[arm.name], story.times, story.boxes, arm.name in DASHED, nearest))
         near = [row for row, gap in enumerate(story.boxes) if gap <= HORIZON]
         if near:
             start, end = min(start, story.times[near[0]]), max(end, story.times[near[-1]])

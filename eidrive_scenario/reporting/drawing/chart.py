@@ -1,27 +1,57 @@
-"""A line chart as SVG: crisp, small, with its labels beside the lines instead of in a box."""
+"""Line chart as inline SVG of a page, drawn by matplotlib in the colors of the page."""
 
 from __future__ import annotations
 
+import io
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
-WIDTH, HEIGHT = 1100.0, 300.0
-LEFT, RIGHT, TOP, BOTTOM = 52.0, 140.0, 14.0, 42.0
-INK, GRID, TEXT, PAPER = "var(--axis, #475569)", "var(--line, #e5e7eb)", "var(--text, #334155)", "var(--paper, #fff)"
-"""Colors of the page around it, in which light and dark differ; each with the one for where there is no page."""
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+WIDTH, HEIGHT = 11.0, 3.0
+"""Size of the chart [in]; a page scales it to its own width."""
+LEFT, RIGHT, TOP, BOTTOM = 0.047, 0.873, 0.95, 0.14
+"""Edges of the axes as fractions of the size. The names of the series are to the right of them."""
+NAME_SPACING = 11.5
+"""Minimum vertical distance between names [pt]."""
+PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}
+"""CSS variables of the page, whose values depend on its light or dark scheme, by the color that matplotlib draws."""
+_AXIS, _GRID, _TEXT, _PAPER = PAGE_COLORS
+_STYLE: dict[Any, Any] = {
+    "axes.edgecolor": _AXIS,
+    "axes.labelcolor": _TEXT,
+    "axes.spines.left": False,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "font.size": 9.0,
+    "grid.color": _GRID,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "eidrive",
+    "text.parse_math": False,
+    "xtick.color": _AXIS,
+    "xtick.labelcolor": _TEXT,
+    "ytick.labelcolor": _TEXT,
+    "ytick.left": False,
+}
 
 
 @dataclass(frozen=True)
 class ChartSeries:
-    """One line of a chart: points (x, y), and a mark at one of them (its index) if wanted."""
+    """Series of a chart: points (x, y), and the index of an optional marked point."""
 
     name: str
     color: str
     x: tuple[float, ...]
     y: tuple[float, ...]
-    dashes: str = ""
+    dashed: bool = False
     mark: int | None = None
 
 
@@ -33,86 +63,78 @@ def line_chart(
     x_range: tuple[float, float] | None = None,
     y_range: tuple[float, float] | None = None,
 ) -> str:
-    """The lines in one frame with axes from nice numbers."""
-    x_low, x_high = x_range or _extent([value for line in lines for value in line.x])
-    y_low, y_high = y_range or (0.0, _extent([value for line in lines for value in line.y])[1])
+    """Return the series as an SVG element. A line is interrupted at points outside the ranges."""
+    with rc_context(_STYLE):
+        figure = Figure(figsize=(WIDTH, HEIGHT))
+        axes = figure.add_axes((LEFT, BOTTOM, RIGHT - LEFT, TOP - BOTTOM))
+        axes.set_xlim(x_range or _extent([value for line in lines for value in line.x]))
+        axes.set_ylim(y_range or (0.0, _extent([value for line in lines for value in line.y])[1]))
+        axes.set_xlabel(x_title)
+        axes.set_ylabel(y_title)
+        axes.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 2, 5, 10]))
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        axes.grid(axis="y")
+        axes.set_axisbelow(True)
+        ends = [end for line in sorted(lines, key=lambda line: line.dashed) if (end := _draw(axes, line)) is not None]
+        _draw_names(axes, ends)
+        return _inline_svg(figure, f"{y_title} over {x_title}")
 
-    def at(x: float, y: float) -> tuple[float, float]:
-        across = (x - x_low) / ((x_high - x_low) or 1.0)
-        up = (y - y_low) / ((y_high - y_low) or 1.0)
-        return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
 
-    right, floor = WIDTH - RIGHT, HEIGHT - BOTTOM
-    parts = []
-    for value in ticks(y_low, y_high, 5):
-        _, y = at(x_low, value)
-        parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" style="stroke:{GRID}"/>')
-        parts.append(_text(LEFT - 8, y + 4, f"{value:g}", "end"))
-    for value in ticks(x_low, x_high, 9):
-        x, _ = at(value, y_low)
-        parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{floor}" y2="{floor + 5}" style="stroke:{INK}"/>')
-        parts.append(_text(x, floor + 19, f"{value:g}", "middle"))
-    parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{floor}" y2="{floor}" style="stroke:{INK}"/>')
-    parts.append(_text((LEFT + right) / 2, HEIGHT - 5, x_title, "middle"))
-    middle = (TOP + floor) / 2
-    parts.append(f'<g transform="translate(13 {middle:.1f}) rotate(-90)">{_text(0.0, 0.0, y_title, "middle")}</g>')
-    ends = []
-    for line in sorted(lines, key=lambda line: bool(line.dashes)):  # a broken line shows the one that it lies upon
-        path, last, before = "", None, False
-        for x, y in zip(line.x, line.y, strict=True):
-            inside = x_low <= x <= x_high and y_low <= y <= y_high
-            if inside:
-                path += "{}{:.1f} {:.1f}".format("L" if before else "M", *at(x, y))
-                last = (x, y)
-            before = inside
-        if last is None:
-            continue
-        dashes = f' stroke-dasharray="{line.dashes}"' if line.dashes else ""
-        parts.append(
-            f'<path d="{path}" fill="none" stroke="{line.color}" stroke-width="2.2" stroke-linejoin="round"{dashes}/>'
+def _draw(axes: Axes, line: ChartSeries) -> tuple[float, float, ChartSeries] | None:
+    """Draw a series and return its last point inside the ranges, or None without such a point."""
+    x, y = np.asarray(line.x, dtype=np.float64), np.asarray(line.y, dtype=np.float64)
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    inside = (left <= x) & (x <= right) & (bottom <= y) & (y <= top)
+    if not inside.any():
+        return None
+    style = (0.0, (3.6, 3.6)) if line.dashed else "-"
+    axes.plot(x, np.where(inside, y, np.nan), color=line.color, lw=1.6, ls=style, gid="series")
+    if line.mark is not None:
+        point = [x[line.mark]], [y[line.mark]]
+        axes.plot(*point, "o", color=line.color, ms=6.5, mec=_PAPER, mew=1.1, clip_on=False, zorder=3.0, gid="mark")
+    last = int(np.flatnonzero(inside)[-1])
+    return float(x[last]), float(y[last]), line
+
+
+def _draw_names(axes: Axes, ends: Sequence[tuple[float, float, ChartSeries]]) -> None:
+    """Write the names of the series beside their last points, with a minimum distance between names."""
+    bottom, top = axes.get_ylim()
+    height = 72.0 * HEIGHT * (TOP - BOTTOM)
+    previous = math.inf
+    for x, y, line in sorted(ends, key=lambda end: -end[1]):
+        previous = min(height * (y - bottom) / ((top - bottom) or 1.0), previous - NAME_SPACING)
+        axes.annotate(
+            line.name,
+            (x, y),
+            (1.015, previous),
+            textcoords=("axes fraction", "axes points"),
+            color=line.color,
+            weight="bold",
+            va="center",
+            arrowprops={"arrowstyle": "-", "color": line.color, "alpha": 0.6, "relpos": (0.0, 0.5), "shrinkA": 0.0},
+            annotation_clip=False,
+            gid="name",
         )
-        if line.mark is not None:
-            x, y = at(line.x[line.mark], line.y[line.mark])
-            parts.append(
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{line.color}" style="stroke:{PAPER}" '
-                'stroke-width="1.5"/>'
-            )
-        ends.append((at(*last), line))
-    parts.extend(_names(ends))
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="chart" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
-        f'font-size="12.5" style="fill:{TEXT}"><title>{escape(y_title)} over {escape(x_title)}</title>'
-        f"{''.join(parts)}</svg>"
-    )
 
 
-def ticks(low: float, high: float, most: int) -> list[float]:
-    """At most `most` + 1 round numbers (1, 2 or 5 times a power of ten apart) from `low` to `high`."""
-    span = high - low
-    if span <= 0:
-        return [low]
-    power = 10.0 ** math.floor(math.log10(span / most))
-    step = next(power * factor for factor in (1, 2, 5, 10) if span / (power * factor) <= most + 1e-9)
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [round(index * step, 10) for index in range(first, last + 1)]
-
-
-def _names(ends: Sequence[tuple[tuple[float, float], ChartSeries]]) -> list[str]:
-    """The lines' names where they end, pushed apart where they would overlap."""
-    drawn, last = [], -math.inf
-    for (x, y), line in sorted(ends, key=lambda end: end[0][1]):
-        last = max(y, last + 16)
-        drawn.append(
-            f'<path d="M{x + 3:.1f} {y:.1f}L{WIDTH - RIGHT + 10:.1f} {last:.1f}" stroke="{line.color}" '
-            'stroke-width="1" fill="none" opacity="0.6"/>'
-            f'<text x="{WIDTH - RIGHT + 14:.1f}" y="{last + 4:.1f}" fill="{line.color}" font-weight="600">'
-            f"{escape(line.name)}</text>"
-        )
-    return drawn
-
-
-def _text(x: float, y: float, text: str, anchor: str) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>'
+def _inline_svg(figure: Figure, title: str) -> str:
+    """Return a figure as an SVG element that inherits colors and fonts of the page and has no ids of its own groups."""
+    buffer = io.StringIO()
+    without_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(buffer, format="svg", transparent=True, metadata=without_metadata)
+    svg = buffer.getvalue()
+    svg = svg[svg.index("<defs>") : svg.rindex("</svg>")]
+    svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # applies to all elements of a page
+    svg = re.sub(r'<g id="(series|mark|name)">', r'<g class="\1">', svg)
+    svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
+    svg = re.sub(r"font: (?:bold |700 )([\d.]+px)[^;\"]*", r"font-weight: 700; font-size: \1", svg)
+    svg = re.sub(r" ?font(?:-family)?: [^;\"]*;", "", svg)
+    svg = svg.replace("xlink:href", "href")
+    for color, variable in PAGE_COLORS.items():
+        svg = svg.replace(color, f"var({variable}, {color})")
+    size = f"{72.0 * WIDTH:g} {72.0 * HEIGHT:g}"
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" class="chart" viewBox="0 0 {size}" role="img">'
+    return f"{head}<title>{escape(title)}</title>{svg}</svg>"
 
 
 def _extent(values: Sequence[float]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Line charts: nice ticks, points where the axes say, names that do not overlap."""
+"""Line charts: round ticks, points at their axis positions, names without overlap, colors of the page."""
 
 from __future__ import annotations
 
@@ -12,49 +12,78 @@ from eidrive_scenario.reporting.drawing.chart import (
     BOTTOM,
     HEIGHT,
     LEFT,
+    NAME_SPACING,
+    PAGE_COLORS,
     RIGHT,
     TOP,
     WIDTH,
     ChartSeries,
     line_chart,
-    ticks,
 )
 
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+def chart(*lines: ChartSeries, y_range: tuple[float, float] | None = None) -> etree._Element:
+    return etree.fromstring(line_chart(lines, x_title="time [s]", y_title="gap [m]", y_range=y_range))
+
+
+def groups(root: etree._Element, kind: str) -> list[etree._Element]:
+    return [group for group in root.iter(f"{SVG}g") if group.get("class") == kind]
+
+
+def path_of(root: etree._Element) -> str:
+    (group,) = groups(root, "series")
+    path = group.find(f"{SVG}path")
+    assert path is not None
+    return path.get("d") or ""
+
+
 @pytest.mark.parametrize(
-    ("low", "high", "most", "expected"),
+    ("x", "y", "x_ticks", "y_ticks"),
     [
-        (0.0, 30.0, 5, [0, 10, 20, 30]),
-        (0.0, 10.0, 5, [0, 2, 4, 6, 8, 10]),
-        (1.3, 2.1, 5, [1.4, 1.6, 1.8, 2.0]),
-        (0.0, 0.004, 4, [0.0, 0.001, 0.002, 0.003, 0.004]),
-        (5.0, 5.0, 5, [5.0]),
+        ((0.0, 9.0), (0.0, 30.0), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9], [0, 10, 20, 30]),
+        ((0.0, 4.0), (0.0, 10.0), [0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4], [0, 2, 4, 6, 8, 10]),
     ],
 )
-def test_ticks_are_round_numbers(low: float, high: float, most: int, expected: list[float]) -> None:
-    assert ticks(low, high, most) == pytest.approx(expected)
+def test_line_chart_ticks_are_round_numbers(
+    x: tuple[float, float], y: tuple[float, float], x_ticks: list[float], y_ticks: list[float]
+) -> None:
+    texts = [text.text or "" for text in chart(ChartSeries("one", "#123456", x, y)).iter(f"{SVG}text")]
+    assert [float(text) for text in texts if re.fullmatch(r"[\d.]+", text)] == x_ticks + y_ticks
 
 
-def test_a_line_spans_the_frame() -> None:
-    svg = line_chart([ChartSeries("one", "#123456", (0.0, 4.0), (0.0, 8.0))], x_title="time [s]", y_title="gap [m]")
-    path = next(p for p in etree.fromstring(svg).iter(f"{SVG}path") if p.get("stroke-width") == "2.2")
-    numbers = [float(number) for number in re.findall(r"[\d.]+", path.get("d") or "")]
-    assert numbers == pytest.approx([LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, TOP])
+def test_line_chart_of_full_range_spans_axes() -> None:
+    numbers = [
+        float(number) for number in re.findall(r"[\d.]+", path_of(chart(ChartSeries("a", "#123456", *2 * [(0, 8)]))))
+    ]
+    left, right, top, bottom = (
+        72 * WIDTH * LEFT,
+        72 * WIDTH * RIGHT,
+        72 * HEIGHT * (1 - TOP),
+        72 * HEIGHT * (1 - BOTTOM),
+    )
+    assert numbers == pytest.approx([left, bottom, right, top], abs=0.01)
 
 
-def test_a_line_that_leaves_the_range_is_interrupted() -> None:
+def test_line_chart_interrupts_line_outside_range() -> None:
     line = ChartSeries("one", "#123456", (0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 2.0, 99.0, 2.0, 1.0))
-    svg = line_chart([line], x_title="x", y_title="y", y_range=(0.0, 5.0))
-    path = next(p for p in etree.fromstring(svg).iter(f"{SVG}path") if p.get("stroke-width") == "2.2")
-    assert (path.get("d") or "").count("M") == 2
+    assert path_of(chart(line, y_range=(0.0, 5.0))).count("M") == 2
 
 
-def test_names_stand_apart_and_a_mark_is_a_dot() -> None:
-    lines = [ChartSeries(name, "#000000", (0.0, 1.0), (1.0, 1.0), mark=0) for name in ("a", "b", "c <&>")]
-    root = etree.fromstring(line_chart(lines, x_title="x", y_title="y"))
-    heights = [float(text.get("y") or "nan") for text in root.iter(f"{SVG}text") if text.get("font-weight") == "600"]
-    assert len(heights) == 3
-    assert min(b - a for a, b in pairwise(heights)) >= 16
-    assert len(list(root.iter(f"{SVG}circle"))) == 3
+def test_line_chart_names_are_separate_and_marks_are_dots() -> None:
+    root = chart(*(ChartSeries(name, "#000000", (0.0, 1.0), (1.0, 1.0), mark=0) for name in ("a", "b", "c <&>")))
+    texts = [group.find(f"{SVG}text") for group in groups(root, "name")]
+    assert [text.text for text in texts if text is not None] == ["a", "b", "c <&>"]
+    heights = [float(text.get("y") or "nan") for text in texts if text is not None]
+    assert min(b - a for a, b in pairwise(heights)) >= NAME_SPACING - 0.01
+    assert [len(list(group.iter(f"{SVG}use"))) for group in groups(root, "mark")] == [1, 1, 1]
+
+
+def test_line_chart_uses_colors_and_fonts_of_page() -> None:
+    text = etree.tostring(chart(ChartSeries("a", "#059669", (0.0, 1.0), (1.0, 1.0), mark=0))).decode()
+    for color, variable in PAGE_COLORS.items():
+        assert text.count(color) == text.count(f"var({variable}, {color})") > 0
+    assert "font-family" not in text
+    assert "<style" not in text
+    assert not re.search(r'<g id="', text)
