@@ -87,7 +87,7 @@ def tree(
     from eidrive_scenario.cli.verdicts import console
     from eidrive_scenario.library import resolve_scenario
     from eidrive_scenario.openscenario import load_scenario
-    from eidrive_scenario.reporting.storyboard_diagram.picture import write_storyboard_picture
+    from eidrive_scenario.reporting.storyboard_diagram.diagram import write_storyboard_diagram
     from eidrive_scenario.roads import RoadNetwork
     from eidrive_scenario.storyboard.storyboard import Storyboard
 
@@ -97,7 +97,7 @@ def tree(
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
     storyboard = Storyboard(loaded, roads, dt=0.05, seed=0)
     if svg is not None:
-        typer.echo(str(write_storyboard_picture(storyboard, svg)))
+        typer.echo(str(write_storyboard_diagram(storyboard, svg)))
     else:
         console().print(storyboard_tree(storyboard))
 

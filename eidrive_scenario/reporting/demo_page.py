@@ -1,4 +1,4 @@
-"""The page of the demo: tables beside the paper's, distances over time, and top views at the decisive instants."""
+"""Page of the demo: tables with published values, distances over time, and top views of key frames."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from eidrive_scenario.reporting.page import png_address, write_page
 COLORS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
 DASHED = {"none", "error"}
 HORIZON = 12.0
-"""The chart shows the two cars while they are this near [m]."""
+"""Maximum distance between the cars in the chart [m]."""
 
 
 @dataclass(frozen=True)
-class CameraPicture:
-    """A picture out of the run, as PNG."""
+class PageImage:
+    """Image of a run as PNG."""
 
     title: str
     caption: str
@@ -43,11 +43,11 @@ class CameraPicture:
 
 @dataclass(frozen=True)
 class DemoSite:
-    """Where a scenario happens: what the pictures of all its arms share."""
+    """Roads, conflict areas and camera images that the figures of all arms of a scenario share."""
 
     roads: RoadDrawing
     conflict_areas: tuple[Array, ...]
-    views: tuple[CameraPicture, ...] = ()
+    views: tuple[PageImage, ...] = ()
 
 
 def write_demo(
@@ -55,25 +55,27 @@ def write_demo(
     links: Table,
     own: Table,
     stories: Mapping[tuple[str, str], Story],
-    places: Mapping[str, DemoSite],
+    sites: Mapping[str, DemoSite],
     *,
     watched: int,
     footer: str = "",
 ) -> Path:
-    """Write the page. `stories` are those of the seed `watched`, by scenario and channel. Returns `out`."""
+    """Write the page. `stories` are those of the seed `watched`, by scenario and channel. Return `out`."""
     windows = {scenario: _window(scenario, stories) for scenario in links.scenarios}
-    symbols = "".join(roads_symbol(places[name].roads, _identifier(name)) for name in links.scenarios)
+    symbols = "".join(roads_symbol(sites[name].roads, _identifier(name)) for name in links.scenarios)
     values = {
         table.variant.name: {
             "title": table.variant.title,
-            "places": [_place(table, name, stories, places[name], windows[name], watched) for name in links.scenarios],
+            "scenarios": [
+                _scenario(table, name, stories, sites[name], windows[name], watched) for name in links.scenarios
+            ],
         }
         for table in (links, own)
     }
     return write_page(
         out,
         "demo.html.jinja",
-        title="A hidden car, a helper, a channel",
+        title="Cooperative perception of an occluded car",
         symbols=Markup(
             f'<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>{symbols}</defs></svg>'
         ),
@@ -88,8 +90,8 @@ def write_demo(
     )
 
 
-def _place(
-    table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], place: DemoSite, window: Window, watched: int
+def _scenario(
+    table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], site: DemoSite, window: Window, watched: int
 ) -> dict[str, Any]:
     mine = {arm.name: stories[scenario, arm.channel(table.variant)] for arm in ARMS}
     found: Sequence[PublishedClaim] = [check for check in evaluate_claims(table) if check.scenario == scenario]
@@ -99,7 +101,7 @@ def _place(
         "checks": found,
         "chart": Markup(_chart(mine)),
         "views": [
-            {"title": view.title, "caption": view.caption, "address": png_address(view.png)} for view in place.views
+            {"title": view.title, "caption": view.caption, "address": png_address(view.png)} for view in site.views
         ]
         if table.variant == LINKS
         else [],
@@ -109,7 +111,7 @@ def _place(
                 "color": COLORS[arm.name],
                 "summary": _summary(table.cell(scenario, arm.name), mine[arm.name], watched),
                 "images": [
-                    _picture(moment, mine[arm.name], arm, place, window, _identifier(scenario))
+                    _figure(moment, mine[arm.name], arm, site, window, _identifier(scenario))
                     for moment in mine[arm.name].moments
                 ],
             }
@@ -119,13 +121,13 @@ def _place(
 
 
 def _speed(speed: float) -> str:
-    """In words; what has been hit may roll backwards."""
-    whole = round(3.6 * speed)
-    return f"at {whole} km/h" if whole >= 0 else f"thrown back at {-whole} km/h"
+    """Return a speed as text. A vehicle may move backwards after a collision."""
+    rounded = round(3.6 * speed)
+    return f"at {rounded} km/h" if rounded >= 0 else f"moving backwards at {-rounded} km/h"
 
 
-def _picture(
-    moment: Moment, story: Story, arm: ExperimentArm, place: DemoSite, window: Window, roads_id: str
+def _figure(
+    moment: Moment, story: Story, arm: ExperimentArm, site: DemoSite, window: Window, roads_id: str
 ) -> dict[str, Any]:
     snapshot = moment.snapshot
     if snapshot is None:
@@ -140,7 +142,7 @@ def _picture(
         snapshot,
         window,
         roads_id=roads_id,
-        conflict_areas=place.conflict_areas,
+        conflict_areas=site.conflict_areas,
         description=f"{arm.title}: {moment.title} {caption}",
     )
     return {"title": moment.title, "caption": caption, "svg": Markup(svg)}
@@ -148,7 +150,7 @@ def _picture(
 
 def _summary(cell: Cell, story: Story, watched: int) -> str:
     nearest = min(story.boxes) if story.boxes else float("nan")
-    outcome = "they collide" if story.touched else f"{nearest:.2f} m apart at the closest"
+    outcome = "collision" if story.touched else f"minimum distance {nearest:.2f} m"
     free = cell.collision_free
     return f"seed {watched}: {outcome}; all seeds: {free.successes} of {free.trials} without a collision"
 
@@ -174,7 +176,7 @@ def _chart(stories: Mapping[str, Story]) -> str:
 
 
 def _window(scenario: str, stories: Mapping[tuple[str, str], Story]) -> Window:
-    """The same for all pictures of a scenario: all actors at all of its decisive instants."""
+    """Return the window of all figures of a scenario, which contains all actors in all key frames."""
     points = [
         tuple(center)
         for (name, _), story in stories.items()
@@ -183,7 +185,7 @@ def _window(scenario: str, stories: Mapping[tuple[str, str], Story]) -> Window:
         if moment.snapshot is not None
         for center in moment.snapshot.view.centers.tolist()
     ]
-    return Window.around(points or [(0.0, 0.0)], margin=7.0)
+    return Window.enclosing(points or [(0.0, 0.0)], margin=7.0)
 
 
 def _identifier(scenario: str) -> str:

@@ -1,4 +1,4 @@
-"""Pages from templates: one file each, nothing loaded from elsewhere."""
+"""HTML pages from templates: self-contained files without external resources."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def _environment() -> Environment:
 
 
 def render_page(template: str, **values: Any) -> str:
-    """The HTML of a template of this package; text is escaped, `markupsafe.Markup` is taken as it is."""
+    """Return the HTML of a template of this package. Text is escaped, except `markupsafe.Markup`."""
     return _environment().get_template(template).render(**values)
 
 
 def write_page(out: Path, template: str, **values: Any) -> Path:
-    """Render a template into the file `out`, whose folder is made if it is missing. Returns `out`.
+    """Render a template to the file `out`, create its folder if necessary, and return `out`.
 
-    Raise SettingError if it cannot be written.
+    Raise SettingError if the file cannot be written.
     """
     with create(out) as stream:
         stream.write(render_page(template, **values).encode(errors="replace"))
@@ -39,5 +39,5 @@ def write_page(out: Path, template: str, **values: Any) -> Path:
 
 
 def png_address(png: bytes) -> str:
-    """A picture as a data URI."""
+    """Return a PNG image as a data URI."""
     return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

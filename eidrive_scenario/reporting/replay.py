@@ -1,4 +1,4 @@
-"""A recorded run as one HTML file: play, pause, scrub; from above, as any of its stations knows it."""
+"""Replay of a recorded run as one HTML file: top view with the information of a selectable station."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from eidrive_scenario.reporting.drawing.top_view import (
     is_broken,
 )
 from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.run_report.reported_run import reported
-from eidrive_scenario.reporting.run_report.settings_text import run_facts, shortened
-from eidrive_scenario.reporting.snapshot import USUAL, SnapshotBuilder, StationSnapshot
+from eidrive_scenario.reporting.run_report.reported_run import parse_run
+from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
+from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 
 _LARGEST_PAGE = 64 * 2**20
-"""Maximum size of the frames in a page, about [bytes]."""
+"""Approximate maximum size of the frames in a page [bytes]."""
 _ABSENT = len("null, ")
 """Size of the entry of a station for a frame before its first one [bytes]."""
 COLORS = {
@@ -56,14 +56,14 @@ COLORS = {
 
 @dataclass(frozen=True)
 class Replay:
-    """A page that was written, and what is wrong with the recording that it shows: a line for each kind of damage."""
+    """Written page, and one line for each kind of damage of its recording."""
 
     page: Path
     damage: tuple[str, ...]
 
 
 def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | None = None) -> Path:
-    """The replay of a recording in the file `out`, which is returned; see `make_replay`."""
+    """Write the replay of a recording to the file `out` and return `out`; see `make_replay`."""
     return make_replay(recording, out, result).page
 
 
@@ -75,13 +75,13 @@ def make_replay(
     result_file: str | Path = "",
     complete: bool = True,
 ) -> Replay:
-    """Write the replay of a recording to the file `out`, with the verdicts of its `result` if it is given.
+    """Write the replay of a recording to the file `out`, with the verdicts of an optional `result`.
 
-    result_file  file of the result, which errors name
-    complete     whether the run has ended; a page of one that has not says so
+    result_file  file of the result for error messages
+    complete     whether the run has ended; the page states that an unfinished run is incomplete
 
-    A damaged recording is shown as far as it can be read, and its page lists the damage. Raise InputError if no frame
-    can be read, or the result is not one.
+    The readable part of a damaged recording is shown, and the page lists the damage. Raise InputError if no frame can
+    be read, or the result is invalid.
     """
     report = DamageReport()
     for line in recording.damage:
@@ -92,15 +92,15 @@ def make_replay(
     data = replay_data(frames, roads, report, _station_settings(settings))
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
-        raise InputError(Diagnostic("the recording holds no frame that can be read", reason, str(recording.path)))
+        raise InputError(Diagnostic("the recording contains no readable frame", reason, str(recording.path)))
     if result is not None and result.get("trace_hash") != trace.hexdigest():
-        report.add("the result beside the recording has another trace hash: its verdicts may be those of another run")
-    name = shortened(recording.scenario or recording.path.stem, 200)
+        report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
+    name = shorten(recording.scenario or recording.path.stem, 200)
     page = write_page(
         out,
         "replay.html.jinja",
         title=f"{name}, seed {recording.seed}",
-        result=None if result is None else reported(result, result_file),
+        result=None if result is None else parse_run(result, result_file),
         facts=_facts(recording, settings),
         settings=json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
         command=recording.metadata.get("command", ""),
@@ -112,12 +112,12 @@ def make_replay(
 
 
 def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> Iterator[Frame]:
-    """The frames, which enter the trace hash on the way."""
-    for frame in recording.frames(lambda reason: report.add("frames do not read", shortened(reason, 200))):
+    """Yield the frames, and add each frame to the trace hash."""
+    for frame in recording.frames(lambda reason: report.add("frames cannot be decoded", shorten(reason, 200))):
         try:
             trace.observe(frame)
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-            report.add("frames do not fit together", f"tick {frame.view.tick}: {_described(error)}")
+            report.add("frames are inconsistent", f"tick {frame.view.tick}: {_describe(error)}")
         yield frame
 
 
@@ -125,38 +125,38 @@ def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
     try:
         return recorded_roads(recording)
     except (InputError, ArithmeticError, LookupError, TypeError, ValueError, MemoryError, RecursionError) as error:
-        report.add("roads are not drawn", _described(error))
+        report.add("roads are not drawn", _describe(error))
         return RoadDrawing()
 
 
-def _described(error: Exception) -> str:
-    """An error in a line; of an input error its first diagnostic."""
+def _describe(error: Exception) -> str:
+    """Return an error in one line; for an input error its first diagnostic."""
     text = str(error.diagnostics[0]) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-    return shortened(text, 300)
+    return shorten(text, 300)
 
 
 def _settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
-    """The resolved settings in the metadata."""
+    """Return the resolved settings of the metadata."""
     settings = _object(recording.metadata.get("settings", "{}"))
     if settings is None:
-        report.add("the settings of the run do not read")
+        report.add("the settings of the run cannot be decoded")
     return settings or {}
 
 
 def _station_settings(settings: Mapping[str, Any]) -> dict[str, AgentSettings]:
-    """The settings that decide how long the stations use a report, of stations that have another than the default."""
+    """Return the settings of stations with a report timeout other than the default."""
     found: dict[str, AgentSettings] = {}
     stations = settings.get("stations")
     for name, station in stations.items() if isinstance(stations, Mapping) else ():
         timeout = station.get("report_timeout") if isinstance(station, Mapping) else None
-        if timeout not in (None, USUAL.report_timeout):
-            with suppress(ValidationError):  # of a damaged recording
+        if timeout not in (None, DEFAULT_SETTINGS.report_timeout):
+            with suppress(ValidationError):  # in a damaged recording
                 found[name] = AgentSettings(report_timeout=timeout)
     return found
 
 
 def _object(text: str) -> dict[str, Any] | None:
-    """A JSON object from the metadata, or None if the text is not one."""
+    """Parse a JSON object of the metadata. Return None for other texts."""
     try:
         found = load_json(text.encode(), max_depth=30)
     except ValueError:
@@ -165,26 +165,26 @@ def _object(text: str) -> dict[str, Any] | None:
 
 
 def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
-    """What the page tells of the run beside the pictures."""
+    """Return the facts about the run that the page lists."""
     if settings:
         return run_facts(settings)
     hidden = ("format", "parameters", "settings", "command")
-    facts = {name: shortened(text) for name, text in recording.metadata.items() if name not in hidden}
+    facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
 
 
 class _Budget:
-    """Bounds the size of a page, whatever a recording holds."""
+    """Limit of the size of a page."""
 
     def __init__(self, report: DamageReport | None) -> None:
         self._left = _LARGEST_PAGE
         self._report = report
 
     def take(self, size: int, time: float) -> bool:
-        """Whether a part of this many bytes still fits."""
+        """Reserve a number of bytes. Return False if the limit is exceeded."""
         self._left -= size
         if self._left < 0 and self._report is not None:
-            self._report.add("the recording is too large for one page", f"it is shown up to {time:.2f} s")
+            self._report.add("the recording is too large for one page", f"shown up to {time:.2f} s")
         return self._left >= 0
 
 
@@ -194,26 +194,26 @@ def replay_data(
     report: DamageReport | None = None,
     settings: Mapping[str, AgentSettings] | None = None,
 ) -> dict[str, Any]:
-    """What the page's script draws, as plain lists; lengths in meters to a centimeter, angles to a milliradian.
+    """Return the data of the script of the page as plain lists, with lengths in cm and angles in mrad resolution.
 
-    actors   by name: category and size; poses[frame][name] = x, y, yaw of the box center, speed
-    stations by name, for each frame: own and heard boxes [x, y, l, w, yaw] or, where it is estimated, with the
-             probability of existence as sixth; links [sender, delivered], plan's reason
-    changes  [time, path, after, why] of the storyboard's transitions
+    actors    category and size by name; poses[frame][name] = x, y, yaw of the box center, speed
+    stations  by name, for each frame: own and heard boxes [x, y, l, w, yaw], with the probability of existence as sixth
+              entry if it is estimated; links [sender, delivered]; reason of the plan
+    changes   [time, path, after, why] of the storyboard transitions
 
-    With a `report`, a frame that cannot be drawn is reported there and left out. `settings` of stations, by name, state
-    how long these use a report.
+    With a `report`, a frame that cannot be drawn is skipped and reported. `settings` of stations, by name, define the
+    lifetime of reports.
     """
     data: dict[str, Any] = {"times": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
-    knowledge: dict[str, SnapshotBuilder] = {}
+    builders: dict[str, SnapshotBuilder] = {}
     budget = _Budget(report)
     for frame in frames:
         try:
-            part = _part(frame, knowledge, settings or {})
+            part = _frame_data(frame, builders, settings or {})
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if report is None:
                 raise
-            report.add("frames cannot be drawn", f"tick {frame.view.tick}: {_described(error)}")
+            report.add("frames cannot be drawn", f"tick {frame.view.tick}: {_describe(error)}")
             continue
         added = len(part["stations"].keys() - data["stations"].keys())
         if not budget.take(_size(part) + _ABSENT * added * len(data["times"]), frame.view.time):
@@ -222,8 +222,10 @@ def replay_data(
     return {**data, "roads": _roads(roads or RoadDrawing()), "colors": COLORS}
 
 
-def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder], settings: Mapping[str, AgentSettings]) -> dict[str, Any]:
-    """What a page shows of one frame. The stations' knowledge is carried on."""
+def _frame_data(
+    frame: Frame, builders: dict[str, SnapshotBuilder], settings: Mapping[str, AgentSettings]
+) -> dict[str, Any]:
+    """Return the data of one frame, and update the snapshot builders of the stations."""
     view = frame.view
     boxes, speeds = view.boxes.tolist(), view.speed.tolist()
     bodies = list(zip(view.names, view.categories, boxes, speeds, strict=True))
@@ -232,9 +234,9 @@ def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder], settings: Mapping
         name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2)] for name, _, box, speed in shown
     }
     for name in frame.steps:
-        if name not in knowledge:
-            knowledge[name] = SnapshotBuilder(name, settings.get(name, USUAL))
-    snapshots = {name: known.observe(frame) for name, known in knowledge.items()}
+        if name not in builders:
+            builders[name] = SnapshotBuilder(name, settings.get(name, DEFAULT_SETTINGS))
+    snapshots = {name: builder.observe(frame) for name, builder in builders.items()}
     return {
         "time": round(view.time, 4),
         "actors": {
@@ -242,7 +244,7 @@ def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder], settings: Mapping
             for name, category, box, _ in shown
         },
         "pose": poses,
-        "stations": {name: _station(snapshots[name]) if name in frame.steps else None for name in knowledge},
+        "stations": {name: _station(snapshots[name]) if name in frame.steps else None for name in builders},
         "changes": [
             [round(change.time, 4), change.path, change.after.value.removesuffix("State"), change.why]
             for change in frame.changes
@@ -263,7 +265,7 @@ def _append(data: dict[str, Any], part: Mapping[str, Any]) -> None:
 
 
 def _size(part: Mapping[str, Any]) -> int:
-    """About how many bytes a part takes in the page."""
+    """Return the approximate size of the data of one frame in the page [bytes]."""
     poses = sum(40 + len(name) for name in part["pose"])
     changes = sum(len(path) + len(why) for _, path, _, why in part["changes"])
     stations = sum(

@@ -1,4 +1,4 @@
-"""One instant as one station knows it, with the truth beside: what a top view draws."""
+"""Information of one station at one time, with the ground truth, for top views."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.world.view import WorldView
 
-USUAL = AgentSettings()
-"""Settings of a station of which no other settings are known: how long it uses an old report."""
+DEFAULT_SETTINGS = AgentSettings()
+"""Default settings of a station, which determine the lifetime of reports."""
 LINK_LIFETIME = 0.15
-"""How long the last message on a link stays in the picture [s]; links of 10 Hz then do not flicker."""
+"""Display time of the last message of a link [s]. It exceeds the period of 10 Hz messages to avoid flicker."""
 
 
 @dataclass(frozen=True)
 class StationSnapshot:
-    """What `station` saw (`own`), holds from others (`heard`) and concluded (`fused`), and the links towards it.
+    """Own detections (`own`), received messages (`heard`), fused detections and incoming links of a station.
 
-    `own` is what the station goes by: where its own detections travel the channel too, those that have come back.
-    `heard` holds one entry per sender and kind of message: the newest, with what the sender said before of objects that
-    the newest leaves out. `links` hold one per sender, the newest.
+    own    detections that the station uses; if they pass the channel, those that have been delivered
+    heard  newest message per sender and kind, completed by earlier reports on objects that it omits
+    links  newest message outcome per sender
     """
 
     station: str
@@ -37,14 +37,14 @@ class StationSnapshot:
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Simulation time [s]."""
         return self.view.time
 
 
 class SnapshotBuilder:
-    """Folds the frames of a run into snapshots of one station, which uses reports as long as its settings state."""
+    """Builder of snapshots of one station from the frames of a run. The settings define the lifetime of reports."""
 
-    def __init__(self, station: str, settings: AgentSettings = USUAL) -> None:
+    def __init__(self, station: str, settings: AgentSettings = DEFAULT_SETTINGS) -> None:
         self.station = station
         self._settings = settings
         self._heard: dict[tuple[str, str], ReceivedMessage] = {}
@@ -53,11 +53,11 @@ class SnapshotBuilder:
         self._own_travels = False
 
     def observe(self, frame: Frame) -> StationSnapshot:
-        """Take the next frame; the snapshot at its time."""
+        """Process the next frame and return the snapshot at its time."""
         now = frame.view.time
         step = frame.steps.get(self.station)
         for received in step.inbox if step else ():
-            self._hear(received)
+            self._receive(received)
         for event in frame.links:
             if event.receiver == self.station:
                 self._links[event.sender] = event
@@ -78,12 +78,12 @@ class SnapshotBuilder:
             step=step,
         )
 
-    def _hear(self, received: ReceivedMessage) -> None:
+    def _receive(self, received: ReceivedMessage) -> None:
         message = received.message
         if message.objects is not None:
             lifetime = self._settings.lifetime(complete=False)
-            said = self._partial.setdefault(message.sender, PartialReportAssembler(lifetime)).update(message)
-            received = replace(received, message=replace(message, detections=said))
+            complete = self._partial.setdefault(message.sender, PartialReportAssembler(lifetime)).update(message)
+            received = replace(received, message=replace(message, detections=complete))
         key = message.sender, message.kind
         held = self._heard.get(key)
         if held is None or received.message.detections.time >= held.message.detections.time:
@@ -98,5 +98,5 @@ class SnapshotBuilder:
         return held.message.detections if held is not None else Detections(now)
 
     def _lifetime(self, message: Message) -> float:
-        """How long the station uses a message [s]."""
+        """Return the time for which the station uses a message [s]."""
         return self._settings.lifetime(complete=message.objects is None and message.kind == "cpm")

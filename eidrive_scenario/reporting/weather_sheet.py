@@ -1,4 +1,4 @@
-"""A contact sheet: one street in every weather of the library, as a car's camera and a roadside unit's camera see it.
+"""Contact sheet of one street in every weather of the library, from the cameras of a car and of a roadside unit.
 
 `python -m eidrive_scenario.reporting.weather_sheet --out reports/weather.png`
 """
@@ -29,7 +29,7 @@ from eidrive_scenario.world.weather import Weather, load_weather
 ROAD = "coop_1.xodr"
 CAMERA = CameraSettings(width=640, height=360, fov=80.0, supersampling=2)
 SPEED = (8.0, 0.0, 0.0)
-"""Of the car that carries the camera [m/s]: rain comes towards it."""
+"""Velocity of the car with the camera [m/s], which determines the apparent direction of rain."""
 _BODIES: dict[str, tuple[str, str, tuple[float, float, float], float, float]] = {
     "car": ("car", "car", (4.89, 1.84, 1.49), 2.85, 0.33),
     "firetruck": ("firetruck", "truck", (8.47, 2.89, 3.83), 4.6, 0.5),
@@ -40,7 +40,7 @@ _BODIES: dict[str, tuple[str, str, tuple[float, float, float], float, float]] = 
     "bicycle": ("bicycle", "bicycle", (1.8, 0.6, 1.7), 1.1, 0.34),
     "pedestrian": ("pedestrian", "pedestrian", (0.5, 0.5, 1.75), 0.0, 0.3),
 }
-"""Shape, class, length, width and height, wheelbase, radius of the wheels."""
+"""Shape, class, size (length, width, height) [m], wheelbase [m] and wheel radius [m]."""
 _STREET: tuple[tuple[str, str, float, float, float], ...] = (
     ("Ego", "car", 0.0, 0.0, 0.0),
     ("Leader", "car", 21.0, -0.1, 0.0),
@@ -64,7 +64,7 @@ _VIEWS = (
 
 
 def street() -> World:
-    """The crossing of scenario 1 with some traffic on it. Close it after use."""
+    """Return the crossing of scenario 1 with traffic. The caller closes the world."""
     world = World(RoadNetwork.load(library_path() / "roads" / ROAD))
     for name, body, x, y, yaw in _STREET:
         shape, category, size, wheelbase, wheel = _BODIES[body]
@@ -75,15 +75,15 @@ def street() -> World:
 
 
 def contact_sheet(weathers: list[Weather], camera: CameraSettings = CAMERA) -> NDArray[np.uint8]:
-    """A picture (H, W, 3): a row for each weather, a column for each view, captions above."""
-    photographer = ImageSensor(camera)
+    """Return an image (H, W, 3) with one row per weather, one column per view, and captions."""
+    sensor = ImageSensor(camera)
     rows = []
     with street() as world:
         for weather in weathers:
             world.set_weather(weather)
             row: list[NDArray[np.uint8]] = []
             for number, (view, pose, own) in enumerate(_VIEWS):
-                reading = photographer.capture(
+                reading = sensor.capture(
                     world,
                     pose,
                     generator(1, "weather sheet", number),
@@ -91,13 +91,13 @@ def contact_sheet(weathers: list[Weather], camera: CameraSettings = CAMERA) -> N
                     velocity=SPEED if own else (0.0, 0.0, 0.0),
                     lens=generator(1, "weather sheet", "lens") if own else None,
                 )
-                about = "" if row else _in_words(weather)
-                row.append(_captioned(reading.rgb, f"{weather.name.replace('_', ' ')}: {view}", about))
+                details = "" if row else _describe_weather(weather)
+                row.append(_add_caption(reading.rgb, f"{weather.name.replace('_', ' ')}: {view}", details))
             rows.append(np.hstack(row))
     return np.vstack(rows)
 
 
-def _in_words(weather: Weather) -> str:
+def _describe_weather(weather: Weather) -> str:
     parts = [f"sun {weather.sun_elevation:.0f} deg", f"clouds {weather.cloud_cover:.0%}"]
     parts.append(f"visual range {weather.visual_range:g} m")
     if weather.precipitation != "none":
@@ -107,22 +107,22 @@ def _in_words(weather: Weather) -> str:
     return ", ".join(parts)
 
 
-def _captioned(picture: NDArray[np.uint8], title: str, about: str) -> NDArray[np.uint8]:
-    bar = np.full((30, picture.shape[1], 3), 245, dtype=np.uint8)
+def _add_caption(image: NDArray[np.uint8], title: str, details: str) -> NDArray[np.uint8]:
+    bar = np.full((30, image.shape[1], 3), 245, dtype=np.uint8)
     cv2.putText(bar, title, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (20, 20, 20), 1, cv2.LINE_AA)
-    room = picture.shape[1] - cv2.getTextSize(title, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)[0][0] - 32
-    size = 0.38 * min(1.0, room / max(1, cv2.getTextSize(about, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)[0][0]))
-    wide = cv2.getTextSize(about, cv2.FONT_HERSHEY_SIMPLEX, size, 1)[0][0]
+    available = image.shape[1] - cv2.getTextSize(title, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)[0][0] - 32
+    size = 0.38 * min(1.0, available / max(1, cv2.getTextSize(details, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)[0][0]))
+    width = cv2.getTextSize(details, cv2.FONT_HERSHEY_SIMPLEX, size, 1)[0][0]
     cv2.putText(
-        bar, about, (picture.shape[1] - wide - 8, 20), cv2.FONT_HERSHEY_SIMPLEX, size, (90, 90, 90), 1, cv2.LINE_AA
+        bar, details, (image.shape[1] - width - 8, 20), cv2.FONT_HERSHEY_SIMPLEX, size, (90, 90, 90), 1, cv2.LINE_AA
     )
-    framed = np.vstack([bar, picture])
+    framed = np.vstack([bar, image])
     framed[:, -2:] = 245
     return framed
 
 
 def write(
-    out: Annotated[Path, typer.Option(help="The PNG file to write.")] = Path("reports/weather.png"),
+    out: Annotated[Path, typer.Option(help="PNG file.")] = Path("reports/weather.png"),
     weather: Annotated[
         list[str] | None, typer.Option(help="Preset or file; repeatable.", show_default="all presets")
     ] = None,

@@ -1,4 +1,4 @@
-"""Roads as a drawing: lanes as polygons, markings as lines, seen from above."""
+"""Drawing of roads from above: lanes as polygons, road marks as lines."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.reading.document import parse_road_map
 
 SPACING = 1.0
-"""Distance of the points at which edges are computed [m]; those that lie on a straight line are dropped again."""
-WIDEST_SPACING = 50.0
+"""Distance between computed points of lane edges [m], before the simplification of straight parts."""
+MAX_SPACING = 50.0
 """Maximum of that distance on a large map [m]."""
-_MOST_POINTS = 1_500_000
-"""Maximum number of points that are computed."""
+_MAX_POINTS = 1_500_000
+"""Maximum number of computed points."""
 _LARGEST_ROAD_FILE = 64 * 2**20
-"""Maximum size of a road in a recording that is drawn [bytes]."""
+"""Maximum size of a road file of a recording that is drawn [bytes]."""
 TOLERANCE = 0.02
-"""How far a drawn line may stray from the edge [m]."""
+"""Maximum deviation of a drawn line from the edge [m]."""
 ROAD_FILE = "road.xodr"
-"""Name of the road among a recording's attachments."""
+"""Name of the road file in the attachments of a recording."""
 
 _LOWEST = ("none", "shoulder", "border", "sidewalk", "median")
 
 
 def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDrawing:
-    """The lanes and markings of these roads; of those that reach into `window` if one is given.
+    """Return lanes and road marks of these roads, limited to an optional `window`.
 
-    Lanes on which cars drive come last, so that they cover the shoulders of roads that cross them in a junction.
-    Edges of a large map are computed at wider distances. Raise InputError if it is too large even so.
+    Driving lanes come last, so that they cover the shoulders of crossing roads in a junction. Edges of a large map have
+    a larger point spacing. Raise InputError if the map exceeds the maximum spacing.
     """
     roads = list(roads)
     spacing = _spacing(roads)
@@ -50,7 +50,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
                 if lane.id != 0:
                     inner = _edge(road, section, lane, stations, outer=False)
                     outer = _edge(road, section, lane, stations, outer=True)
-                    polygon = np.concatenate([thinned(inner), thinned(outer)[::-1]])
+                    polygon = np.concatenate([simplify_line(inner), simplify_line(outer)[::-1]])
                     if _reaches(polygon, window):
                         lanes.append((lane.type, polygon))
                 markings.extend(mark for mark in _marks(road, section, lane, spacing) if _reaches(mark[2], window))
@@ -59,7 +59,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
 
 
 def recorded_roads(recording: Recording) -> RoadDrawing:
-    """The roads that a recording carries along; nothing where it carries none."""
+    """Return the roads in the attachments of a recording; an empty drawing without a road file."""
     text = recording.attachments.get(ROAD_FILE)
     if text is None:
         return RoadDrawing()
@@ -68,8 +68,8 @@ def recorded_roads(recording: Recording) -> RoadDrawing:
     return road_drawing(parse_road_map(text, f"{recording.path}/{ROAD_FILE}").roads.values())
 
 
-def thinned(points: Array, tolerance: float = TOLERANCE) -> Array:
-    """The points (N, 2) without those that lie within `tolerance` of the line between their kept neighbors
+def simplify_line(points: Array, tolerance: float = TOLERANCE) -> Array:
+    """Return the points (N, 2) without points within `tolerance` of the line between kept neighbors [m]
     (Douglas and Peucker 1973)."""
     keep = np.zeros(len(points), dtype=bool)
     keep[[0, -1]] = True
@@ -82,42 +82,42 @@ def thinned(points: Array, tolerance: float = TOLERANCE) -> Array:
         length = float(np.hypot(*along))
         between = points[first + 1 : last] - points[first]
         if length > 0.0:
-            stray = np.abs(along[0] * between[:, 1] - along[1] * between[:, 0]) / length
+            deviation = np.abs(along[0] * between[:, 1] - along[1] * between[:, 0]) / length
         else:
-            stray = np.hypot(between[:, 0], between[:, 1])
-        worst = int(stray.argmax())
-        if stray[worst] > tolerance:
-            middle = first + 1 + worst
+            deviation = np.hypot(between[:, 0], between[:, 1])
+        farthest = int(deviation.argmax())
+        if deviation[farthest] > tolerance:
+            middle = first + 1 + farthest
             keep[middle] = True
             open_spans += [(first, middle), (middle, last)]
     return points[keep]
 
 
 def _spacing(roads: Sequence[Road]) -> float:
-    """The distance between points [m] that keeps their number within bounds."""
+    """Return the point spacing that limits the number of points [m]."""
     length = sum(
         section.length * sum(2 + len(lane.road_marks) for lane in section.lanes.values())
         for road in roads
         for section in road.sections
     )
-    spacing = max(SPACING, length / _MOST_POINTS)
-    if not spacing <= WIDEST_SPACING:
+    spacing = max(SPACING, length / _MAX_POINTS)
+    if not spacing <= MAX_SPACING:
         raise _too_large("")
     return spacing
 
 
 def _too_large(source: str) -> InputError:
-    return InputError(Diagnostic("the road network is too large to be drawn", "", source))
+    return InputError(Diagnostic("the road network is too large for a drawing", "", source))
 
 
 def _stations(start: float, end: float, spacing: float) -> list[float]:
-    """Points along a road, its ends included [m]."""
+    """Return equidistant s coordinates along a road, including both ends [m]."""
     found: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
     return found
 
 
 def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *, outer: bool) -> Array:
-    """(N, 2) points of a lane's inner or outer edge; lane 0 has its center line for both."""
+    """Return points (N, 2) of the inner or outer edge of a lane; both are the center line for lane 0."""
     width = lane.outer if outer else lane.inner
     points = []
     for s in stations:
@@ -130,14 +130,14 @@ def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *
 
 
 def _marks(road: Road, section: LaneSection, lane: Lane, spacing: float) -> Iterator[tuple[str, str, Array]]:
-    """The painted stretches on the lane's outer edge."""
+    """Yield the road marks on the outer edge of a lane."""
     for index, mark in enumerate(lane.road_marks):
         after = lane.road_marks[index + 1].s_offset if index + 1 < len(lane.road_marks) else section.length
         start, end = section.s + mark.s_offset, section.s + min(after, section.length)
         if mark.type in ("none", "curb", "grass") or end - start < 1e-6:
             continue
         stations = _stations(start, end, spacing)
-        yield mark.type, mark.color, thinned(_edge(road, section, lane, stations, outer=True))
+        yield mark.type, mark.color, simplify_line(_edge(road, section, lane, stations, outer=True))
 
 
 def _reaches(points: Array, window: Window | None) -> bool:

@@ -1,7 +1,7 @@
-"""A street from above as SVG: the truth as outlines, and what one station knows of it.
+"""Top view of a street as SVG: ground truth as outlines, and the detections of one station.
 
-Coordinates in the picture are x and -y of the world [m], so a picture may share the drawing of its roads with others
-on the page (`roads_symbol`, then `roads_id`).
+SVG coordinates are x and -y of the world [m], so several figures of a page can share one drawing of the roads
+(`roads_symbol` and `roads_id`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ WHITE = "#ffffff"
 
 @dataclass(frozen=True)
 class Window:
-    """The part of the world that a picture shows [m]."""
+    """Section of the world in a figure [m]."""
 
     left: float
     right: float
@@ -42,28 +42,28 @@ class Window:
     top: float
 
     @classmethod
-    def around(cls, points: Iterable[Sequence[float]], margin: float = 6.0) -> Window:
-        """The smallest window that holds all points (x, y, …) with a margin [m]."""
+    def enclosing(cls, points: Iterable[Sequence[float]], margin: float = 6.0) -> Window:
+        """Return the smallest window that contains all points (x, y, …) with a margin [m]."""
         plan = np.array([tuple(point[:2]) for point in points], dtype=np.float64)
         low, high = plan.min(axis=0) - margin, plan.max(axis=0) + margin
         return cls(float(low[0]), float(high[0]), float(low[1]), float(high[1]))
 
     @property
     def view_box(self) -> str:
-        """For the attribute viewBox."""
+        """Value of the SVG attribute viewBox."""
         return f"{self.left:.2f} {-self.top:.2f} {self.right - self.left:.2f} {self.top - self.bottom:.2f}"
 
 
 @dataclass(frozen=True)
 class RoadDrawing:
-    """Roads seen from above: lanes (type, polygon (M, 2)) and painted lines (type, color, polyline (M, 2)) [m]."""
+    """Roads from above: lanes (type, polygon (M, 2)) and road marks (type, color, polyline (M, 2)) [m]."""
 
     lanes: tuple[tuple[str, Array], ...] = ()
     markings: tuple[tuple[str, str, Array], ...] = ()
 
 
 def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
-    """The roads as a group with an id, to be put once into a page and used by many pictures."""
+    """Return the roads as a group with an id, which several figures of a page can reference."""
     lanes = "".join(
         f'<path d="{_path(polygon)}Z" fill="{LANES.get(kind, LANE)}" stroke="{LANES.get(kind, LANE)}" '
         'stroke-width="0.05"/>'
@@ -86,11 +86,13 @@ def top_view(
     labels: Mapping[str, str] | None = None,
     description: str = "",
 ) -> str:
-    """The snapshot as an SVG element.
+    """Return the snapshot as an SVG element.
 
-    `roads` are drawn into the picture itself; `roads_id` refers to a `roads_symbol` of the same page instead.
-    `conflict_areas` are polygons (M, 2) [m]. `labels` maps an actor's name to what is written beside it; an actor
-    without an entry is labeled with its name, one mapped to "" is not labeled.
+    roads           roads that are drawn into the figure
+    roads_id        id of a `roads_symbol` of the same page, instead of `roads`
+    conflict_areas  polygons (M, 2) [m]
+    labels          label by actor name; the default is the name, "" omits the label
+    description     title of the figure
     """
     view = snapshot.view
     names = labels or {}
@@ -112,7 +114,7 @@ def top_view(
     parts.extend(_truth(snapshot))
     parts.extend(_labels(snapshot, window, {name: names.get(name, name) for name in view.names}))
     parts.append(_clock(window, snapshot.time))
-    title = escape(description or f"top view at {snapshot.time:.2f} s as {snapshot.station} knows it")
+    title = escape(description or f"top view at {snapshot.time:.2f} s with the detections of {snapshot.station}")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="top-view" viewBox="{window.view_box}" role="img">'
         f"<title>{title}</title>{''.join(parts)}</svg>"
@@ -120,7 +122,7 @@ def top_view(
 
 
 def _truth(snapshot: StationSnapshot) -> list[str]:
-    """Every actor as an outline with a bar at its front; the station itself filled; a mast as a dot."""
+    """Draw each actor as an outline with a bar at its front, the station itself filled, and a mast as a dot."""
     view, drawn = snapshot.view, []
     corners = footprint(view.boxes)
     for row, name in enumerate(view.names):
@@ -148,7 +150,7 @@ def _truth(snapshot: StationSnapshot) -> list[str]:
 
 
 def _boxes(detections: Detections, kind: str, color: str, stroke: float) -> list[str]:
-    """Received boxes have the broader rim, so that both show where two stations report one object."""
+    """Draw boxes. Received boxes have a wider outline, so that boxes of two stations on one object are distinct."""
     return [
         f'<path class="{kind}" d="{_path(corners)}Z" fill="{color}" fill-opacity="0.28" stroke="{color}" '
         f'stroke-width="{stroke}" stroke-linejoin="round"/>'
@@ -176,7 +178,7 @@ def _links(snapshot: StationSnapshot) -> list[str]:
 
 
 def _labels(snapshot: StationSnapshot, window: Window, texts: Mapping[str, str]) -> list[str]:
-    """Each beside its vehicle: to the right, left, above or below, where it first covers neither vehicle nor label."""
+    """Draw the label of each vehicle at the first free position: right, left, above or below."""
     view, size = snapshot.view, _text_size(window)
     bodies = [(*low, *high) for low, high in ((plan.min(0), plan.max(0)) for plan in footprint(view.boxes))]
     taken: list[tuple[float, ...]] = [tuple(map(float, body)) for body in bodies]
@@ -187,13 +189,13 @@ def _labels(snapshot: StationSnapshot, window: Window, texts: Mapping[str, str])
             continue
         left, bottom, right, top = taken[row]
         half, width, gap = 0.5 * size, 0.58 * size * len(texts[name]), 0.45 * size
-        places = (
+        positions = (
             ("start", right + gap, y, right + gap),
             ("end", left - gap, y, left - gap - width),
             ("middle", x, top + gap + half, x - width / 2),
             ("middle", x, bottom - gap - half, x - width / 2),
         )
-        rectangles = [(start, middle - half, start + width, middle + half) for _, _, middle, start in places]
+        rectangles = [(start, middle - half, start + width, middle + half) for _, _, middle, start in positions]
         free = [
             index
             for index, rectangle in enumerate(rectangles)
@@ -202,7 +204,7 @@ def _labels(snapshot: StationSnapshot, window: Window, texts: Mapping[str, str])
         ]
         best = free[0] if free else 0
         taken.append(rectangles[best])
-        anchor, at, middle, _ = places[best]
+        anchor, at, middle, _ = positions[best]
         drawn.append(
             f'<text x="{at:.2f}" y="{-middle + 0.35 * size:.2f}" font-size="{size:.2f}" text-anchor="{anchor}" '
             f'fill="{STATION}" stroke="#ffffff" stroke-width="{0.22 * size:.2f}" paint-order="stroke" '
@@ -212,7 +214,7 @@ def _labels(snapshot: StationSnapshot, window: Window, texts: Mapping[str, str])
 
 
 def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    """Whether two rectangles (left, bottom, right, top) share an area."""
+    """True if two rectangles (left, bottom, right, top) overlap."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
@@ -230,7 +232,7 @@ def _text_size(window: Window) -> float:
 
 
 def is_broken(kind: str) -> bool:
-    """Whether a marking of this type is broken; of a double line, whether both are."""
+    """True if a road mark of this type is broken; for a double line, if both lines are."""
     return set(kind.split()) == {"broken"}
 
 
@@ -243,19 +245,19 @@ def _path(points: Array) -> str:
 
 
 def legend() -> str:
-    """What the colors and lines of a top view mean, as HTML."""
+    """Return the legend of colors and lines of a top view as HTML."""
     box = '<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" {}/></svg>'
     line = '<svg viewBox="0 0 26 14"><line x1="1" x2="25" y1="7" y2="7" stroke-width="2" {}/></svg>'
     entries = (
-        (box.format(f'fill="#fff" stroke="{TRUTH}" stroke-width="1.4"'), "where it really is"),
-        (box.format(f'fill="{STATION}"'), "the ego"),
-        (_sample(OWN), "seen by the ego itself"),
+        (box.format(f'fill="#fff" stroke="{TRUTH}" stroke-width="1.4"'), "ground truth"),
+        (box.format(f'fill="{STATION}"'), "ego"),
+        (_sample(OWN), "detected by the ego"),
         (_sample(RECEIVED), "received from others"),
-        (line.format(f'stroke="{LINK}"'), "message arrives"),
+        (line.format(f'stroke="{LINK}"'), "message delivered"),
         (line.format(f'stroke="{LOST}" stroke-dasharray="5 4"'), "message lost"),
         (
             box.format(f'fill="{AREA}" fill-opacity=".25" stroke="{AREA}" stroke-dasharray="4 2"'),
-            "conflict area: the ego stops while it knows of a car inside",
+            "conflict area: the ego stops while a detected car is inside",
         ),
     )
     return "".join(f"<span>{symbol}{escape(text)}</span>" for symbol, text in entries)

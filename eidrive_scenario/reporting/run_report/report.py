@@ -1,4 +1,4 @@
-"""One page over many runs: what passed, what failed, and why."""
+"""Report of many runs as one HTML page: verdicts, reasons and statistics."""
 
 from __future__ import annotations
 
@@ -14,35 +14,33 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.statistics import Summary, summarize, wilson
 from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, reported
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 PREFERRED = ("min_distance", "time_to_collision", "collision.count", "messages.lost")
-"""Metrics that the overview shows before others, by how their names begin."""
+"""Prefixes of metrics with priority in the overview."""
 SHOWN = 4
-"""So many metrics stand in the overview."""
+"""Maximum number of metrics in the overview."""
 _UNITS = {"count": "", "impact_speed": "m/s"}
-"""Of metrics that have another unit than the value of their criterion, by the last part of their name."""
+"""Units that differ from the unit of the criterion, by the last part of the name of the metric."""
 
 
 def write_report(
     results: Iterable[Mapping[str, Any]], out: Path, *, sources: Sequence[Path] = (), footer: str = ""
 ) -> Path:
-    """One page over these results, given as `--json` prints them. Returns the page's path.
+    """Write a page about results in the format of `--json`, and return its path.
 
-    sources  files of the results in their order, which errors name
+    out      file of the page if it ends in `.html`, else the folder of `report.html`
+    sources  files of the results in their order, for error messages
 
-    Runs are grouped by the settings in which those of a scenario differ. A run that lies in several folders is listed
-    each time, and counts once.
-
-    `out` is the page if it ends in `.html`, else the folder in which `report.html` is written. Raise InputError if
-    there are no results, or one of them is none.
+    Runs are grouped by the settings in which those of a scenario differ. A run in several folders is listed each time
+    and counts once. Raise InputError without results, or for an invalid result.
     """
     page = out if out.suffix == ".html" else out / "report.html"
     files: Iterable[str | Path] = chain(sources, repeat(""))
-    runs = [reported(result, file) for result, file in zip(results, files, strict=False)]
+    runs = [parse_run(result, file) for result, file in zip(results, files, strict=False)]
     if not runs:
-        raise InputError(Diagnostic("there is no result to report", "give at least one run", str(out)))
+        raise InputError(Diagnostic("no result to report", "give at least one run", str(out)))
     groups = group_runs(runs)
     counted = [run for group in groups for run in group.distinct]
     metrics = _common_metrics(runs)
@@ -78,18 +76,18 @@ def write_report(
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
-    """The preferred ones, then those that most runs have; instants of time do not make a mean."""
+    """Return the preferred metrics, then the most frequent ones, without times, whose mean has no meaning."""
     counts = Counter(name for run in runs for name in run.metrics if not name.endswith(".time"))
 
     def rank(name: str) -> tuple[int, int, str]:
-        place = next((index for index, start in enumerate(PREFERRED) if name.startswith(start)), len(PREFERRED))
-        return place, -counts[name], name
+        priority = next((index for index, start in enumerate(PREFERRED) if name.startswith(start)), len(PREFERRED))
+        return priority, -counts[name], name
 
     return sorted(counts, key=rank)[:SHOWN]
 
 
 def _title(metric: str, runs: Sequence[ReportedRun]) -> str:
-    """Its name in words, and its unit where it is that of the criterion which it belongs to."""
+    """Return the name of a metric with its unit, which is usually that of its criterion."""
     kind, last = metric.split(".")[0], metric.split(".")[-1]
     units = (criterion.unit for run in runs for criterion in run.criteria if criterion.name == kind)
     unit = _UNITS[last] if last in _UNITS else next(units, "")
@@ -97,7 +95,7 @@ def _title(metric: str, runs: Sequence[ReportedRun]) -> str:
 
 
 def _varied(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
-    """The parameters in which the runs of a distribution differ; of other runs none, as their seeds tell them apart."""
+    """Return the parameters in which runs of a distribution differ; empty for runs that differ in their seeds."""
     if all(run.run is None for run in runs):
         return ()
     names = dict.fromkeys(name for run in runs for name in run.parameters)
@@ -111,5 +109,5 @@ def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:
 
 
 def _number(value: float | None, unit: str) -> str:
-    """With two decimals where it is measured, so that limits and values line up; counts as they are."""
+    """Return a measured value with two decimals, so that values and limits align, or a count without decimals."""
     return "" if value is None else f"{value:.2f} {unit}" if unit else f"{value:g}"

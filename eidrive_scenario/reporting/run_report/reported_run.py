@@ -1,4 +1,4 @@
-"""A run as `--json` prints it, checked: what pages show of it."""
+"""Validated run in the format of `--json`, as input of pages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 
 class ReportedCriterion(BaseModel):
-    """A verdict as `--json` prints it."""
+    """Verdict in the format of `--json`."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -26,7 +26,7 @@ class ReportedCriterion(BaseModel):
 
 
 class ReportedRun(BaseModel):
-    """A run as `--json` prints it."""
+    """Run in the format of `--json`."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -47,23 +47,23 @@ class ReportedRun(BaseModel):
 
     @property
     def finished(self) -> bool:
-        """False where the run was cut off by its time limit."""
+        """False if the run ended at its time limit."""
         return self.end_reason != TIME_LIMIT
 
 
-def reported(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:
-    """Return a checked run from the object that `--json` prints, read from the file `source` if that is given.
+def parse_run(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:
+    """Return a validated run from an object in the format of `--json`, read from the optional file `source`.
 
-    Raise InputError if it is not one.
+    Raise InputError if the object is invalid.
     """
     try:
         return ReportedRun.model_validate(result)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
+        key = ".".join(str(part) for part in first["loc"])
         raise InputError(
             Diagnostic(
-                f"result: {where[:200]!r}: {first['msg'].lower()}",
+                f"result: {key[:200]!r}: {first['msg'].lower()}",
                 "give an object that eidrive run --json prints",
                 str(source),
             )

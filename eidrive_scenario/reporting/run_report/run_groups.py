@@ -1,4 +1,4 @@
-"""Runs of a report in groups that differ in a setting, whatever setting that is."""
+"""Groups of runs of a report, by all settings in which they differ."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
-from eidrive_scenario.reporting.run_report.settings_text import channel_text, flattened, shortened
+from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, shorten
 
 _LEFT_OUT = ("seed", "run", "drawn", "varied", "scenario", "channel", "detector", "cooperate")
-"""Settings that tell the runs of a group apart, and options that the settings of channel and stations contain."""
+"""Settings that differ within a group, and options that the settings of channel and stations contain."""
 _NAMES = ("channel_profile.name", "channel_profile.description")
 _SHOWN = 200
-"""Characters of a value in a heading."""
+"""Maximum number of characters of a value in a heading."""
 
 
 @dataclass(frozen=True)
 class RunGroup:
-    """Runs with equal settings, but for the seed and what follows from it.
+    """Runs with equal settings, except for the seed and values derived from it.
 
-    differing  settings in which the groups of this scenario differ, and their values here
+    differing  values of the settings in which the groups of this scenario differ
     content    content of the channel
     """
 
@@ -32,7 +32,7 @@ class RunGroup:
 
     @property
     def distinct(self) -> tuple[ReportedRun, ...]:
-        """The runs that count in statistics: one and the same run, left in several folders, counts once."""
+        """Runs for statistics: a run in several folders counts once."""
         found: dict[object, ReportedRun] = {}
         for index, run in enumerate(self.runs):
             found.setdefault((run.settings_sha256, run.trace_hash) if run.settings_sha256 else index, run)
@@ -40,7 +40,7 @@ class RunGroup:
 
 
 def group_runs(runs: Sequence[ReportedRun]) -> list[RunGroup]:
-    """All runs in groups, ordered by scenario, channel and settings; the runs of each by number and seed."""
+    """Return groups ordered by scenario, channel and settings, each with its runs ordered by number and seed."""
     by_scenario: dict[str, list[ReportedRun]] = {}
     for run in sorted(runs, key=lambda run: (run.scenario, run.channel, run.run or 0, run.seed)):
         by_scenario.setdefault(run.scenario, []).append(run)
@@ -62,7 +62,7 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
             scenario,
             channel,
             {
-                name.replace("channel_profile.", "channel."): shortened(value, _SHOWN)
+                name.replace("channel_profile.", "channel."): shorten(value, _SHOWN)
                 for name, value in zip(differing, values, strict=True)
                 if value and name not in _NAMES
             },
@@ -74,18 +74,18 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
 
 
 def _comparable(run: ReportedRun) -> dict[str, str]:
-    """The settings of a run that others of its group share, by path."""
+    """Return the settings of a run that its group shares, by path."""
     settings: dict[str, Any] = {key: value for key, value in run.settings.items() if key not in _LEFT_OUT}
     own = {name for key in ("drawn", "varied") for name in _names(run.settings.get(key))}
     if isinstance(settings.get("parameters"), Mapping):
         settings["parameters"] = {name: value for name, value in settings["parameters"].items() if name not in own}
     if isinstance(settings.get("files"), list):
         settings["files"] = _files(settings["files"])
-    return flattened(settings)
+    return flatten(settings)
 
 
 def _files(files: Sequence[Any]) -> dict[str, Any]:
-    """The digests of files by role and name."""
+    """Return the digests of files by role and name."""
     return {
         f"{entry.get('role')} {entry.get('name')}": str(entry.get("sha256"))[:12]
         for entry in files

@@ -1,4 +1,4 @@
-"""What stands in the boxes of a storyboard's picture: names, triggers and actions in words, and who waits for whom."""
+"""Content of the boxes of a storyboard diagram: names, triggers, actions, and dependencies between elements."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ Path = tuple[str, ...]
 
 
 class Role(StrEnum):
-    """What a line of a box says."""
+    """Meaning of a line of a box."""
 
     START = "start"
     STOP = "stop"
-    WHO = "who"
-    WHAT = "what"
+    ACTORS = "actors"
+    CONTENT = "content"
 
 
 @dataclass(frozen=True)
 class BoxLine:
-    """One line: a word in front (when, and, or, stop when, …) and its text."""
+    """Line of a box: a leading word (when, and, or, stops when, …) and its text."""
 
     role: Role
     lead: str
@@ -36,7 +36,7 @@ class BoxLine:
 
 @dataclass
 class Box:
-    """One element: its kind and name, a remark beside it, its lines, what it holds, and the elements it waits for."""
+    """Box of one element: kind, name, remark, lines, children, and paths of the elements that its trigger refers to."""
 
     kind: str
     title: str
@@ -47,30 +47,30 @@ class Box:
     waits_for: tuple[Path, ...] = ()
 
     def walk(self) -> Iterator[Box]:
-        """This box and all that it holds."""
+        """Yield this box and all its descendants."""
         yield self
         for child in self.children:
             yield from child.walk()
 
 
 def story_boxes(storyboard: Storyboard) -> list[Box]:
-    """The stories of a storyboard with all that they hold. A group with a single maneuver takes that into its box."""
+    """Return the boxes of all stories. The box of a group with a single maneuver includes the maneuver."""
     elements = ReferenceMatch((element.record.path, element) for element in _walk(storyboard.root))
     return [_box(story, elements) for story in storyboard.root.elements]
 
 
 def init_boxes(storyboard: Storyboard) -> list[Box]:
-    """What Init does: a box for each entity, one for what concerns all."""
+    """Return the boxes of Init: one for each entity, and one for global actions."""
     lines: dict[str, list[BoxLine]] = {}
     for behavior in storyboard.init.actions:
         lines.setdefault(behavior.actor_name or "global actions", []).append(
-            BoxLine(Role.WHAT, "", behavior.describe())
+            BoxLine(Role.CONTENT, "", behavior.describe())
         )
     return [Box("init", name, (name,), lines=tuple(dict.fromkeys(found))) for name, found in lines.items()]
 
 
 def stop_lines(storyboard: Storyboard) -> tuple[BoxLine, ...]:
-    """When the run ends, as far as the storyboard says."""
+    """Return the conditions of the stop trigger of the storyboard."""
     leaf = storyboard.root.stop_leaf
     if leaf is None:
         return (BoxLine(Role.STOP, "when", "every story has ended"),)
@@ -95,7 +95,7 @@ def _box(element: StoryElement, elements: ReferenceMatch[StoryElement]) -> Box:
     if isinstance(element, ManeuverGroupElement):
         lines += _group_lines(element)
         if len(children) == 1:
-            lines.append(BoxLine(Role.WHAT, "maneuver", children[0].name))
+            lines.append(BoxLine(Role.CONTENT, "maneuver", children[0].name))
             children = children[0].elements
     if isinstance(element, ActionElement):
         lines += _action_lines(element)
@@ -119,20 +119,20 @@ def _remark(element: StoryElement) -> str:
 
 def _trigger(trigger: Trigger, role: Role, lead: str) -> Iterator[BoxLine]:
     for number, group in enumerate(trigger.groups):
-        for place, monitor in enumerate(group.monitors):
+        for index, monitor in enumerate(group.monitors):
             first = lead if number == 0 else f"or {lead.removeprefix('stops ')}"
-            yield BoxLine(role, first if place == 0 else "and", monitor.describe())
+            yield BoxLine(role, first if index == 0 else "and", monitor.describe())
 
 
 def _waits(trigger: Trigger, elements: ReferenceMatch[StoryElement]) -> Iterator[Path]:
-    """The elements whose state a trigger asks for; an action counts as the event that it belongs to."""
+    """Yield the paths of elements whose state a trigger evaluates, with the event instead of an action."""
     for group in trigger.groups:
         for monitor in group.monitors:
-            asked = monitor.condition.element
-            if not isinstance(asked, StoryboardElementStateCondition):
+            condition = monitor.condition.element
+            if not isinstance(condition, StoryboardElementStateCondition):
                 continue
-            for element in elements.by(asked.storyboard_element_ref):
-                if element.kind == asked.storyboard_element_type.value:
+            for element in elements.by(condition.storyboard_element_ref):
+                if element.kind == condition.storyboard_element_type.value:
                     path = element.record.path
                     yield path[:-1] if isinstance(element, ActionElement) else path
 
@@ -141,15 +141,15 @@ def _group_lines(group: ManeuverGroupElement) -> list[BoxLine]:
     actions = [one for one in _walk(group) if isinstance(one, ActionElement)]
     actors = dict.fromkeys(name for one in actions for name in one.actors if name is not None)
     if any(one.triggering is not None for one in actions):
-        actors["whoever fulfils the act's trigger"] = None
-    return [BoxLine(Role.WHO, "", ", ".join(actors))] if actors else []
+        actors["triggering entities of the act"] = None
+    return [BoxLine(Role.ACTORS, "", ", ".join(actors))] if actors else []
 
 
 def _action_lines(action: ActionElement) -> list[BoxLine]:
-    made = [behavior for actor in action.actors for behavior in action.behaviours(actor)]
-    return [BoxLine(Role.WHAT, "", words) for words in dict.fromkeys(behavior.describe() for behavior in made)]
+    behaviors = [behavior for actor in action.actors for behavior in action.behaviours(actor)]
+    return [BoxLine(Role.CONTENT, "", text) for text in dict.fromkeys(behavior.describe() for behavior in behaviors)]
 
 
 def has_maneuvers(boxes: list[Box]) -> bool:
-    """Whether any maneuver has a box of its own."""
+    """True if any maneuver has a separate box."""
     return any(box.kind == ManeuverElement.kind for story in boxes for box in story.walk())

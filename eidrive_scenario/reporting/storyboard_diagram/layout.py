@@ -1,4 +1,4 @@
-"""Where the boxes of a storyboard's picture stand: a column for each level, parents beside their first child."""
+"""Layout of a storyboard diagram: one column per level, parents at the height of their first child."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from eidrive_scenario.reporting.storyboard_diagram.boxes import Box, BoxLine, Path, has_maneuvers
-from eidrive_scenario.reporting.storyboard_diagram.text_width import broken, width_of
+from eidrive_scenario.reporting.storyboard_diagram.text_width import width_of, wrap_text
 
 TITLE, TEXT, LEADING = 13.0, 11.5, 16.0
 """Font sizes and line height [px]."""
 PADDING, GAP, GUTTER, LANE = 10.0, 12.0, 40.0, 9.0
-"""Inside a box, between boxes, between columns, between arrows that run side by side [px]."""
+"""Distances inside a box, between boxes, between columns, and between parallel arrows [px]."""
 WIDTHS = {"story": 165.0, "act": 230.0, "maneuverGroup": 190.0, "maneuver": 150.0, "event": 340.0, "action": 330.0}
 INIT_WIDTH = 300.0
 
 
 @dataclass(frozen=True)
 class TextLine:
-    """A line as it is drawn: the word in front (on the first line of several), the text and where it begins [px]."""
+    """Drawn line: the leading word on the first of several lines, the text, and its indent [px]."""
 
     source: BoxLine
     lead: str
@@ -28,7 +28,7 @@ class TextLine:
 
 @dataclass
 class Placed:
-    """A box with its place [px] and the lines that it shows."""
+    """Box with its position [px] and its drawn lines."""
 
     box: Box
     x: float
@@ -40,17 +40,17 @@ class Placed:
 
     @property
     def height(self) -> float:
-        """Of the box [px]."""
+        """Height of the box [px]."""
         between = 4.0 if self.lines else 0.0
         return 2 * PADDING + LEADING * (len(self.title) + len(self.lines)) + between - 3.0
 
     @property
     def middle(self) -> float:
-        """Height at which lines meet the box: that of its title [px]."""
+        """Vertical position of connecting lines, at the title of the box [px]."""
         return self.y + PADDING + LEADING / 2
 
     def walk(self) -> Iterator[Placed]:
-        """This box and all that it holds."""
+        """Yield this box and all its descendants."""
         yield self
         for child in self.children:
             yield from child.walk()
@@ -58,7 +58,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Arrow:
-    """From an element to one of its own level that waits for it; it runs in a lane left of the column [px]."""
+    """Arrow from an element to a dependent element of its level, in a lane left of the column [px]."""
 
     source: Placed
     target: Placed
@@ -67,7 +67,7 @@ class Arrow:
 
 @dataclass(frozen=True)
 class DiagramLayout:
-    """All boxes and arrows, and the size of the whole [px]."""
+    """All boxes and arrows, and the size of the diagram [px]."""
 
     stories: list[Placed]
     arrows: list[Arrow]
@@ -77,7 +77,7 @@ class DiagramLayout:
 
 
 def layout_diagram(stories: Sequence[Box], x: float, y: float) -> DiagramLayout:
-    """Place stories below each other, from a corner on."""
+    """Arrange the stories vertically, with the given upper left corner [px]."""
     lanes = _lanes(stories)
     columns: dict[str, float] = {}
     right = x
@@ -98,25 +98,25 @@ def layout_diagram(stories: Sequence[Box], x: float, y: float) -> DiagramLayout:
 
 
 def text_lines(lines: Sequence[BoxLine], width: float) -> list[TextLine]:
-    """The lines of a box, broken to a width [px]."""
+    """Return the lines of a box, wrapped to a width [px]. Leading words are bold."""
     shown = []
     for line in lines:
-        indent = width_of(line.lead + " ", TEXT) if line.lead else 0.0
-        for number, part in enumerate(broken(line.text, width - indent, TEXT) or [""]):
+        indent = width_of(line.lead + " ", TEXT, bold=True) if line.lead else 0.0
+        for number, part in enumerate(wrap_text(line.text, width - indent, TEXT) or [""]):
             shown.append(TextLine(line, line.lead if number == 0 else "", part, indent))
     return shown
 
 
 def sized(box: Box, x: float, y: float, width: float) -> Placed:
-    """A box at a place, its text broken to its width."""
+    """Return a box at a position, with its text wrapped to its width."""
     inside = width - 2 * PADDING
     remark = width_of(box.remark, TEXT) + 8.0 if box.remark else 0.0
-    title = broken(box.title, inside - remark, TITLE) or [""]
+    title = wrap_text(box.title, inside - remark, TITLE) or [""]
     return Placed(box, x, y, width, title, text_lines(box.lines, inside))
 
 
 def _place(box: Box, columns: dict[str, float], y: float) -> tuple[Placed, float]:
-    """The box at this height, and where what comes below it may begin."""
+    """Place a box and its descendants, and return it with the lower end of its area [px]."""
     placed = sized(box, columns[box.kind], y, WIDTHS[box.kind])
     below = y
     for child in box.children:
@@ -136,7 +136,7 @@ def _pairs(boxes: dict[Path, Placed]) -> Iterator[tuple[Placed, Placed]]:
 
 
 def _lanes(stories: Sequence[Box]) -> dict[str, int]:
-    """How many lanes the arrows of each column may need: no more than there are arrows, and not too many."""
+    """Return the number of lanes of each column: the number of its arrows, up to 8."""
     kinds = {box.path: box.kind for story in stories for box in story.walk()}
     count: dict[str, int] = {}
     for story in stories:
@@ -147,7 +147,7 @@ def _lanes(stories: Sequence[Box]) -> dict[str, int]:
 
 
 def _arrows(boxes: dict[Path, Placed], columns: dict[str, float]) -> list[Arrow]:
-    """Each arrow takes the first lane that is free along its way; short ones come first, so they run near the boxes."""
+    """Assign each arrow to the first free lane. Short arrows come first, so they are next to the boxes."""
     pairs = sorted(_pairs(boxes), key=lambda pair: abs(pair[0].y - pair[1].y))
     taken: dict[str, list[list[tuple[float, float]]]] = {}
     arrows = []

@@ -1,18 +1,20 @@
-"""How wide text is in a sans serif font, near enough to break lines without a browser."""
+"""Approximate width of text in a sans serif font, for line wrapping without a browser."""
 
 from __future__ import annotations
 
 _NARROW = frozenset("iljtfrI.,:;'|!()[]/ ")
 _WIDE = frozenset("mwMW@%≥≤±→")
+_BOLD = 1.2
+"""Width of bold text relative to regular text, sufficient for DejaVu Sans Bold."""
 
 
-def width_of(text: str, size: float) -> float:
-    """The width of a text [px] at a font size [px]."""
-    return size * sum(_share(letter) for letter in text)
+def width_of(text: str, size: float, *, bold: bool = False) -> float:
+    """Return the width of a text [px] at a font size [px]."""
+    return size * (_BOLD if bold else 1.0) * sum(_share(letter) for letter in text)
 
 
 def _share(letter: str) -> float:
-    """Of the font size, between Helvetica and the wider DejaVu Sans."""
+    """Return the width of a letter relative to the font size, between Helvetica and the wider DejaVu Sans."""
     if letter in _NARROW:
         return 0.35
     if letter in _WIDE:
@@ -20,8 +22,8 @@ def _share(letter: str) -> float:
     return 0.7 if letter.isupper() else 0.59
 
 
-def broken(text: str, width: float, size: float) -> list[str]:
-    """A text in lines no wider than `width` [px]; too long a word is cut, where its parts begin if it can."""
+def wrap_text(text: str, width: float, size: float) -> list[str]:
+    """Wrap a text to lines of at most `width` [px]. A longer word is split, if possible at a part of the word."""
     lines: list[str] = []
     line = ""
     for word in text.split():
@@ -40,7 +42,7 @@ def broken(text: str, width: float, size: float) -> list[str]:
 
 
 def _fitting(word: str, width: float, size: float) -> int:
-    """The number of letters at the beginning of a word that fit, at least 1; the time does not grow with the rest."""
+    """Return the number of leading letters that fit, at least 1, in a time independent of the rest of the word."""
     total = 0.0
     for count, letter in enumerate(word):
         total += _share(letter)
@@ -49,11 +51,11 @@ def _fitting(word: str, width: float, size: float) -> int:
     return len(word)
 
 
-def _part(word: str, most: int) -> str:
-    """At most so many letters of a word: up to a capital or behind an underscore, else all of them."""
-    seams = (
+def _part(word: str, limit: int) -> str:
+    """Return at most `limit` leading letters of a word, up to a capital letter or after a separator if possible."""
+    splits = (
         n
-        for n in range(most, most // 2, -1)
+        for n in range(limit, limit // 2, -1)
         if word[n - 1] in "_-/." or (word[n].isupper() and not word[n - 1].isupper())
     )
-    return word[: next(seams, most)]
+    return word[: next(splits, limit)]

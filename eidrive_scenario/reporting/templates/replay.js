@@ -13,8 +13,8 @@ function make(tag, text, parent) {
   return made;
 }
 
-for (const name of Object.keys(data.stations)) make("option", "as " + name + " knows it", element("station")).value = name;
-make("option", "the truth alone", element("station")).value = "";
+for (const name of Object.keys(data.stations)) make("option", "detections of " + name, element("station")).value = name;
+make("option", "ground truth only", element("station")).value = "";
 element("slider").max = data.times.length - 1;
 for (const [time, path, after, why] of data.changes) {
   const item = make("li", time.toFixed(2) + " s  " + path.split("/").pop() + " → " + after, element("changes"));
@@ -22,7 +22,7 @@ for (const [time, path, after, why] of data.changes) {
   item.title = path + (why ? ": " + why : "");
   item.onclick = () => { pause(); show(data.times.findIndex((t) => t >= time - 1e-6)); };
 }
-for (const [color, text] of [[C.own, "seen by the station itself (%: probability of existence)"], [C.received, "received from others"], [C.link, "message arrives"], [C.lost, "message lost"]]) {
+for (const [color, text] of [[C.own, "detected by the station (%: probability of existence)"], [C.received, "received from others"], [C.link, "message delivered"], [C.lost, "message lost"]]) {
   const entry = make("span", "", element("legend"));
   const patch = make("i", "", entry);
   patch.className = "swatch";
@@ -63,7 +63,7 @@ function box([x, y, length, width, yaw], fill, stroke, line, opacity) {
   pen.restore();
 }
 
-/* A box that somebody knows of; the less likely its object is to exist, the paler and thinner. */
+/* Draw a detected box; opacity and line width decrease with the probability of existence. */
 function perceived(at, color, line) {
   const existence = at.length > 5 ? at[5] : 1;
   box(at, color, color, line * (0.3 + 0.7 * existence), 0.28 * existence);
@@ -82,7 +82,7 @@ function outline(name, [x, y, yaw], at) {
   return [...at(x - across, y + up), ...at(x + across, y - up)];
 }
 
-/* Where a label goes: right of its car, or else left, above, below, wherever it covers the least of others. */
+/* Return the label position (right, left, above or below) with the smallest overlap with other labels. */
 function place(text, [left, top, right, bottom], others) {
   const width = pen.measureText(text).width, middle = (left + right) / 2 - width / 2 - 7;
   const spots = [[right, (top + bottom) / 2], [left - width - 14, (top + bottom) / 2], [middle, top - 11], [middle, bottom + 11]];
@@ -149,7 +149,7 @@ function show(next) {
   element("clock").textContent = data.times[index].toFixed(2) + " s";
   const known = element("known"), station = (data.stations[element("station").value] || [])[index];
   known.textContent = "";
-  for (const [key, value] of station ? [["sees", station.own.length], ["has heard of", station.heard.length], ["plan", station.plan || "does not drive"]] : [["", "not there"]]) {
+  for (const [key, value] of station ? [["own detections", station.own.length], ["received objects", station.heard.length], ["plan", station.plan || "none"]] : [["", "absent"]]) {
     make("dt", key, known); make("dd", value, known);
   }
   let last = null;

@@ -1,4 +1,4 @@
-"""Frames of a street made by hand: the geometry of the paper's first scenario, in which a truck hides a car."""
+"""Synthetic frames with the geometry of scenario 1 of the paper, in which a truck occludes a car."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SIZES = np.array([[4.892, 1.837, 1.49], [4.892, 1.837, 1.49], [8.468, 2.891, 3.8
 
 
 def view_at(tick: int, ego_x: float, ego_speed: float, incoming_y: float) -> WorldView:
-    """All centers on their reference points, to keep the numbers of the tests plain."""
+    """Return a view whose box centers equal the reference points, for simple numbers."""
     count = len(NAMES)
     position = np.array([[ego_x, 0.0, 0.75], [29.5, incoming_y, 0.75], [25.4, 5.6, 1.9], [42.2, -6.0, 1.5]])
     velocity = np.zeros((count, 3))
@@ -44,7 +44,7 @@ def view_at(tick: int, ego_x: float, ego_speed: float, incoming_y: float) -> Wor
 
 
 def detections_of(view: WorldView, time: float, *names: str) -> Detections:
-    """The true boxes of these actors, as measured at `time`."""
+    """Return the true boxes of these actors as detections of `time`."""
     rows = [view.row(name) for name in names]
     return Detections(
         time=time,
@@ -57,12 +57,12 @@ def detections_of(view: WorldView, time: float, *names: str) -> Detections:
 
 
 def play(delay: int | None, lost: frozenset[int] = frozenset()) -> list[Frame]:
-    """A run in which the RSU sees the car from 20 m on, and its messages take `delay` ticks (None: it is not heard).
+    """Return a run in which the RSU detects the car from 20 m, with a message delay in ticks (None: no messages).
 
-    The ego brakes from the first message on that shows the car, at 5 m/s². Messages of the ticks `lost` are lost.
+    The ego brakes at 5 m/s² from the first message that contains the car. Messages of the ticks `lost` are lost.
     """
     frames: list[Frame] = []
-    said: dict[int, Message] = {}
+    messages: dict[int, Message] = {}
     ego_x, speed, known = 0.0, 8.0, False
     for tick in range(100):
         view = view_at(tick, ego_x, speed, 39.5 - 14.0 * tick * DT)
@@ -70,16 +70,16 @@ def play(delay: int | None, lost: frozenset[int] = frozenset()) -> list[Frame]:
         by_rsu = detections_of(view, view.time, *(("Truck", "Incoming") if seen else ("Truck",)))
         by_ego = detections_of(view, view.time, "Truck")
         state = StationState(view.time, 42.2, -6.0, 0.0, 2.6, 0.0)
-        said[tick] = Message("RSU", tick, view.time, state, by_rsu, 200)
+        messages[tick] = Message("RSU", tick, view.time, state, by_rsu, 200)
         inbox: tuple[ReceivedMessage, ...] = ()
         links: tuple[LinkEvent, ...] = ()
         if delay is not None:
             sent = tick - delay
-            if sent in said and sent not in lost:
-                inbox = (ReceivedMessage(said[sent], view.time),)
-                known = known or len(said[sent].detections) == 2
+            if sent in messages and sent not in lost:
+                inbox = (ReceivedMessage(messages[sent], view.time),)
+                known = known or len(messages[sent].detections) == 2
             before = tick - 1
-            if before in said:
+            if before in messages:
                 gone = before in lost
                 links = (
                     LinkEvent(
@@ -98,7 +98,7 @@ def play(delay: int | None, lost: frozenset[int] = frozenset()) -> list[Frame]:
         )
         steps = {
             "Ego": AgentStep(by_ego, inbox, by_ego, plan, Control(brake=0.5 if known else 0.0), ()),
-            "RSU": AgentStep(by_rsu, (), by_rsu, None, None, (said[tick],)),
+            "RSU": AgentStep(by_rsu, (), by_rsu, None, None, (messages[tick],)),
         }
         frames.append(Frame(view, steps, (), links))
         ego_x += speed * DT

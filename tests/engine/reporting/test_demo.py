@@ -1,4 +1,4 @@
-"""The main job end to end, with one seed."""
+"""Demo with one seed, end to end."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, tuple[boo
     return out, printed.getvalue(), tuple(check.holds for table in tables for check in evaluate_claims(table)[:2])
 
 
-def test_cooperation_keeps_farther_away_than_none_and_than_late_messages(
+def test_demo_confirms_order_of_cooperation_none_and_latency(
     done: tuple[Path, str, tuple[bool, ...]],
 ) -> None:
     assert all(done[2])
 
 
-def test_both_tables_and_the_sentence_are_printed(done: tuple[Path, str, tuple[bool, ...]]) -> None:
+def test_demo_prints_both_tables_and_difference(done: tuple[Path, str, tuple[bool, ...]]) -> None:
     text = done[1]
     assert text.count("Table II") == 2
     assert text.count("no cooperation ") >= 4
@@ -35,21 +35,23 @@ def test_both_tables_and_the_sentence_are_printed(done: tuple[Path, str, tuple[b
     assert "14/14" in text
 
 
-def test_every_run_is_kept_as_json(done: tuple[Path, str, tuple[bool, ...]]) -> None:
+def test_demo_writes_every_run_as_json(done: tuple[Path, str, tuple[bool, ...]]) -> None:
     runs = json.loads(done[0].with_suffix(".json").read_text(encoding="utf-8"))
     assert {(run["scenario"], run["channel"]) for run in runs} == {(s, c) for s in SCENARIOS for c in run_settings()}
     assert all(len(run["trace_hash"]) >= 16 for run in runs)
 
 
-def test_the_page_has_camera_pictures_of_ego_and_helper(done: tuple[Path, str, tuple[bool, ...]]) -> None:
+def test_demo_page_contains_camera_images_of_ego_and_helper(done: tuple[Path, str, tuple[bool, ...]]) -> None:
     page = done[0].read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 4
-    assert "What RSU sees" in page
-    assert "What Spectator sees" in page
+    assert "View of RSU" in page
+    assert "View of Spectator" in page
 
 
 @pytest.mark.parametrize("arguments", [["--seeds", "0"], ["--workers", "0"], ["--sedes", "3"], ["--out", "demo.json"]])
-def test_wrong_arguments_are_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_main_with_invalid_arguments_ends_with_exit_code_2(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as ended:
         main(arguments)
     assert ended.value.code == 2

@@ -1,4 +1,4 @@
-"""The page of the demo, from tables and stories made by hand."""
+"""Page of the demo from synthetic tables and stories."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from eidrive_scenario.experiments.paper import (
 )
 from eidrive_scenario.experiments.statistics import wilson
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.demo_page import CameraPicture, DemoSite, _speed, write_demo
+from eidrive_scenario.reporting.demo_page import DemoSite, PageImage, _speed, write_demo
 from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 
@@ -56,37 +56,38 @@ def page(street: Callable[..., list[Frame]], tmp_path_factory: pytest.TempPathFa
         for variant in VARIANTS
         for arm in ARMS
     }
-    view = CameraPicture("What Ego sees", "a <truck>", b"\x89PNG")
-    place = DemoSite(RoadDrawing(lanes=(("driving", AREA),)), (AREA,), (view,))
+    view = PageImage("View of Ego", "a <truck>", b"\x89PNG")
+    site = DemoSite(RoadDrawing(lanes=(("driving", AREA),)), (AREA,), (view,))
     out = tmp_path_factory.mktemp("demo") / "reports" / "demo.html"
-    write_demo(out, table(LINKS), table(OWN), stories, dict.fromkeys(SCENARIOS, place), watched=1, footer="version 1")
+    write_demo(out, table(LINKS), table(OWN), stories, dict.fromkeys(SCENARIOS, site), watched=1, footer="version 1")
     return out.read_text(encoding="utf-8")
 
 
-def test_the_page_loads_nothing_from_elsewhere(page: str) -> None:
+def test_demo_page_has_no_external_resources(page: str) -> None:
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
     assert "<link" not in page
     assert "<script" not in page
     assert all(address.startswith(("#", "data:")) for address in re.findall(r'(?:href|src)="([^"]*)"', page))
 
 
-def test_every_arm_has_four_pictures_or_says_why_not(page: str) -> None:
+def test_demo_page_has_four_figures_or_reasons_per_arm(page: str) -> None:
     root = html.fromstring(page)
     strips = [strip for strip in root.iterfind(".//div[@class='strip']")]
     assert len(strips) == len(SCENARIOS) * len(VARIANTS) * len(ARMS)
     assert all(len(strip.findall("figure")) == 4 for strip in strips)
-    silent = [figure.text_content().strip() for figure in strips[0].iterfind("figure[@class='empty']")]
-    assert silent == ["Ego never brakes for it"]
+    empty = [figure.text_content().strip() for figure in strips[0].iterfind("figure[@class='empty']")]
+    assert empty == ["Ego never brakes"]
 
 
-def test_captions_tell_time_distance_and_speed(page: str) -> None:
+def test_demo_page_captions_state_time_distance_and_speed(page: str) -> None:
     captions = [caption.text_content() for caption in html.fromstring(page).iterfind(".//figcaption")]
     assert any(
-        re.fullmatch(r"Ego knows Incoming from RSU aloneat 1\.45 s, 26\.\d m between centers, .*", c) for c in captions
+        re.fullmatch(r"Ego receives Incoming only from RSUat 1\.45 s, 26\.\d m between centers, .*", c)
+        for c in captions
     )
 
 
-def test_tables_stand_beside_the_papers_numbers(page: str) -> None:
+def test_demo_page_tables_contain_published_values(page: str) -> None:
     rows = [
         [" ".join(cell.text_content().split()) for cell in row.iterfind("td")]
         for row in html.fromstring(page).iterfind(".//tbody/tr")
@@ -97,26 +98,26 @@ def test_tables_stand_beside_the_papers_numbers(page: str) -> None:
     ]
 
 
-def test_roads_are_drawn_once_for_each_scenario(page: str) -> None:
+def test_demo_page_draws_roads_once_per_scenario(page: str) -> None:
     for name in ("roads-coop-scenario-1", "roads-coop-scenario-2"):
         assert page.count(f'id="{name}"') == 1
         assert page.count(f'href="#{name}"') > 10
 
 
-def test_checks_the_sentence_and_a_chart_per_table_are_there(page: str) -> None:
+def test_demo_page_contains_checks_difference_and_charts(page: str) -> None:
     root = html.fromstring(page)
     assert len(root.findall(".//li[@class='holds']")) == 12
     assert "Delaying and dropping the ego's own detections" in root.text_content()
     assert len(root.findall(".//svg[@class='chart']")) == 4
 
 
-def test_camera_pictures_are_inside_and_their_captions_escaped(page: str) -> None:
+def test_demo_page_embeds_images_with_escaped_captions(page: str) -> None:
     assert page.count("data:image/png;base64,iVBORw==") == 2
     assert "a &lt;truck&gt;" in page
 
 
 @pytest.mark.parametrize(
-    ("speed", "words"), [(8.0, "at 29 km/h"), (-0.1, "at 0 km/h"), (-1.4, "thrown back at 5 km/h")]
+    ("speed", "text"), [(8.0, "at 29 km/h"), (-0.1, "at 0 km/h"), (-1.4, "moving backwards at 5 km/h")]
 )
-def test_a_car_that_was_hit_does_not_drive_at_less_than_nothing(speed: float, words: str) -> None:
-    assert _speed(speed) == words
+def test_speed_of_backward_motion_has_no_negative_number(speed: float, text: str) -> None:
+    assert _speed(speed) == text

@@ -1,4 +1,4 @@
-"""The decisive instants of a run, against the plain kinematics of conftest's street."""
+"""Key frames of a run, against the kinematics of the synthetic street of conftest."""
 
 from __future__ import annotations
 
@@ -49,21 +49,21 @@ def time_of(story: Story, kind: str) -> float:
     return snapshot.time
 
 
-def test_the_helper_sees_the_car_at_20_m(street: Play) -> None:
+def test_hidden_frame_is_first_detection_of_helper(street: Play) -> None:
     story = story_of(street(None))
     assert time_of(story, "hidden") == pytest.approx(1.40)
     assert story.moment("hidden").title == "RSU sees Incoming, Ego does not"
 
 
 @pytest.mark.parametrize("delay", [1, 3, 6])
-def test_the_ego_hears_of_it_as_many_ticks_later_as_the_message_takes(street: Play, delay: int) -> None:
+def test_heard_frame_follows_after_message_delay(street: Play, delay: int) -> None:
     story = story_of(street(delay))
     assert time_of(story, "heard") == pytest.approx(1.40 + 0.05 * delay)
     assert time_of(story, "braked") == time_of(story, "heard")
 
 
-def test_what_the_ego_sees_itself_is_not_hidden(street: Play) -> None:
-    """Until 1.00 s the ego sees the car too; the RSU sees it all the time."""
+def test_hidden_frame_requires_missing_detection_of_ego(street: Play) -> None:
+    """The ego detects the car until 1.00 s, and the RSU at all times."""
     frames = []
     for frame in street(None):
         seen = detections_of(frame.view, "Incoming")
@@ -77,12 +77,12 @@ def test_what_the_ego_sees_itself_is_not_hidden(street: Play) -> None:
     assert time_of(story_of(frames), "hidden") == pytest.approx(1.0)
 
 
-def test_lost_messages_put_it_off(street: Play) -> None:
+def test_heard_frame_is_delayed_by_lost_messages(street: Play) -> None:
     story = story_of(street(1, frozenset({28, 29, 30})))
     assert time_of(story, "heard") == pytest.approx(1.60)
 
 
-def test_without_a_channel_the_ego_does_not_brake(street: Play) -> None:
+def test_story_without_messages_has_no_braked_frame(street: Play) -> None:
     story = story_of(street(None))
     assert [(moment.kind, moment.snapshot is None) for moment in story.moments] == [
         ("hidden", False),
@@ -90,15 +90,15 @@ def test_without_a_channel_the_ego_does_not_brake(street: Play) -> None:
         ("braked", True),
         ("closest", False),
     ]
-    assert story.moment("braked").title == "Ego never brakes for it"
+    assert story.moment("braked").title == "Ego never brakes"
 
 
-def test_the_car_enters_the_area_when_its_center_does(street: Play) -> None:
+def test_entered_frame_depends_on_center_of_car(street: Play) -> None:
     """y = 39.5 - 14 t falls below 10.5 m after 2.071 s."""
     assert time_of(story_of(street(1)), "entered") == pytest.approx(2.10)
 
 
-def test_a_contact_that_the_world_reports_is_a_collision(street: Play) -> None:
+def test_closest_frame_of_contact_is_a_collision(street: Play) -> None:
     frames = street(1)
     blow = Contact("Ego", "Incoming", (0.0, 0.0, 0.0), 3.0)
     frames[50] = dataclasses.replace(frames[50], view=dataclasses.replace(frames[50].view, contacts=(blow,)))
@@ -107,14 +107,14 @@ def test_a_contact_that_the_world_reports_is_a_collision(street: Play) -> None:
     assert story_of(street(1)).touched is False
 
 
-def test_without_an_area_nothing_is_told_of_one(street: Play) -> None:
+def test_story_without_conflict_area_has_no_entered_frame(street: Play) -> None:
     observer = KeyFrames("Ego", "Incoming")
     for frame in street(1):
         observer.observe(frame)
     assert [moment.kind for moment in observer.story().moments] == ["heard", "braked", "closest"]
 
 
-def test_distances_over_time_are_those_of_centers_and_bodies(street: Play) -> None:
+def test_story_contains_distances_of_centers_and_bodies(street: Play) -> None:
     story = story_of(street(None))
     assert len(story.times) == len(story.centers) == len(story.boxes) == len(story.speeds) == 100
     assert story.centers[0] == pytest.approx(math.hypot(29.5, 39.5))
@@ -122,16 +122,16 @@ def test_distances_over_time_are_those_of_centers_and_bodies(street: Play) -> No
     assert story.boxes[0] == pytest.approx(math.hypot(*gap))
 
 
-def test_closest_is_the_smallest_gap_between_bodies(street: Play) -> None:
+def test_closest_frame_has_minimum_distance_of_bodies(street: Play) -> None:
     story = story_of(street(1))
     nearest = min(story.boxes)
     assert nearest > 0.0
     assert time_of(story, "closest") == story.times[story.boxes.index(nearest)]
-    assert story.moment("closest").title == f"closest, {nearest:.2f} m apart"
+    assert story.moment("closest").title == f"minimum distance, {nearest:.2f} m"
 
 
-def test_a_story_travels_between_processes(street: Play) -> None:
-    """Also where views hold cached things that do not, such as a read-only mapping of names."""
+def test_story_with_cached_view_values_is_picklable(street: Play) -> None:
+    """A view may cache values that cannot be pickled, such as a read-only mapping of names."""
     frames = street(1)
     for frame in frames:
         frame.view.__dict__["rows"] = MappingProxyType(dict(frame.view.rows))
@@ -140,8 +140,8 @@ def test_a_story_travels_between_processes(street: Play) -> None:
     assert story.moment("closest").snapshot.view.rows["Truck"] == 2
 
 
-def test_a_collision_is_shown_at_its_first_touch(street: Play) -> None:
-    """With the ego 7.5 m further on, the two meet."""
+def test_closest_frame_of_collision_is_first_contact(street: Play) -> None:
+    """With an offset of 7.5 m of the ego, the two cars collide."""
     further = np.array([[7.5, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     frames = [
         Frame(dataclasses.replace(frame.view, position=frame.view.position + further), frame.steps)

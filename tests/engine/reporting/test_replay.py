@@ -1,4 +1,4 @@
-"""Replays: the data of the page, and a page that loads nothing from elsewhere."""
+"""Replays: data of the page, and a page without external resources."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def recorded(frames: list[Frame], folder: Path) -> Path:
     return folder / "run.mcap"
 
 
-def test_data_holds_a_pose_per_frame_and_actor(street: Play) -> None:
+def test_replay_data_contains_pose_per_frame_and_actor(street: Play) -> None:
     data = replay_data(street(1))
     assert len(data["times"]) == len(data["poses"]) == 100
     assert data["times"][40] == 2.0
@@ -40,7 +40,7 @@ def test_data_holds_a_pose_per_frame_and_actor(street: Play) -> None:
     assert data["actors"]["Truck"] == {"category": "truck", "size": [8.47, 2.89]}
 
 
-def test_data_tells_own_boxes_from_heard_ones(street: Play) -> None:
+def test_replay_data_separates_own_and_received_boxes(street: Play) -> None:
     ego = replay_data(street(6))["stations"]["Ego"][40]
     assert ego["own"] == [[25.4, 5.6, 8.47, 2.89, -1.571]]
     assert sorted(box[:2] for box in ego["heard"]) == [[25.4, 5.6], [29.5, 15.7]]
@@ -48,7 +48,7 @@ def test_data_tells_own_boxes_from_heard_ones(street: Play) -> None:
     assert ego["plan"] == "conflict area"
 
 
-def test_data_states_existence_where_it_is_estimated(street: Play) -> None:
+def test_replay_data_contains_estimated_existence(street: Play) -> None:
     frame = street(6)[40]
     step = frame.steps["Ego"]
     seen = replace(step.detections, existence=np.full(len(step.detections), 0.876))
@@ -56,7 +56,7 @@ def test_data_states_existence_where_it_is_estimated(street: Play) -> None:
     assert ego["own"] == [[25.4, 5.6, 8.47, 2.89, -1.571, 0.88]]
 
 
-def test_a_station_that_comes_later_has_no_knowledge_before(street: Play) -> None:
+def test_replay_data_of_late_station_is_empty_before(street: Play) -> None:
     frames = street(1)
     late = [
         Frame(frame.view, {k: v for k, v in frame.steps.items() if k == "Ego"} if i < 5 else frame.steps)
@@ -68,7 +68,7 @@ def test_a_station_that_comes_later_has_no_knowledge_before(street: Play) -> Non
     assert rsu[5] is not None
 
 
-def test_changes_of_the_storyboard_are_listed(street: Play) -> None:
+def test_replay_data_lists_storyboard_transitions(street: Play) -> None:
     change = StateChange(
         0.0, "Go", "S/A/Go", "event", ElementState.STANDBY, ElementTransition.START, ElementState.RUNNING, "time > 0"
     )
@@ -77,7 +77,7 @@ def test_changes_of_the_storyboard_are_listed(street: Play) -> None:
     assert data["changes"] == [[0.0, "S/A/Go", "running", "time > 0"]]
 
 
-def test_the_page_holds_the_run_and_nothing_from_elsewhere(street: Play, tmp_path: Path) -> None:
+def test_replay_page_contains_run_without_external_resources(street: Play, tmp_path: Path) -> None:
     out = write_replay(read_recording(recorded(street(1), tmp_path)), tmp_path / "pages" / "run.html")
     text = out.read_text(encoding="utf-8")
     assert not re.search(r"(?:src|href)\s*=\s*[\"']?(?!#|data:)", text)
@@ -89,8 +89,8 @@ def test_the_page_holds_the_run_and_nothing_from_elsewhere(street: Play, tmp_pat
     assert "$EgoSpeed" in [term.text for term in root.iterfind(".//dt")]
 
 
-def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds no frame"):
+def test_replay_of_empty_recording_raises_input_error(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="contains no readable frame"):
         write_replay(read_recording(recorded([], tmp_path)), tmp_path / "run.html")
 
 
@@ -108,11 +108,11 @@ def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
         ("red", "red"),
     ],
 )
-def test_parameters_as_a_reader_wants_them(text: str, shown: str) -> None:
+def test_short_number_rounds_decimal_fractions_only(text: str, shown: str) -> None:
     assert short_number(text) == shown
 
 
-def test_where_nobody_is_a_station_nothing_speaks_of_stations(street: Play, tmp_path: Path) -> None:
+def test_replay_page_without_stations_hides_station_panels(street: Play, tmp_path: Path) -> None:
     hidden = ".stations { display: none; }"
     alone = [Frame(frame.view) for frame in street(1)]
     for frames, expected in ((street(1), False), (alone, True)):
@@ -121,7 +121,7 @@ def test_where_nobody_is_a_station_nothing_speaks_of_stations(street: Play, tmp_
 
 
 def test_page_size_counts_frames_before_a_station(street: Play, monkeypatch: pytest.MonkeyPatch) -> None:
-    """500 stations in the last of 100 frames have an entry for each frame: 50 000 in all."""
+    """500 stations in the last of 100 frames have one entry per frame, 50 000 in total."""
     frames = street(1)
     crowd = {f"S{number}": frames[-1].steps["RSU"] for number in range(500)}
     frames[-1] = replace(frames[-1], steps=crowd)
@@ -136,9 +136,9 @@ def test_page_size_counts_frames_before_a_station(street: Play, monkeypatch: pyt
 def test_replay_report_timeout_of_station_ends_received_boxes(
     street: Play, tmp_path: Path, timeout: object, last: int
 ) -> None:
-    """Messages are 1 tick late, and all from tick 30 on are lost: the last report was measured at tick 29.
+    """The message delay is 1 tick, and all messages from tick 30 are lost: the last report is from tick 29.
 
-    A timeout of 0.2 s is 4 ticks, so the report is used up to tick 33.
+    A timeout of 0.2 s is 4 ticks, so the report is used until tick 33.
     """
     settings = {"stations": {"Ego": {"report_timeout": timeout}}}
     recorder = Recorder(tmp_path / "run.mcap", metadata={"seed": "1", "settings": json.dumps(settings)})

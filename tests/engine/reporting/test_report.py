@@ -1,4 +1,4 @@
-"""The page over many results."""
+"""Report of many results."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def rows(page: Path) -> list[list[str]]:
     ]
 
 
-def test_the_overview_has_a_row_per_scenario_and_channel(tmp_path: Path) -> None:
+def test_report_overview_has_one_row_per_scenario_and_channel(tmp_path: Path) -> None:
     results = [result(seed, "ideal", True) for seed in (2, 1)] + [result(1, "none", False)]
     page = write_report(results, tmp_path)
     assert page == tmp_path / "report.html"
@@ -54,7 +54,7 @@ def test_the_overview_has_a_row_per_scenario_and_channel(tmp_path: Path) -> None
     assert overview[1] == ["coop/scenario_1", "none", "0/1", "0.00 … 0.79", "2.00 · 2.00"]
 
 
-def test_each_run_shows_its_verdict_and_reason(tmp_path: Path) -> None:
+def test_report_shows_verdict_and_reason_of_each_run(tmp_path: Path) -> None:
     page = write_report([result(3, "none", False), result(1, "none", True)], tmp_path / "page.html")
     assert page.name == "page.html"
     passed, failed = rows(page)[1:]
@@ -63,7 +63,7 @@ def test_each_run_shows_its_verdict_and_reason(tmp_path: Path) -> None:
     assert failed[5] == "Ego and <Incoming> came as near as 0.00 m at 3.10 s"
 
 
-def test_a_run_cut_off_by_its_time_limit_did_not_finish(tmp_path: Path) -> None:
+def test_report_counts_run_at_time_limit_as_unfinished(tmp_path: Path) -> None:
     page = write_report(
         [result(1, "none", False, end_reason="time limit", criteria=[]), result(2, "none", True)], tmp_path
     )
@@ -71,33 +71,33 @@ def test_a_run_cut_off_by_its_time_limit_did_not_finish(tmp_path: Path) -> None:
     assert text == "1 did not finish"
 
 
-def test_a_metric_that_is_null_is_left_out(tmp_path: Path) -> None:
+def test_report_omits_null_metrics(tmp_path: Path) -> None:
     results = [result(1, "ideal", True, metrics={"ttc": None}), result(2, "ideal", True, metrics={"ttc": 1.5})]
     assert rows(write_report(results, tmp_path))[0][-1] == "1.50 · 1.50"
 
 
-def test_what_is_no_result_is_refused(tmp_path: Path) -> None:
+def test_report_of_invalid_or_no_result_raises_input_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="result: 'scenario': field required"):
         write_report([{"seed": 1, "passed": True, "end": ""}], tmp_path)
     with pytest.raises(InputError, match="no result to report"):
         write_report([], tmp_path)
 
 
-def test_the_page_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
+def test_report_has_no_external_resources(tmp_path: Path) -> None:
     text = write_report([result(1, "ideal", True)], tmp_path).read_text(encoding="utf-8")
     assert "http" not in text
     assert "<link" not in text
     assert "src=" not in text
 
 
-def test_distances_come_first_and_instants_are_no_metrics(tmp_path: Path) -> None:
+def test_report_shows_distances_first_and_omits_times(tmp_path: Path) -> None:
     metrics = {"collision.time": 3.0, "collision.count": 1.0, "a": 1.0, "b": 2.0, "min_distance.A.B.box": 0.5, "c": 0.0}
     page = write_report([result(1, "ideal", False, metrics=metrics)], tmp_path)
     heads = [head.text for head in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//thead/tr/th")][4:8]
     assert heads == ["min_distance A B box [m]", "collision count", "a", "b"]
 
 
-def test_runs_of_a_distribution_are_told_apart_by_what_they_vary(tmp_path: Path) -> None:
+def test_report_of_distribution_shows_varied_parameters(tmp_path: Path) -> None:
     runs = [
         result(1, "none", True, run=number, parameters={"Speed": speed, "End": "3"})
         for number, speed in ((11, "30"), (2, "20"))
@@ -109,7 +109,7 @@ def test_runs_of_a_distribution_are_told_apart_by_what_they_vary(tmp_path: Path)
     assert "End" not in headings
 
 
-def test_metrics_have_the_units_of_their_criteria(tmp_path: Path) -> None:
+def test_report_metrics_have_units_of_criteria(tmp_path: Path) -> None:
     metrics = {"min_distance.Ego.Incoming.box": 1.0, "collision.impact_speed": 2.0, "collision.count": 1.0}
     text = write_report([result(1, "ideal", True, metrics=metrics)], tmp_path).read_text(encoding="utf-8")
     assert "min_distance Ego Incoming box [m]<br>" in text
@@ -117,7 +117,7 @@ def test_metrics_have_the_units_of_their_criteria(tmp_path: Path) -> None:
     assert "collision count<br>" in text
 
 
-def test_all_colors_of_a_page_have_one_for_the_dark() -> None:
+def test_style_defines_all_colors_for_both_schemes() -> None:
     templates = Path(reporting.__file__).parent / "templates"
     style = (templates / "style.css").read_text(encoding="utf-8")
     light, dark = re.findall(r":root \{(.*?)\}", style, re.DOTALL)[:2]

@@ -1,11 +1,11 @@
-"""Roads as drawings, against a straight and a curved road written by hand."""
+"""Drawings of a straight and a curved road."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from eidrive_scenario.reporting.drawing.road_drawing import road_drawing, thinned
+from eidrive_scenario.reporting.drawing.road_drawing import road_drawing, simplify_line
 from eidrive_scenario.reporting.drawing.top_view import Window
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.reading.document import parse_road_map
@@ -36,24 +36,24 @@ def roads(shape: bytes) -> list[Road]:
     return list(parse_road_map(ROAD.replace(b"{shape}", shape), "street.xodr").roads.values())
 
 
-def test_a_straight_lane_is_a_rectangle() -> None:
+def test_road_drawing_of_straight_lane_is_a_rectangle() -> None:
     drawing = road_drawing(roads(b"<line/>"))
     by_type = {kind: polygon for kind, polygon in drawing.lanes if kind == "sidewalk"}
     assert by_type["sidewalk"] == pytest.approx(np.array([[10, 1.5], [60, 1.5], [60, -0.5], [10, -0.5]]))
 
 
-def test_driving_lanes_cover_sidewalks() -> None:
+def test_road_drawing_orders_driving_lanes_after_sidewalks() -> None:
     assert [kind for kind, _ in road_drawing(roads(b"<line/>")).lanes] == ["sidewalk", "driving", "driving"]
 
 
-def test_markings_run_as_far_as_they_are_painted() -> None:
+def test_road_drawing_of_marks_ends_at_their_length() -> None:
     markings = {kind: line for kind, _, line in road_drawing(roads(b"<line/>")).markings}
     assert set(markings) == {"solid", "broken"}
     assert markings["broken"] == pytest.approx(np.array([[10, 5], [40, 5]]))
     assert markings["solid"] == pytest.approx(np.array([[10, 8.5], [60, 8.5]]))
 
 
-def test_a_curved_edge_stays_within_the_tolerance() -> None:
+def test_road_drawing_of_curved_edge_is_within_tolerance() -> None:
     """Curvature 0.02: the left lane's outer edge is a circle of radius 46.5 m about (10, 55)."""
     drawing = road_drawing(roads(b'<arc curvature="0.02"/>'))
     solid = next(line for kind, _, line in drawing.markings if kind == "solid")
@@ -64,18 +64,18 @@ def test_a_curved_edge_stays_within_the_tolerance() -> None:
     assert len(solid) < 40
 
 
-def test_only_what_reaches_into_the_window_is_drawn() -> None:
+def test_road_drawing_with_window_omits_lanes_outside() -> None:
     drawing = road_drawing(roads(b"<line/>"), Window(0, 20, 6.0, 20))
     assert [kind for kind, _ in drawing.lanes] == ["driving"]
     assert not road_drawing(roads(b"<line/>"), Window(100, 120, 0, 20)).lanes
 
 
-def test_thinning_keeps_corners_and_drops_points_on_lines() -> None:
+def test_simplify_line_keeps_corners_only() -> None:
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0, 2.0]])
-    assert thinned(corner) == pytest.approx(np.array([[0, 0], [2, 0], [2, 2]]))
-    assert len(thinned(corner[:2])) == 2
+    assert simplify_line(corner) == pytest.approx(np.array([[0, 0], [2, 0], [2, 2]]))
+    assert len(simplify_line(corner[:2])) == 2
 
 
-def test_thinning_a_closed_line_keeps_its_farthest_point() -> None:
+def test_simplify_line_of_closed_line_keeps_farthest_point() -> None:
     loop = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
-    assert thinned(loop) == pytest.approx(loop)
+    assert simplify_line(loop) == pytest.approx(loop)

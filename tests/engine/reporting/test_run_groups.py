@@ -1,4 +1,4 @@
-"""The report groups runs by the settings that differ, and shows the channel of each."""
+"""Groups of runs in a report, by differing settings, with the content of each channel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
 from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.recording.run_files import read_results
 from eidrive_scenario.reporting.run_report.report import write_report
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, reported
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 from eidrive_scenario.simulation import RunSettings
 
@@ -27,14 +27,14 @@ def run(seed: int = 1, **settings: Any) -> dict[str, Any]:
 
 
 def reports(*results: dict[str, Any]) -> list[ReportedRun]:
-    return [reported(result) for result in results]
+    return [parse_run(result) for result in results]
 
 
 def late(seconds: float) -> str:
     return f"{{delay: {{kind: constant, seconds: {seconds}}}}}"
 
 
-def test_groups_differ_by_channel_content_and_not_by_seed() -> None:
+def test_group_runs_separates_channel_contents_but_not_seeds() -> None:
     groups = group_runs(reports(*(run(seed, channel=late(delay)) for seed in (1, 2) for delay in (0.1, 0.2))))
     assert [(group.channel, group.differing) for group in groups] == [
         ("custom", {"channel.delay.seconds": "0.1"}),
@@ -53,14 +53,14 @@ def test_groups_differ_by_channel_content_and_not_by_seed() -> None:
         ({"weather": "storm"}, {"weather": ("null", "storm")}),
     ],
 )
-def test_groups_state_the_setting_that_differs(changes: dict[str, Any], differing: dict[str, tuple[str, str]]) -> None:
+def test_group_runs_states_differing_setting(changes: dict[str, Any], differing: dict[str, tuple[str, str]]) -> None:
     groups = group_runs(reports(run(), run(**changes)))
     assert len(groups) == 2
     for name, values in differing.items():
         assert {group.differing.get(name, "") for group in groups} == set(values)
 
 
-def test_a_scenario_file_that_changed_makes_another_group() -> None:
+def test_group_runs_separates_changed_scenario_files() -> None:
     first, second = run(), run()
     second["settings"]["files"][0]["sha256"] = "f" * 64
     groups = group_runs(reports(first, second))
@@ -70,7 +70,7 @@ def test_a_scenario_file_that_changed_makes_another_group() -> None:
     }
 
 
-def test_a_result_in_two_folders_counts_once_and_is_listed_twice(tmp_path: Path) -> None:
+def test_report_counts_copied_result_once(tmp_path: Path) -> None:
     one = run()
     page = write_report([one, dict(one), run(seed=2)], tmp_path).read_text(encoding="utf-8")
     tree = html.fromstring(page)
@@ -80,7 +80,7 @@ def test_a_result_in_two_folders_counts_once_and_is_listed_twice(tmp_path: Path)
     assert tree.findtext(".//p[@class='lead']").startswith("2 runs: ")
 
 
-def test_the_page_holds_channel_content_settings_and_command_of_each_run(tmp_path: Path) -> None:
+def test_report_contains_channel_settings_and_command_of_each_run(tmp_path: Path) -> None:
     page = write_report([run(channel=late(0.1)), run(channel=late(0.25))], tmp_path).read_text(encoding="utf-8")
     text = html.fromstring(page).text_content()
     assert "channel.delay.seconds: 0.1" in text
@@ -89,7 +89,7 @@ def test_the_page_holds_channel_content_settings_and_command_of_each_run(tmp_pat
     assert '"sha256"' in text
 
 
-def test_names_do_not_become_markup(tmp_path: Path) -> None:
+def test_report_escapes_names(tmp_path: Path) -> None:
     attack = "<img src=x onerror=alert(1)>"
     one = run()
     one |= {"scenario": attack, "channel": attack, "command": attack, "end_reason": attack}
@@ -100,7 +100,7 @@ def test_names_do_not_become_markup(tmp_path: Path) -> None:
     assert "<img" not in page
 
 
-def test_odd_values_of_a_result_are_no_internal_error(tmp_path: Path) -> None:
+def test_report_of_unusual_values_is_written(tmp_path: Path) -> None:
     for changes in (
         {"settings": {"stations": [[1]], "parameters": 3, "drawn": 5, "files": [1, {"x": 2}], "channel_profile": "x"}},
         {"metrics": {"a": 1e308, "b": float("nan")}, "settings": {}},
@@ -122,7 +122,7 @@ def test_odd_values_of_a_result_are_no_internal_error(tmp_path: Path) -> None:
     ],
     ids=["deep", "rather deep", "long number", "many values", "no UTF-8", "null"],
 )
-def test_a_hostile_result_is_an_input_error(tmp_path: Path, text: str, message: str) -> None:
+def test_read_results_of_hostile_file_raises_input_error(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "result.json").write_text(text, encoding="latin-1")
     with pytest.raises(InputError, match=message):
         read_results([tmp_path])

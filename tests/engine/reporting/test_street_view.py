@@ -1,4 +1,4 @@
-"""Camera pictures of a recorded instant."""
+"""Camera images of a recorded view."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from eidrive_scenario.reporting.drawing.street_view import (
     driver_view,
     helper_view,
     look_at,
-    street_picture,
+    street_image,
 )
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -28,7 +28,7 @@ def body(name: str, shape: str, size: tuple[float, float, float], color: tuple[f
     return ActorSpec(name, shape, "car", size, (0.0, 0.0, 0.0), color=color)
 
 
-def test_look_at_is_a_rotation_that_points_there_with_down_below() -> None:
+def test_look_at_returns_upright_rotation_towards_target() -> None:
     pose = look_at((1.0, 2.0, 3.0), (5.0, 2.0, 0.0))
     rotation = pose[:3, :3]
     assert rotation.T @ rotation == pytest.approx(np.eye(3))
@@ -39,21 +39,21 @@ def test_look_at_is_a_rotation_that_points_there_with_down_below() -> None:
     assert pose[:3, 3] == pytest.approx([1.0, 2.0, 3.0])
 
 
-def test_a_driver_looks_along_the_heading(street: Play) -> None:
+def test_driver_view_is_along_heading(street: Play) -> None:
     view = street(None)[0].view
     forward = driver_view(view, "Incoming")[:3, 2]
     assert forward[:2] == pytest.approx([0.0, -1.0], abs=0.01)
 
 
-def test_a_helper_looks_at_its_target(street: Play) -> None:
+def test_helper_view_is_towards_target(street: Play) -> None:
     view = street(None)[0].view
     pose = helper_view(view, "RSU", "Incoming")
     assert pose[:3, 3] == pytest.approx([42.2, -6.0, 3.1])
-    way = view.centers[1] - pose[:3, 3]
-    assert pose[:3, 2] == pytest.approx(way / np.linalg.norm(way))
+    offset = view.centers[1] - pose[:3, 3]
+    assert pose[:3, 2] == pytest.approx(offset / np.linalg.norm(offset))
 
 
-def test_the_picture_shows_the_target_and_not_who_takes_it(street: Play) -> None:
+def test_street_image_shows_target_without_camera_actor(street: Play) -> None:
     view = street(None)[50].view
     bodies = {
         "Ego": body("Ego", "car", (4.892, 1.837, 1.49), (0.8, 0.0, 0.0)),
@@ -61,9 +61,9 @@ def test_the_picture_shows_the_target_and_not_who_takes_it(street: Play) -> None
         "Truck": body("Truck", "truck", (8.468, 2.891, 3.827), (0.0, 0.0, 0.8)),
         "RSU": body("RSU", "rsu", (0.4, 0.4, 3.0), (0.5, 0.5, 0.5)),
     }
-    png = street_picture(bodies, None, view, helper_view(view, "RSU", "Incoming"), without="RSU", fov=30.0)
-    picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
-    assert picture is not None
-    assert picture.shape == (HEIGHT, WIDTH, 3)
-    blue, green, red = np.moveaxis(picture[200:340, 380:580].astype(int), -1, 0)
+    png = street_image(bodies, None, view, helper_view(view, "RSU", "Incoming"), without="RSU", fov=30.0)
+    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None
+    assert image.shape == (HEIGHT, WIDTH, 3)
+    blue, green, red = np.moveaxis(image[200:340, 380:580].astype(int), -1, 0)
     assert np.mean((green > red + 25) & (green > blue + 25)) > 0.02

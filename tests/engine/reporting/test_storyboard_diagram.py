@@ -1,16 +1,17 @@
-"""The picture of a storyboard: every element in its column, nothing on top of anything else, arrows to who waits."""
+"""Storyboard diagram: columns of elements, boxes without overlap, arrows to dependent elements."""
 
 from itertools import combinations
 from pathlib import Path
 
 import pytest
 from lxml import etree
+from matplotlib.font_manager import findfont, get_font
 
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.reporting.storyboard_diagram.boxes import Role, init_boxes, stop_lines, story_boxes
-from eidrive_scenario.reporting.storyboard_diagram.layout import DiagramLayout, layout_diagram
-from eidrive_scenario.reporting.storyboard_diagram.picture import storyboard_picture, write_storyboard_picture
-from eidrive_scenario.reporting.storyboard_diagram.text_width import broken, width_of
+from eidrive_scenario.reporting.storyboard_diagram.boxes import BoxLine, Role, init_boxes, stop_lines, story_boxes
+from eidrive_scenario.reporting.storyboard_diagram.diagram import storyboard_diagram, write_storyboard_diagram
+from eidrive_scenario.reporting.storyboard_diagram.layout import DiagramLayout, layout_diagram, text_lines
+from eidrive_scenario.reporting.storyboard_diagram.text_width import width_of, wrap_text
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 HEAD = """<OpenSCENARIO>
@@ -67,11 +68,11 @@ CHAIN = act(
 
 @pytest.fixture
 def layout() -> DiagramLayout:
-    """Two acts; in the first, events that wait for each other."""
+    """Return a layout of two acts; events of the first act depend on each other."""
     return layout_diagram(story_boxes(storyboard(CHAIN, act("two", event("x"), event("y", count=3)))), 10.0, 20.0)
 
 
-def test_what_stands_in_the_boxes() -> None:
+def test_story_boxes_contain_triggers_and_actions() -> None:
     (story,) = story_boxes(storyboard(CHAIN))
     (one,) = story.children
     (group,) = one.children
@@ -85,18 +86,18 @@ def test_what_stands_in_the_boxes() -> None:
     assert [child.title for child in c.children] == ["c action"]
 
 
-def test_who_waits_for_whom() -> None:
+def test_story_boxes_contain_dependencies() -> None:
     (story,) = story_boxes(storyboard(CHAIN))
     waits = {box.title: [path[-1] for path in box.waits_for] for box in story.walk() if box.kind == "event"}
     assert waits == {"a": [], "b": ["a"], "c": ["a", "b"], "d": ["c"]}
 
 
-def test_remarks() -> None:
+def test_story_boxes_contain_priority_and_limit() -> None:
     (story,) = story_boxes(storyboard(act("two", event("y", count=3))))
     assert [box.remark for box in story.walk() if box.kind == "event"] == ["parallel, up to 3 times"]
 
 
-def test_no_box_covers_another(layout: DiagramLayout) -> None:
+def test_layout_boxes_do_not_overlap(layout: DiagramLayout) -> None:
     boxes = [box for story in layout.stories for box in story.walk()]
     assert len(boxes) == 1 + 2 + 2 + 2 + 6 + 6
     for one, other in combinations(boxes, 2):
@@ -106,16 +107,16 @@ def test_no_box_covers_another(layout: DiagramLayout) -> None:
     assert max(box.y + box.height for box in boxes) < layout.height
 
 
-def test_children_stand_right_of_their_parents_and_begin_at_their_height(layout: DiagramLayout) -> None:
+def test_layout_children_are_right_of_parents_at_equal_height(layout: DiagramLayout) -> None:
     for story in layout.stories:
         for box in story.walk():
             assert all(child.x > box.x + box.width for child in box.children)
             assert not box.children or box.children[0].y == box.y
 
 
-def test_arrows_that_run_side_by_side_have_lanes_of_their_own(layout: DiagramLayout) -> None:
-    ways = [(arrow.source.box.title, arrow.target.box.title) for arrow in layout.arrows]
-    assert sorted(ways) == [("a", "b"), ("a", "c"), ("b", "c"), ("c", "d")]
+def test_layout_parallel_arrows_have_separate_lanes(layout: DiagramLayout) -> None:
+    pairs = [(arrow.source.box.title, arrow.target.box.title) for arrow in layout.arrows]
+    assert sorted(pairs) == [("a", "b"), ("a", "c"), ("b", "c"), ("c", "d")]
     for one, other in combinations(layout.arrows, 2):
         if one.lane == other.lane:
             spans = sorted(sorted((arrow.source.y, arrow.target.y)) for arrow in (one, other))
@@ -125,29 +126,29 @@ def test_arrows_that_run_side_by_side_have_lanes_of_their_own(layout: DiagramLay
     assert all(group < arrow.lane < events for arrow in layout.arrows)
 
 
-def test_the_text_of_a_line_fits_into_its_box(layout: DiagramLayout) -> None:
+def test_layout_lines_fit_into_boxes(layout: DiagramLayout) -> None:
     for story in layout.stories:
         for box in story.walk():
             for line in box.lines:
                 assert line.indent + width_of(line.text, 11.5) <= box.width - 20
 
 
-def test_the_picture_names_everything_and_is_well_formed(tmp_path: Path) -> None:
+def test_storyboard_diagram_is_well_formed_and_complete(tmp_path: Path) -> None:
     made = storyboard(CHAIN, stop=f"<StopTrigger><ConditionGroup>{TIME}</ConditionGroup></StopTrigger>")
-    path = write_storyboard_picture(made, tmp_path / "new" / "tree.svg")
+    path = write_storyboard_diagram(made, tmp_path / "new" / "tree.svg")
     root = etree.parse(path).getroot()
     texts = ["".join(node.itertext()) for node in root.iter("{*}text")]
     for name in ("story <1>", "one", "one group", "a", "b", "c", "d", "a action", "The run stops when"):
         assert name in texts
     assert len(root.findall(".//{*}g[@class='arrow']")) == 4
-    assert storyboard_picture(made) == storyboard_picture(made)
+    assert storyboard_diagram(made) == storyboard_diagram(made)
 
 
-def test_a_run_without_stop_trigger() -> None:
+def test_stop_lines_without_stop_trigger_state_end_of_stories() -> None:
     assert [(line.lead, line.text) for line in stop_lines(storyboard(CHAIN))] == [("when", "every story has ended")]
 
 
-def test_init_has_a_card_for_everyone() -> None:
+def test_init_boxes_contain_one_box_per_entity() -> None:
     path = Path(__file__).parents[2] / "data" / "passing_by.xosc"
     cards = init_boxes(Storyboard(load_scenario(path), None, dt=0.1))
     assert [card.title for card in cards] == ["global actions", "Ego", "Parked"]
@@ -155,19 +156,29 @@ def test_init_has_a_card_for_everyone() -> None:
 
 
 @pytest.mark.parametrize("width", [20.0, 60.0, 400.0])
-def test_broken_lines_keep_all_letters_and_the_width(width: float) -> None:
+def test_wrap_text_keeps_letters_within_width(width: float) -> None:
     text = "Ego: time headway to TheVehicleThatCutsIn_2 ≥ 0.7 s becomes true"
-    lines = broken(text, width, 12)
+    lines = wrap_text(text, width, 12)
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")
     assert all(width_of(line, 12) <= width for line in lines)
 
 
-def test_long_words_are_cut_where_their_parts_begin() -> None:
-    assert broken("CutInAndBrakeStory", 100, 13) == ["CutInAndBrake", "Story"]
+@pytest.mark.parametrize("lead", ["The run stops when", "stops when", "maneuver", "or when", "when", "and"])
+def test_text_lines_indent_exceeds_width_of_bold_lead(lead: str) -> None:
+    """The leading word is drawn bold; DejaVu Sans Bold is wider than Helvetica Bold."""
+    font = get_font(findfont("DejaVu Sans:bold"))
+    font.set_size(11.5, 72)
+    font.set_text(lead)
+    (line,) = text_lines([BoxLine(Role.STOP, lead, "x")], 500.0)
+    assert line.indent > font.get_width_height()[0] / 64.0
 
 
-def test_broken_long_word_is_cut_in_short_time() -> None:
-    """A name of 100 000 letters; with lower-case letters only, all lines but the last have the same length."""
-    lines = broken("x" * 100_000, 300.0, 12.0)
+def test_wrap_text_splits_long_words_at_their_parts() -> None:
+    assert wrap_text("CutInAndBrakeStory", 100, 13) == ["CutInAndBrake", "Story"]
+
+
+def test_wrap_text_of_very_long_word_takes_linear_time() -> None:
+    """All lines but the last of a word of 100 000 equal letters have the same length."""
+    lines = wrap_text("x" * 100_000, 300.0, 12.0)
     assert "".join(lines) == "x" * 100_000
     assert {len(line) for line in lines[:-1]} == {int(300.0 / width_of("x", 12.0))}

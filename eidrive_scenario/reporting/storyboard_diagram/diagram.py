@@ -1,4 +1,4 @@
-"""A storyboard as a picture: who does what when, and what waits for what."""
+"""Storyboard diagram as SVG: elements, actors, triggers, actions, and dependencies between elements."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from eidrive_scenario.storyboard.storyboard import Storyboard
 
 MARGIN = 28.0
 INK, MUTED, WIRE = "#1e293b", "#64748b", "#cbd5e1"
-ROLES = {Role.START: "#15803d", Role.STOP: "#b91c1c", Role.WHO: "#475569", Role.WHAT: "#475569"}
+ROLES = {Role.START: "#15803d", Role.STOP: "#b91c1c", Role.ACTORS: "#475569", Role.CONTENT: "#475569"}
 KINDS = {
     "init": ("Init", "#94a3b8"),
     "story": ("Story", "#64748b"),
@@ -40,15 +40,15 @@ KINDS = {
 ARROWS = ("#b45309", "#0369a1", "#be185d", "#4d7c0f", "#7c3aed", "#0f766e")
 
 
-def write_storyboard_picture(storyboard: Storyboard, out: Path) -> Path:
-    """Draw a storyboard into an SVG file. Raise SettingError if it cannot be written. Returns `out`."""
+def write_storyboard_diagram(storyboard: Storyboard, out: Path) -> Path:
+    """Draw a storyboard to an SVG file and return `out`. Raise SettingError if the file cannot be written."""
     with create(out) as stream:
-        stream.write(storyboard_picture(storyboard).encode())
+        stream.write(storyboard_diagram(storyboard).encode())
     return out
 
 
-def storyboard_picture(storyboard: Storyboard) -> str:
-    """The SVG of a storyboard: Init on top, then a column for each level, arrows from what is waited for."""
+def storyboard_diagram(storyboard: Storyboard) -> str:
+    """Return the SVG of a storyboard: Init at the top, one column per level, and arrows to dependent elements."""
     stories = story_boxes(storyboard)
     width = max(layout_diagram(stories, MARGIN, 0.0).width, MARGIN + 3 * INIT_WIDTH + 2 * GAP)
     head, y = _head(storyboard, width)
@@ -96,7 +96,7 @@ def _head(storyboard: Storyboard, width: float) -> tuple[list[str], float]:
 
 
 def _init(storyboard: Storyboard, y: float, width: float) -> tuple[list[str], float]:
-    """Cards of what Init does, side by side in rows."""
+    """Draw the boxes of Init in rows, and return them with the lower end of the last row [px]."""
     boxes = init_boxes(storyboard)
     if not boxes:
         return [], y
@@ -119,9 +119,9 @@ def _columns(layout: DiagramLayout, y: float) -> Iterator[str]:
 def _box(placed: Placed) -> list[str]:
     name, color = KINDS[placed.box.kind]
     x, y, width, height = placed.x, placed.y, placed.width, placed.height
-    where = " / ".join(placed.box.path)
+    path = " / ".join(placed.box.path)
     parts = [
-        f"<g><title>{escape(f'{name}: {where}')}</title>",
+        f"<g><title>{escape(f'{name}: {path}')}</title>",
         f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="5" fill="{color}" '
         f'fill-opacity="0.07" stroke="{color}" stroke-opacity="0.45"/>',
         f'<path d="M{x + 1.5:.1f} {y + 4:.1f}v{height - 8:.1f}" stroke="{color}" stroke-width="3"/>',
@@ -139,7 +139,7 @@ def _box(placed: Placed) -> list[str]:
 
 def _line(x: float, y: float, line: TextLine) -> str:
     color = ROLES[line.source.role]
-    text = _text(x + line.indent, y, line.text, weight=600 if line.source.role is Role.WHO else 400)
+    text = _text(x + line.indent, y, line.text, weight=600 if line.source.role is Role.ACTORS else 400)
     return (_text(x, y, line.lead, color=color, weight=600) if line.lead else "") + text
 
 
@@ -148,25 +148,25 @@ def _wire(parent: Placed, child: Placed) -> str:
     y0, y1 = parent.middle, child.middle
     bend = x0 + 12.0
     if abs(y1 - y0) < 0.5:
-        way = f"M{x0:.1f} {y0:.1f}H{x1:.1f}"
+        curve = f"M{x0:.1f} {y0:.1f}H{x1:.1f}"
     else:
-        way = f"M{x0:.1f} {y0:.1f}H{bend - 5:.1f}q5 0 5 5V{y1 - 5:.1f}q0 5 5 5H{x1:.1f}"
-    return f'<path d="{way}" fill="none" stroke="{WIRE}" stroke-width="1.5"/>'
+        curve = f"M{x0:.1f} {y0:.1f}H{bend - 5:.1f}q5 0 5 5V{y1 - 5:.1f}q0 5 5 5H{x1:.1f}"
+    return f'<path d="{curve}" fill="none" stroke="{WIRE}" stroke-width="1.5"/>'
 
 
 def _arrow(arrow: Arrow, color: str) -> str:
-    """Out of the source's lower left, along its lane, into the first line of the target's trigger."""
+    """Draw an arrow from the lower left of the source, along its lane, to the first trigger line of the target."""
     source, target = arrow.source, arrow.target
     y0 = source.y + source.height - 9.0
     y1 = target.middle + LEADING + 4.0 if target.lines else target.middle + 6.0
     turn = 6.0 if y1 > y0 else -6.0
-    way = (
+    curve = (
         f"M{source.x:.1f} {y0:.1f}H{arrow.lane + 6:.1f}q-6 0 -6 {turn:.1f}V{y1 - turn:.1f}q0 {turn:.1f} 6 {turn:.1f}"
         f"H{target.x:.1f}"
     )
-    words = f"{target.box.title} waits for {source.box.title}"
+    title = f"{target.box.title} depends on {source.box.title}"
     return (
-        f'<g class="arrow"><title>{escape(words)}</title><path d="{way}" fill="none" stroke="{color}" '
+        f'<g class="arrow"><title>{escape(title)}</title><path d="{curve}" fill="none" stroke="{color}" '
         f'marker-end="url(#tip)"/><circle cx="{source.x:.1f}" cy="{y0:.1f}" r="2.6" fill="{color}"/></g>'
     )
 

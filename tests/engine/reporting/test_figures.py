@@ -1,4 +1,4 @@
-"""The commands that draw pictures: what is written, and wrong places and names."""
+"""Commands that draw figures: output files, and errors of paths and names."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from matplotlib.figure import Figure
 from eidrive_scenario.reporting import trends, weather_sheet
 
 
-def test_the_sheet_has_a_row_for_each_weather(tmp_path: Path) -> None:
+def test_weather_sheet_has_one_row_per_weather(tmp_path: Path) -> None:
     out = tmp_path / "new" / "sheet.png"
     weather_sheet.write(out, ["storm", "sunny"])
-    picture = cv2.imread(str(out))
-    assert picture is not None
-    assert picture.shape == (2 * (360 + 30), 2 * 640, 3)
+    image = cv2.imread(str(out))
+    assert image is not None
+    assert image.shape == (2 * (360 + 30), 2 * 640, 3)
 
 
-def test_a_long_caption_leaves_room_for_the_title() -> None:
+def test_weather_sheet_caption_does_not_overlap_title() -> None:
     bare = np.zeros((4, 640, 3), dtype=np.uint8)
-    title = weather_sheet._captioned(bare, "storm: car", "")
-    both = weather_sheet._captioned(bare, "storm: car", "visual range 4000 m, " * 6)
+    title = weather_sheet._add_caption(bare, "storm: car", "")
+    both = weather_sheet._add_caption(bare, "storm: car", "visual range 4000 m, " * 6)
     end = int(np.flatnonzero((title[:30, :600] < 200).any(axis=(0, 2)))[-1])
     dark = np.flatnonzero((both[:30] < 200).any(axis=(0, 2)))
     assert not ((dark > end) & (dark <= end + 12)).any()
 
 
 @pytest.mark.parametrize("weather", [["sunnny"], ["sunny"]])
-def test_wrong_weather_and_wrong_places_are_told(
+def test_weather_sheet_of_invalid_name_or_path_ends_with_exit_code_2(
     tmp_path: Path, weather: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(typer.Exit) as ended:
@@ -40,7 +40,7 @@ def test_wrong_weather_and_wrong_places_are_told(
     assert ("did you mean 'sunny'?" if weather == ["sunnny"] else "Is a directory") in capsys.readouterr().err
 
 
-def test_trends_are_drawn_or_the_place_is_told(
+def test_trends_writes_figures_or_reports_unwritable_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(trends, "FIGURES", {"empty": Figure})
