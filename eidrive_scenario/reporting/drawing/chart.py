@@ -118,7 +118,7 @@ def _draw_names(axes: Axes, ends: Sequence[tuple[float, float, ChartSeries]]) ->
 
 
 def _inline_svg(figure: Figure, title: str) -> str:
-    """Return a figure as an SVG element that inherits colors and fonts of the page and has no ids of its own groups."""
+    """Return a figure as an SVG element with the colors and fonts of the page, and without ids of its groups."""
     buffer = io.StringIO()
     without_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     figure.savefig(buffer, format="svg", transparent=True, metadata=without_metadata)

@@ -56,7 +56,7 @@ def test_hidden_frame_is_first_detection_of_helper(street: Play) -> None:
 
 
 @pytest.mark.parametrize("delay", [1, 3, 6])
-def test_heard_frame_follows_after_message_delay(street: Play, delay: int) -> None:
+def test_reception_frame_follows_after_message_delay(street: Play, delay: int) -> None:
     story = story_of(street(delay))
     assert time_of(story, "heard") == pytest.approx(1.40 + 0.05 * delay)
     assert time_of(story, "braked") == time_of(story, "heard")
@@ -77,7 +77,7 @@ def test_hidden_frame_requires_missing_detection_of_ego(street: Play) -> None:
     assert time_of(story_of(frames), "hidden") == pytest.approx(1.0)
 
 
-def test_heard_frame_is_delayed_by_lost_messages(street: Play) -> None:
+def test_reception_frame_is_delayed_by_lost_messages(street: Play) -> None:
     story = story_of(street(1, frozenset({28, 29, 30})))
     assert time_of(story, "heard") == pytest.approx(1.60)
 
