@@ -19,6 +19,7 @@ from eidrive_scenario.evaluation.criterion import Criterion, Verdict
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import Registry
+from eidrive_scenario.settings import load_yaml
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
@@ -89,11 +90,10 @@ def test_build_criteria_of_one_declaration_twice_returns_independent_criteria() 
 def test_run_parses_each_criterion_command_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The library scenario declares its criteria in commands of Init, which are executed before the first tick."""
     texts: list[str] = []
-    load = criteria_parser.load_yaml
 
     def counted(text: str, **given: object) -> object:
         texts.append(text)
-        return load(text, **given)  # type: ignore[arg-type]
+        return load_yaml(text, **given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(criteria_parser, "load_yaml", counted)
     with Simulation("coop/scenario_1") as simulation:

@@ -199,9 +199,9 @@ def _forged(path: Path, source: Path, change: Callable[[bytes], bytes]) -> Path:
                     tick, text = int.from_bytes(message[2:6], "little"), change(message[22:])
                     writer.add_message(channel, tick, text, tick, sequence=tick)
                     seal.add_frame(tick, tick, text)
-        writer.flush()
+        writer.flush()  # type: ignore[no-untyped-call]
         writer.add_metadata("end", seal.entries())
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return path
 
 

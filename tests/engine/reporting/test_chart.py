@@ -54,16 +54,16 @@ def test_line_chart_ticks_are_round_numbers(
 
 
 def test_line_chart_of_full_range_spans_axes() -> None:
-    numbers = [
-        float(number) for number in re.findall(r"[\d.]+", path_of(chart(ChartSeries("a", "#123456", *2 * [(0, 8)]))))
-    ]
+    path = path_of(chart(ChartSeries("one", "#123456", (0.0, 8.0), (0.0, 8.0))))
     left, right, top, bottom = (
         72 * WIDTH * LEFT,
         72 * WIDTH * RIGHT,
         72 * HEIGHT * (1 - TOP),
         72 * HEIGHT * (1 - BOTTOM),
     )
-    assert numbers == pytest.approx([left, bottom, right, top], abs=0.01)
+    assert [float(number) for number in re.findall(r"[\d.]+", path)] == pytest.approx(
+        [left, bottom, right, top], abs=0.01
+    )
 
 
 def test_line_chart_interrupts_line_outside_range() -> None:

@@ -84,7 +84,7 @@ def test_replay_page_contains_run_without_external_resources(street: Play, tmp_p
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
     root = html.fromstring(text)
     assert root.findtext(".//h1") == "street <1>, seed 7"
-    data = json.loads(root.findtext(".//script[@id='data']"))
+    data = json.loads(root.findtext(".//script[@id='data']") or "")
     assert len(data["times"]) == 100
     assert "$EgoSpeed" in [term.text for term in root.iterfind(".//dt")]
 
@@ -146,6 +146,6 @@ def test_replay_report_timeout_of_station_ends_received_boxes(
         recorder.observe(frame)
     recorder.close()
     page = write_replay(read_recording(tmp_path / "run.mcap"), tmp_path / "replay.html").read_text(encoding="utf-8")
-    data = json.loads(html.fromstring(page).findtext(".//script[@id='data']"))
+    data = json.loads(html.fromstring(page).findtext(".//script[@id='data']") or "")
     heard = [tick for tick, ego in enumerate(data["stations"]["Ego"]) if ego["heard"]]
     assert heard[-1] == last

@@ -40,7 +40,7 @@ def result(seed: int, channel: str, passed: bool, **changes: Any) -> dict[str, A
 
 def rows(page: Path) -> list[list[str]]:
     return [
-        [" ".join(cell.text_content().split()) for cell in row.iterfind("td")]
+        [" ".join(str(cell.xpath("string()")).split()) for cell in row.iterfind("td")]
         for row in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//tbody/tr")
     ]
 

@@ -137,7 +137,7 @@ def test_storyboard_diagram_is_well_formed_and_complete(tmp_path: Path) -> None:
     made = storyboard(CHAIN, stop=f"<StopTrigger><ConditionGroup>{TIME}</ConditionGroup></StopTrigger>")
     path = write_storyboard_diagram(made, tmp_path / "new" / "tree.svg")
     root = etree.parse(path).getroot()
-    texts = ["".join(node.itertext()) for node in root.iter("{*}text")]
+    texts = [str(node.xpath("string()")) for node in root.iter("{*}text")]
     for name in ("story <1>", "one", "one group", "a", "b", "c", "d", "a action", "The run stops when"):
         assert name in texts
     assert len(root.findall(".//{*}g[@class='arrow']")) == 4
