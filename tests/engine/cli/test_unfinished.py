@@ -18,14 +18,14 @@ Eidrive = Callable[..., Result]
 
 
 def break_at(monkeypatch: pytest.MonkeyPatch, instant: float, error: BaseException) -> None:
-    usual = Simulation._end
+    usual = Simulation._end_reason
 
     def end(simulation: Simulation, frame: Frame) -> str | None:
         if frame.view.time >= instant - 1e-9:
             raise error
         return usual(simulation, frame)
 
-    monkeypatch.setattr(Simulation, "_end", end)
+    monkeypatch.setattr(Simulation, "_end_reason", end)
 
 
 def names(folder: Path) -> list[str]:

@@ -272,7 +272,7 @@ def test_error_of_run_has_notes_with_command_and_recording(tmp_path: Path, monke
     def fail(*_: object) -> None:
         raise ZeroDivisionError("physics")
 
-    monkeypatch.setattr(Simulation, "_end", fail)
+    monkeypatch.setattr(Simulation, "_end_reason", fail)
     with pytest.raises(ZeroDivisionError) as raised:
         run(tmp_path)
     notes = raised.value.__notes__
