@@ -1,4 +1,4 @@
-"""Makes the modules of this folder importable in the folders below, and shares fixtures with them."""
+"""Import path and shared fixtures of the engine tests."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The folder of the installed package of faulty extensions."""
+    """Install the package of faulty extensions and return its folder."""
     from faulty_extensions import BROKEN_MODULES, install
 
     from eidrive_scenario.registry import registry
