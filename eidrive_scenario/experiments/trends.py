@@ -106,9 +106,9 @@ def precision_by_delay(
 def reception_by_distance(distances: Sequence[float], *, truck: bool, messages: int = 300) -> Curve:
     """Return the packet reception ratio between two antennas at 1.5 m on a highway, with or without a firetruck.
 
-    The truck is a body in the world, which rays detect. Each message has independent shadowing.The expected value is
-    the probability of a signal above -85 dBm, times the packet success ratio at that power. Random losses are shadowing
-    (3 dB) and, behind the truck, blockage (TR 37.885, lognormal).
+    The truck is a body in the world, which rays detect. Each message has independent shadowing. The expected
+    value is the probability of a signal above -85 dBm, times the packet success ratio at that power. Random losses are
+    shadowing (3 dB) and, behind the truck, blockage (TR 37.885, lognormal).
     """
     profile = RadioProfile.model_validate({"path_loss": {"kind": "tr37885", "environment": "highway"}, "jitter": 0.0})
     measured = []
