@@ -1,4 +1,4 @@
-"""What a station perceives: boxes of objects, as arrays; made by detectors, carried by messages, joined by fusion."""
+"""Perceived objects as arrays of boxes: produced by detectors, transmitted in messages, combined by fusion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
 
 NOT_ESTIMATED: Array = np.empty(0)
-"""Existence of objects that no tracker and no fusion has judged."""
+"""Existence of objects for which no tracker and no fusion method has estimated it."""
 NOT_ESTIMATED.flags.writeable = False
 
 CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
@@ -27,8 +27,8 @@ class Detections:
     classes     (N,) names out of CLASSES
     velocity    (N, 2) world frame [m/s], NaN where unknown
     covariance  (N, 2, 2) of the position x y [m²], NaN where unknown
-    tracks      numbers of the tracks (N,), the same for one object over time; empty where nobody tracks
-    existence   (N,) probability that there is such an object, in [0, 1]; empty (0,) if it is not estimated
+    tracks      (N,) track numbers, constant over time for one object; empty without a tracker
+    existence   (N,) probability of existence in [0, 1]; empty (0,) if it is not estimated
     """
 
     time: float
@@ -59,14 +59,14 @@ class Detections:
 
     @property
     def confidence(self) -> Array:
-        """(N,) probability of existence if it is estimated, else the scores."""
+        """Return the probability of existence (N,) if it is estimated, else the scores."""
         return self.existence if len(self.existence) else self.scores
 
     def __len__(self) -> int:
         return len(self.boxes)
 
     def subset(self, rows: Sequence[int]) -> Detections:
-        """These rows only, in the order given."""
+        """Return these rows, in the given order."""
         picked = np.array(rows, dtype=np.intp)
         return Detections(
             self.time,

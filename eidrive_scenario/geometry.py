@@ -1,8 +1,8 @@
 """Plane and solid geometry of oriented boxes: corners, overlap, distance, intersection over union.
 
 A box is seven numbers `x y z l w h yaw`: center, length, width, height [m] and heading [rad]; it stands upright.
-All of it is exact up to rounding. The functions for two single boxes work on plain floats, as a handful of actors does
-not pay for numpy; those for arrays broadcast.
+All results are exact up to rounding. The functions for two single boxes use plain floats, which are faster than numpy
+for a few actors; those for arrays broadcast.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ def wrap_angle(angle: float) -> float: ...
 @overload
 def wrap_angle(angle: Array) -> Array: ...
 def wrap_angle(angle: Any) -> Any:
-    """The same angle in (-pi, pi] [rad]; a float or an array."""
+    """Return the equivalent angle in (-pi, pi] [rad]; a float or an array."""
     if isinstance(angle, np.ndarray):
         return np.pi - (np.pi - angle) % (2 * np.pi)
     return math.pi - (math.pi - angle) % (2 * math.pi)
 
 
 def rotation_matrix(yaw: Any, pitch: Any = 0.0, roll: Any = 0.0) -> Array:
-    """(..., 3, 3) rotations that take the body's axes to the world's: yaw, then pitch, then roll (z-y'-x'')."""
+    """Return rotations (..., 3, 3) from the body frame to the world frame: yaw, then pitch, then roll (z-y'-x'')."""
     yaw, pitch, roll = np.broadcast_arrays(yaw, pitch, roll)
     cy, sy, cp, sp, cr, sr = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
     rows = [
@@ -45,7 +45,7 @@ def rotation_matrix(yaw: Any, pitch: Any = 0.0, roll: Any = 0.0) -> Array:
 
 
 def footprint(boxes: Array) -> Array:
-    """(..., 4, 2) corners seen from above, counter-clockwise from the front left, of boxes (..., 7)."""
+    """Return the corners (..., 4, 2) of boxes (..., 7) in the plane, counter-clockwise from the front left."""
     boxes = np.asarray(boxes, dtype=float)
     local = _CORNERS * boxes[..., None, 3:5]
     cos, sin = np.cos(boxes[..., 6:7]), np.sin(boxes[..., 6:7])
@@ -54,7 +54,7 @@ def footprint(boxes: Array) -> Array:
 
 
 def box_corners(boxes: Array) -> Array:
-    """(..., 8, 3) corners of boxes (..., 7): the four of the bottom as in `footprint`, then the four of the top."""
+    """Return the corners (..., 8, 3) of boxes (..., 7): bottom ones in the order of `footprint`, then top ones."""
     boxes = np.asarray(boxes, dtype=float)
     plan = footprint(boxes)
     bottom, top = boxes[..., 2:3] - boxes[..., 5:6] / 2, boxes[..., 2:3] + boxes[..., 5:6] / 2
@@ -63,7 +63,7 @@ def box_corners(boxes: Array) -> Array:
 
 
 def box_distance(a: Box, b: Box) -> float:
-    """Distance between two boxes (7,) [m]; 0 where they touch or overlap."""
+    """Return the distance between two boxes (7,) [m]; 0 if they touch or overlap."""
     a, b = _plain(a), _plain(b)
     gap = max(abs(a[2] - b[2]) - (a[5] + b[5]) / 2, 0.0)
     plan = footprint_distance(a, b)
@@ -71,7 +71,7 @@ def box_distance(a: Box, b: Box) -> float:
 
 
 def footprint_distance(a: Box, b: Box) -> float:
-    """Distance between two boxes (7,) seen from above [m]; 0 where they touch or overlap."""
+    """Return the distance between the footprints of two boxes (7,) [m]; 0 if they touch or overlap."""
     a, b = _plain(a), _plain(b)
     dx, dy = b[0] - a[0], b[1] - a[1]
     cos_a, sin_a, cos_b, sin_b = math.cos(a[6]), math.sin(a[6]), math.cos(b[6]), math.sin(b[6])
@@ -86,7 +86,7 @@ def footprint_distance(a: Box, b: Box) -> float:
 
 
 def overlap(a: Box, b: Box) -> bool:
-    """Whether two boxes (7,) share a point, heights included. Separating axes (Gottschalk et al., OBBTree, 1996)."""
+    """Whether two boxes (7,) share a point in 3D, by separating axes (Gottschalk et al., OBBTree, 1996)."""
     a, b = _plain(a), _plain(b)
     if abs(a[2] - b[2]) > (a[5] + b[5]) / 2:
         return False
@@ -95,14 +95,14 @@ def overlap(a: Box, b: Box) -> bool:
 
 
 def boxes_distance(a: Array, b: Array) -> Array:
-    """(...) distances between boxes (..., 7) and (..., 7), broadcast [m]; 0 where they touch or overlap."""
+    """Return distances (...) between boxes (..., 7), broadcast [m]; 0 where they touch or overlap."""
     a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
     gap = np.maximum(np.abs(a[..., 2] - b[..., 2]) - (a[..., 5] + b[..., 5]) / 2, 0.0)
     return np.hypot(_footprints_distance(a, b), gap)
 
 
 def iou_bev(a: Array, b: Array) -> Array:
-    """(N, M) intersection over union, seen from above, of boxes (N, 7) and (M, 7)."""
+    """Return the intersection over union (N, M) of the footprints of boxes (N, 7) and (M, 7)."""
     a, b = np.reshape(a, (-1, 7)), np.reshape(b, (-1, 7))
     shared = _intersection_area(footprint(a)[:, None], b[None, :])
     area_a, area_b = a[:, 3] * a[:, 4], b[:, 3] * b[:, 4]
@@ -111,7 +111,7 @@ def iou_bev(a: Array, b: Array) -> Array:
 
 
 def points_in_polygon(points: Array, polygon: Array) -> NDArray[np.bool_]:
-    """(...) whether points (..., 2) lie inside a polygon (M, 2), convex or not, by the even-odd rule."""
+    """Return whether points (..., 2) are inside a polygon (M, 2) by the even-odd rule; it need not be convex."""
     points, polygon = np.asarray(points, dtype=float), np.asarray(polygon, dtype=float)
     x, y = points[..., 0:1], points[..., 1:2]
     x0, y0 = polygon[:, 0], polygon[:, 1]
@@ -123,7 +123,7 @@ def points_in_polygon(points: Array, polygon: Array) -> NDArray[np.bool_]:
 
 
 def points_in_box(points: Array, box: Box) -> NDArray[np.bool_]:
-    """(...) whether points (..., 3) lie inside a box (7,), its surface included."""
+    """Return whether points (..., 3) are inside a box (7,) or on its surface."""
     x, y, z, length, width, height, yaw = _plain(box)
     offset = np.asarray(points, dtype=float) - (x, y, z)
     along = math.cos(yaw) * offset[..., 0] + math.sin(yaw) * offset[..., 1]
@@ -157,8 +157,10 @@ def _plan_overlap(
 def _nearest_corner(
     a: Sequence[float], b: Sequence[float], dx: float, dy: float, ca: float, sa: float, cb: float, sb: float
 ) -> float:
-    """Square of the distance from rectangle a to the nearest corner of b; between disjoint rectangles the shortest
-    connection ends at a corner of one of them."""
+    """Return the squared distance from rectangle a to the nearest corner of b [m²].
+
+    The shortest connection between disjoint rectangles ends at a corner of one of them.
+    """
     x, y = dx * ca + dy * sa, dy * ca - dx * sa
     cos, sin = ca * cb + sa * sb, ca * sb - sa * cb
     lx, ly, wx, wy = cos * b[3] / 2, sin * b[3] / 2, -sin * b[4] / 2, cos * b[4] / 2
@@ -187,7 +189,7 @@ def _footprints_distance(a: Array, b: Array) -> Array:
 
 
 def _in_frame(points: Array, box: Array) -> Array:
-    """Points (..., K, 2) in the frame of boxes (..., 7): x along, y to the left, from the center."""
+    """Transform points (..., K, 2) to the frames of boxes (..., 7): origin at the center, x forward, y left."""
     offset = points - box[..., None, 0:2]
     cos, sin = np.cos(box[..., 6:7]), np.sin(box[..., 6:7])
     along = cos * offset[..., 0] + sin * offset[..., 1]
@@ -195,11 +197,11 @@ def _in_frame(points: Array, box: Array) -> Array:
 
 
 def _intersection_area(polygon: Array, boxes: Array) -> Array:
-    """Area shared by polygons (..., 4, 2), counter-clockwise, and boxes (..., 7).
+    """Return the intersection area of polygons (..., 4, 2), counter-clockwise, and boxes (..., 7) [m²].
 
     Green's theorem: the area is the integral of clamp(x, -l/2, l/2) dy along the part of the outline with |y| <= w/2,
-    in the frame of the box. Each edge is cut where an integrand has a kink, so the trapezoidal rule is exact; and the
-    sum is continuous in its input, unlike a list of crossing points, so that edges which coincide do no harm.
+    in the frame of the box. Each edge is divided where the integrand has a kink, so the trapezoidal rule is exact. The
+    sum is continuous in its input, unlike a list of crossing points, so coinciding edges cause no error.
     """
     start = _in_frame(polygon, boxes)
     edge = np.roll(start, -1, axis=-2) - start

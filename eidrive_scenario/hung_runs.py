@@ -1,6 +1,6 @@
-"""Reports of runs and checks that cannot be interrupted.
+"""Error reports of runs and checks that cannot be interrupted.
 
-They are made from the frame of a thread, or from the stack that faulthandler wrote.
+The source is the frame of a thread, or the stack that faulthandler wrote.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.simulation.attribution import wall_limit_error
 from eidrive_scenario.wall_limit import Limit
 
-_MODULES = ("simulation.py", "inspection.py")
-"""Modules in the stack of the thread of a run or a check."""
+_MODULES = ("simulation.py", "scenario_checks.py", "distribution_checks.py")
+"""Modules in the stack of the thread of a run or a check, but of no other thread."""
 _DUMPED = re.compile(r'^  File "(.+)", line (\d+) in (.+)$', re.MULTILINE)
 
 
 def describe_hung_run(limit: Limit, frame: FrameType | None) -> WallLimitError:
-    """Return the error of a run that executes this frame, and close what its observers write."""
+    """Return the error of a run that executes this frame, and close the files of its observers."""
     for one, _ in traceback.walk_stack(frame):
         simulation = one.f_locals.get("self")
         if isinstance(simulation, Simulation) and hasattr(simulation, "world"):
@@ -48,7 +48,7 @@ def describe_dump(limit: float, dump: str) -> WallLimitError:
 
 
 def _extensions_at(file: str, line: int) -> Iterator[tuple[str, str, str]]:
-    """The extensions of third parties whose class contains a line; without one, those of the module."""
+    """Yield third-party extensions whose class contains a line; if there is none, those of the module."""
     of_module = []
     for group in GROUPS:
         known = registry(group)
@@ -74,7 +74,7 @@ def _file_of(module: str) -> str:
 
 @cache
 def _lines_of(file: str) -> dict[str, range]:
-    """The lines of each class of a module."""
+    """Return the line range of each class of a module."""
     try:
         tree = ast.parse(Path(file).read_bytes())
     except (OSError, SyntaxError, ValueError):

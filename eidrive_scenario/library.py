@@ -1,4 +1,4 @@
-"""The library of scenarios, channel profiles and weather presets that travels with the engine."""
+"""Library of scenarios, channel profiles and weather presets that is distributed with the engine."""
 
 from __future__ import annotations
 
@@ -14,16 +14,19 @@ Kind = Literal["channels", "weather"]
 Definition = Literal["scenario", "catalog", "distribution", "roads", "unreadable", "other"]
 
 _SUFFIX = ".xosc"
-_LARGEST = 256 * MIB
-_LOOKED_AT = 100_000
-"""Elements of a file within which it is told what the file defines."""
+_MAX_BYTES = 256 * MIB
+_MAX_ELEMENTS = 100_000
+"""Maximum number of elements that are read to determine the definition of a file."""
 
 LIBRARY_FOLDER = "eidrive_library"
-"""First part of the paths by which scenario files of any folder name what lies in the library."""
+"""First part of the paths with which scenario files in any folder refer to the library."""
 
 
 def library_path() -> Path:
-    """The library's folder: package data of an installed wheel, `xosc` in a checkout. Raises SettingError."""
+    """Return the folder of the library: package data of an installed wheel, `xosc` in a checkout.
+
+    Raise SettingError if there is none.
+    """
     package = Path(__file__).parent
     for folder in (package / "library", package.parent / "xosc"):
         if folder.is_dir():
@@ -32,7 +35,7 @@ def library_path() -> Path:
 
 
 def scenarios() -> list[str]:
-    """Names of the library's scenarios, such as `coop/scenario_1`, sorted."""
+    """Return the sorted names of the scenarios in the library, such as `coop/scenario_1`."""
     root = library_path()
     return sorted(
         path.relative_to(root).with_suffix("").as_posix()
@@ -42,13 +45,13 @@ def scenarios() -> list[str]:
 
 
 def resolve_scenario(name: str | Path) -> Path:
-    """The file of a scenario given by path or by library name; a file wins over a library's scenario of that name.
+    """Return the file of a scenario given by path or by library name; a path takes precedence.
 
-    Raises SettingError, with the nearest name, if there is neither.
+    Raise SettingError with the most similar name if neither exists.
     """
     path = Path(name)
     if is_regular_file(path):
-        _check_letters(path)
+        _check_encoding(path)
         return path
     inside = _inside(path)
     if inside is not None:
@@ -60,7 +63,7 @@ def resolve_scenario(name: str | Path) -> Path:
 
 
 def from_library(name: str | Path) -> Path:
-    """The file of the library's scenario of that name; the path itself if it is a file or no such name."""
+    """Return the file of a library scenario; the path itself if it is a file or not a name of the library."""
     path = Path(name)
     return path if is_regular_file(path) else _inside(path) or path
 
@@ -76,10 +79,10 @@ def _inside(path: Path) -> Path | None:
 
 
 def place_of(path: str | Path, folder: Path) -> Path:
-    """The place of a path that a file in `folder` names.
+    """Return the location of a path that a file in `folder` specifies.
 
-    A path that begins with `eidrive_library/` is that of a copy of the library beside the file; without such a copy it
-    leads into the library itself, never out of it. Any other path counts from the folder.
+    A path that begins with `eidrive_library/` is resolved in a copy of the library in that folder; without a copy, in
+    the library itself, never outside of it. Any other path is relative to the folder.
     """
     named = Path(path)
     beside = folder / named
@@ -90,7 +93,7 @@ def place_of(path: str | Path, folder: Path) -> Path:
 
 
 def name_of(path: Path) -> str:
-    """The library's name of a scenario file, such as `coop/scenario_1`; the file's own name for any other."""
+    """Return the library name of a scenario file, such as `coop/scenario_1`; the stem of any other file."""
     try:
         return absolute(path).relative_to(absolute(library_path())).with_suffix("").as_posix()
     except ValueError:
@@ -98,12 +101,15 @@ def name_of(path: Path) -> str:
 
 
 def names(kind: Kind) -> list[str]:
-    """Names of the library's channel profiles or weather presets, sorted."""
+    """Return the sorted names of the channel profiles or weather presets in the library."""
     return sorted(path.stem for path in (library_path() / kind).glob("*.yaml"))
 
 
 def resolve(kind: Kind, name: str | Path) -> Path:
-    """The file of a channel profile or weather preset given by path or name. Raises SettingError, with the nearest."""
+    """Return the file of a channel profile or weather preset given by path or name.
+
+    Raise SettingError with the most similar name if neither exists.
+    """
     path = Path(name)
     if is_regular_file(path):
         return path
@@ -115,20 +121,22 @@ def resolve(kind: Kind, name: str | Path) -> Path:
     raise SettingError(Diagnostic(f"no {singular} {quoted(str(name))}: neither a file nor in the library", hint))
 
 
-def _check_letters(path: Path) -> None:
-    """Raises SettingError for a path with bytes that are no letters: neither XML nor JSON could name it."""
+def _check_encoding(path: Path) -> None:
+    """Raise SettingError for a path that is not valid text: neither XML nor JSON could contain it."""
     try:
         str(path).encode()
     except UnicodeEncodeError:
         shown = os.fsencode(path).decode(errors="backslashreplace")
         hint = "rename it, or set a locale with UTF-8, such as LANG=C.UTF-8"
-        raise SettingError(Diagnostic("the name has bytes that are no letters here", hint, shown)) from None
+        raise SettingError(
+            Diagnostic("the name has bytes that are not valid in the encoding of the locale", hint, shown)
+        ) from None
 
 
 def definition(path: Path) -> Definition:
-    """What an OpenSCENARIO file defines, by its first elements, read without entities and network.
+    """Return the definition of an OpenSCENARIO file by its first elements, read without entities and network.
 
-    `roads` is OpenDRIVE, `other` any other XML; `unreadable` is no XML before that could be told.
+    `roads` is OpenDRIVE, `other` any other XML; `unreadable` is a file that is not XML up to the deciding element.
     """
     kinds: dict[str, Definition] = {
         "Catalog": "catalog",
@@ -139,15 +147,15 @@ def definition(path: Path) -> Definition:
     }
     found: list[Definition] = []
 
-    def visit(depth: int, word: str) -> bool:
-        if depth == 1 and word != "OpenSCENARIO":
-            found.append("roads" if word == "OpenDRIVE" else "other")
-        elif depth == 2 and word in kinds:
-            found.append(kinds[word])
+    def visit(depth: int, tag: str) -> bool:
+        if depth == 1 and tag != "OpenSCENARIO":
+            found.append("roads" if tag == "OpenDRIVE" else "other")
+        elif depth == 2 and tag in kinds:
+            found.append(kinds[tag])
         return bool(found)
 
     try:
-        content = read_regular_file(path, _LARGEST)
-        return found[0] if first_elements(content, _LOOKED_AT, visit) else "scenario"
+        content = read_regular_file(path, _MAX_BYTES)
+        return found[0] if first_elements(content, _MAX_ELEMENTS, visit) else "scenario"
     except (OSError, ValueError):
         return "unreadable"

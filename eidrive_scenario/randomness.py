@@ -1,7 +1,7 @@
-"""Random numbers that depend on what they are for, not on who drew before.
+"""Random numbers that depend on their purpose, not on the draws before them.
 
-Every consumer asks for a generator keyed by (seed, consumer, …). Turning one fault on never shifts another's draws,
-and the order of the agents in a list does not matter.
+Every consumer uses a generator keyed by (seed, consumer, …). Enabling one fault model does not shift the draws of
+another one, and the order of the agents in a list does not matter.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 
 
 def generator(seed: int, *key: str | int) -> np.random.Generator:
-    """A counter-based generator (Philox 4x64-10) for this seed and key, the same in every process.
+    """Return the counter-based generator (Philox 4x64-10) of this seed and key, the same in every process.
 
-    The key is hashed with BLAKE2b, as Python's own `hash` differs between processes.
+    The key is hashed with BLAKE2b, as the `hash` of Python differs between processes.
     """
     text = "\x1f".join([str(seed), *(f"{type(part).__name__}:{part}" for part in key)])
     digest = hashlib.blake2b(text.encode(), digest_size=16).digest()

@@ -1,4 +1,4 @@
-"""Records that cannot be changed and are made in each tick: frozen dataclasses with a quick initialiser."""
+"""Immutable records that are created in every tick: frozen dataclasses with a fast initializer."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ T = TypeVar("T")
 
 
 def fast_frozen(record: type[T]) -> type[T]:
-    """Give a frozen dataclass an initialiser that sets all fields at once, in half the time.
+    """Replace the initializer of a frozen dataclass by one that sets all fields in a single step, in half the time.
 
-    That of `dataclasses` sets them one by one past the lock, with a call for each. All else stays as it is: order,
-    defaults, `__post_init__`, and that nobody can change a field. Every field must be a parameter, and the class
-    without `__slots__`.
+    The initializer of `dataclasses` calls `object.__setattr__` once per field. Order, defaults, `__post_init__` and
+    immutability are preserved. Every field must be a parameter, and the class must not have `__slots__`.
     """
     own = fields(record)  # type: ignore[arg-type]
     signature = inspect.signature(record)
     if tuple(signature.parameters) != tuple(entry.name for entry in own):
-        raise TypeError(f"{record.__name__} has fields that are no parameters")
+        raise TypeError(f"{record.__name__} has fields that are not parameters")
     names: dict[str, Any] = {}
     parameters, values = [], []
     for entry in own:
@@ -37,19 +36,19 @@ def fast_frozen(record: type[T]) -> type[T]:
     lines = [f"def __init__(self, {', '.join(parameters)}):", f"    self.__dict__.update({{{', '.join(values)}}})"]
     if hasattr(record, "__post_init__"):
         lines.append("    self.__post_init__()")
-    made: dict[str, Any] = {}
-    exec("\n".join(lines), names, made)
-    initialiser = made["__init__"]
-    initialiser.__signature__ = inspect.signature(record.__init__)
-    initialiser.__qualname__ = f"{record.__qualname__}.__init__"
-    record.__init__ = initialiser  # type: ignore[method-assign]
+    defined: dict[str, Any] = {}
+    exec("\n".join(lines), names, defined)
+    initializer = defined["__init__"]
+    initializer.__signature__ = inspect.signature(record.__init__)
+    initializer.__qualname__ = f"{record.__qualname__}.__init__"
+    record.__init__ = initializer  # type: ignore[method-assign]
     return record
 
 
 def replaced(record: T, **changes: Any) -> T:
-    """Return a copy of a record of `fast_frozen` with other values of some fields.
+    """Return a copy of a record of `fast_frozen` with new values of some fields.
 
-    As `dataclasses.replace` in a fraction of its time: names are not checked, and `__post_init__` is not called.
+    Faster than `dataclasses.replace`: names are not checked, and `__post_init__` is not called.
     """
     copy = object.__new__(type(record))
     copy.__dict__.update(record.__dict__)

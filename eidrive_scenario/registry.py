@@ -1,4 +1,4 @@
-"""Extensions by name: the built-in ones come through the same entry points as a third party's package."""
+"""Registry of extensions by name; built-in and third-party ones are found through the same entry points."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _SINGULAR = {
 }
 _BUILT_IN = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
 _loaded: dict[type, tuple[str, str, str]] = {}
-"""Kind, name and value of the entry point of each extension that was loaded."""
+"""Kind, name and value of the entry point of each loaded extension."""
 
 
 class Registry:
-    """The extensions of one kind, found by their entry points `eidrive_scenario.<kind>`.
+    """Extensions of one kind, found by their entry points `eidrive_scenario.<kind>`.
 
-    Raises RegistryError if two of them claim one name; an extension is imported when it is first asked for.
+    An extension is imported on its first use. Raise RegistryError if two extensions have the same name.
     """
 
     def __init__(self, kind: str, found: list[EntryPoint] | None = None) -> None:
@@ -60,11 +60,11 @@ class Registry:
         return iter(sorted(self._points))
 
     def value(self, name: str) -> str:
-        """The module and object behind a name, as `package.module:Object`."""
+        """Return module and object of an extension as `package.module:Object`."""
         return self._points[name].value
 
     def distribution(self, name: str) -> str | None:
-        """Package, version and entry point of an extension; None for a built-in one, or where there is none."""
+        """Return package, version and entry point of an extension; None if it is built-in or unknown."""
         point = self._points.get(name)
         if point is None or point.value.split(".")[0].split(":")[0] in _BUILT_IN:
             return None
@@ -72,48 +72,49 @@ class Registry:
         return f"{package} ({point.value})"
 
     def load(self, name: str, base: type | None = None) -> Any:
-        """The extension of that name, a class derived from `base`.
+        """Return the extension of that name, a class derived from `base`.
 
-        Raises SettingError if there is none. Raises RegistryError if it does not import, is no such class, leaves out
-        a method that its base class asks for, or defines one that cannot be called in the same way.
+        Raise SettingError if there is none. Raise RegistryError if it does not import, is not derived from `base`,
+        lacks an abstract method of its base class, or defines one with an incompatible signature.
         """
         point = self._points.get(name)
         if point is None:
             what = self.kind.removesuffix("s")
             raise SettingError(Diagnostic(f"unknown {what} {name!r}", suggestion(name, self._points)))
-        found = self._import(point)
-        if found in _checked.get((self.kind, name, base), ()):
-            return found
+        extension = self._import(point)
+        if extension in _checked.get((self.kind, name, base), ()):
+            return extension
         described = f"{self.kind} {name!r} ({point.value})"
-        if base is not None and not (isinstance(found, type) and issubclass(found, base)):
-            what = found.__name__ if isinstance(found, type) else f"an object of type {type(found).__name__}"
-            raise RegistryError(f"{described} is no class derived from {base.__name__} (got {what})")
-        if inspect.isabstract(found):
-            missing = ", ".join(sorted(found.__abstractmethods__))
+        if base is not None and not (isinstance(extension, type) and issubclass(extension, base)):
+            got = extension.__name__ if isinstance(extension, type) else f"an object of type {type(extension).__name__}"
+            raise RegistryError(f"{described} is not a class derived from {base.__name__} (got {got})")
+        if inspect.isabstract(extension):
+            missing = ", ".join(sorted(extension.__abstractmethods__))
             raise RegistryError(f"{described} lacks {missing}")
-        if isinstance(found, type):
-            for diagnostic in _mismatches(found):
-                raise RegistryError(f"{described}: {diagnostic}")
-            _loaded.setdefault(found, (singular(self.kind), name, point.value))
-            _checked[self.kind, name, base] = (found,)
-        return found
+        if isinstance(extension, type):
+            for mismatch in _signature_mismatches(extension):
+                raise RegistryError(f"{described}: {mismatch}")
+            _loaded.setdefault(extension, (singular(self.kind), name, point.value))
+            _checked[self.kind, name, base] = (extension,)
+        return extension
 
     def _import(self, point: EntryPoint) -> Any:
         try:
             return point.load()
         except (Exception, SystemExit) as error:
-            place = _raised_at(error)
+            location = _raised_at(error)
             text = str(error) if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {error}"
             described = f"{self.kind} {point.name!r} ({point.value})"
-            raise RegistryError(f"{described} does not load: {text}{f' ({place})' if place else ''}") from error
+            raise RegistryError(f"{described} does not load: {text}{f' ({location})' if location else ''}") from error
 
 
 _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
+"""Extensions that passed all checks, by kind, name and base class."""
 
 
 @cache
 def registry(kind: str) -> Registry:
-    """The registry of one kind, read once per process."""
+    """Return the registry of one kind; it is read once per process."""
     return Registry(kind)
 
 
@@ -124,14 +125,14 @@ def distributions(used: Iterable[tuple[str, str]]) -> dict[str, str]:
 
 
 def singular(kind: str) -> str:
-    """Return what one extension of a kind is called."""
+    """Return the noun for one extension of a kind, such as `detector`."""
     return _SINGULAR.get(kind, kind.removesuffix("s"))
 
 
-def construct(extension_class: Any, *given: Any, **named: Any) -> Any:
+def construct(extension_class: Any, *arguments: Any, **keywords: Any) -> Any:
     """Return an instance of an extension. Raise InvalidResult if its constructor does not take these arguments."""
     try:
-        return extension_class(*given, **named)
+        return extension_class(*arguments, **keywords)
     except TypeError as error:
         if error.__traceback__ is not None and error.__traceback__.tb_next is None:
             raise InvalidResult(extension_class, "__init__", f"cannot be called: TypeError: {error}") from error
@@ -139,7 +140,7 @@ def construct(extension_class: Any, *given: Any, **named: Any) -> Any:
 
 
 def third_party_files() -> dict[str, dict[str, tuple[str, str, str]]]:
-    """Return kind, name and value of the loaded extensions of others, by file and qualified name of their classes."""
+    """Return kind, name and value of loaded third-party extensions, by file and qualified name of their classes."""
     found: dict[str, dict[str, tuple[str, str, str]]] = {}
     for extension_class, known in _loaded.items():
         file = getattr(sys.modules.get(extension_class.__module__), "__file__", None)
@@ -161,10 +162,10 @@ def is_built_in(extension_class: type) -> bool:
     return extension_class.__module__.partition(".")[0] in _BUILT_IN
 
 
-def _mismatches(found: type) -> Iterator[str]:
-    """Methods of a third party's class that cannot be called as those of this project that they override."""
-    bases = [one for one in found.__mro__ if is_built_in(one)]
-    for own_class in found.__mro__:
+def _signature_mismatches(extension_class: type) -> Iterator[str]:
+    """Yield methods of a third-party class that cannot be called like the methods that they override."""
+    bases = [one for one in extension_class.__mro__ if is_built_in(one)]
+    for own_class in extension_class.__mro__:
         if own_class in bases:
             continue
         for name, own in vars(own_class).items():
@@ -176,12 +177,12 @@ def _mismatches(found: type) -> Iterator[str]:
                 yield f"{name} is an object of type {type(plain).__name__} (expected a method)"
             elif inspect.isgeneratorfunction(plain) or inspect.iscoroutinefunction(plain):
                 yield f"{name} is a generator or coroutine (expected a method that returns its result)"
-            elif diagnostic := _signature_problem(own, plain, expected):
-                yield f"{name}{diagnostic}"
+            elif difference := _signature_difference(own, plain, expected):
+                yield f"{name}{difference}"
 
 
-def _signature_problem(own: Any, plain: Any, expected: Any) -> str:
-    """How the signature of a method differs from that of its base class, so that a call fails; "" if it does not."""
+def _signature_difference(own: Any, plain: Any, expected: Any) -> str:
+    """Return why a call of a method with the signature of its base class fails; "" if it succeeds."""
     wanted = inspect.signature(expected)
     try:
         given = inspect.signature(plain)

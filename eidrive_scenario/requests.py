@@ -16,13 +16,13 @@ from eidrive_scenario.records import fast_frozen
 @fast_frozen
 @dataclass(frozen=True)
 class Goal:
-    """What the storyboard asks of a driven vehicle; None leaves it to the agent's own settings.
+    """Goal of a driven vehicle that the storyboard sets; for None the settings of the agent apply.
 
-    speed      to have now [m/s]
-    acceleration  with which that speed is changing [m/s²]
-    path       (M, 3) points of a line to drive along, to its end [m], world frame
-    lap        (M, 3) points that follow the path's end, again and again [m]; its end is its start
-    waypoints  (M, 3) points to pass where there is no path, the last is the destination [m]; the agent finds the way
+    speed         current target speed [m/s]
+    acceleration  rate of change of the target speed [m/s²]
+    path          (M, 3) points of the line to follow to its end [m], world frame
+    lap           (M, 3) points that follow the end of the path, repeatedly [m]; its end is its start
+    waypoints     (M, 3) points to pass if there is no path; the last is the destination [m]; the agent plans the route
     """
 
     speed: float | None = None
@@ -34,12 +34,12 @@ class Goal:
 
 @dataclass(frozen=True)
 class Override:
-    """One pedal, the steering wheel or the gear held at a value.
+    """Override of a pedal, the steering wheel or the gear by a constant value.
 
     control   throttle, brake, clutch, parkingBrake, steeringWheel or gear
-    value     share of the pedal in [0, 1], angle of the wheel, left positive [rad], or the gear's number
-    active    False gives the control back
-    max_rate  how fast it may go there [1/s, rad/s]; None at once
+    value     pedal position in [0, 1], steering wheel angle, left positive [rad], or number of the gear
+    active    False ends the override
+    max_rate  maximum rate of change towards the value [1/s, rad/s]; None for an immediate change
     newton    True for a brake whose value is a force [N]
     parked    True for the position P of an automatic transmission
     """
@@ -53,4 +53,4 @@ class Override:
 
 
 Overrides: TypeAlias = Mapping[str, Override]
-"""What is held of one vehicle, by control."""
+"""Overrides of one vehicle, by control."""

@@ -1,5 +1,4 @@
-"""All settings that make a run, after the options, the scenario and its draws are combined: one type, one JSON form,
-one hash."""
+"""Settings of a run after options, scenario and random draws are combined, with their JSON form and hash."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ from typing import Any
 ENGINE = "eidrive-scenario"
 _PACKAGES = (ENGINE, "numpy", "pybullet")
 _FILE_KEYS = frozenset({"file", "weights", "asn1_files"})
-"""Settings that name a file, in a channel profile, a controller's properties or a weather."""
+"""Settings that name a file, in a channel profile, controller properties or a weather preset."""
 _SHORT = 10
 
 
@@ -25,24 +24,24 @@ class ResolvedSettings:
     """All settings that determine the result of one run.
 
     scenario         name in the library, or of the file
-    seed             of all randomness
-    run              number among the runs of a parameter value distribution
-    channel          name of the profile at the start, `custom` for one without a name, `none` for no cooperation
+    seed             seed of all random numbers
+    run              number of the run in a parameter value distribution
+    channel          name of the initial profile; `custom` for one without a name, `none` for no cooperation
     channel_profile  its content with all defaults; None for no cooperation
     later_channels   profiles that events of the scenario select, in the order of the file
-    detector, cooperate   the options that override the scenario; None where it decides
+    detector, cooperate   the options that override the scenario; None if the scenario applies
     stations         settings of each station, by name: detector, its settings, cooperation, sensors and all others
-    weather          name of the preset that overrides the scenario; None where it decides
+    weather          name of the preset that overrides the scenario; None if the scenario applies
     weather_profile  its content
-    parameters       of the scenario as a whole, with the values that count
-    drawn            names of the parameters that this seed has drawn
+    parameters       parameters of the scenario, with their final values
+    drawn            names of the parameters whose values this seed has drawn
     varied           names of the parameters that a parameter value distribution assigns
-    controllers      controller models, by the controller's name
-    user_values      for UserDefinedValueConditions, by name
-    dt, time_limit   [s]
-    files            SHA-256 of each file that enters: (role, name, digest); the scenario is the first
-    versions         of the packages that decide the result
-    extensions       of third parties that are used, by kind and name: package, version and entry point
+    controllers      controller models, by name of the controller
+    user_values      values of UserDefinedValueConditions, by name
+    dt, time_limit   time step and maximum simulated time [s]
+    files            role, name and SHA-256 of each input file; the scenario is the first
+    versions         versions of the packages that affect the result
+    extensions       package, version and entry point of each third-party extension, by kind and name
     """
 
     scenario: str = ""
@@ -68,44 +67,44 @@ class ResolvedSettings:
     extensions: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """The settings as JSON values, in the order of the fields."""
+        """Return the settings as JSON values, in the order of the fields."""
         found: dict[str, Any] = {entry.name: _plain(getattr(self, entry.name)) for entry in fields(self)}
         found["files"] = [{"role": role, "name": name, "sha256": digest} for role, name, digest in self.files]
         return found
 
     @property
     def canonical(self) -> str:
-        """The JSON form that is hashed: sorted keys, no white space, ASCII."""
+        """Return the JSON form that is hashed: sorted keys, no white space, ASCII."""
         return canonical_json(self.as_json())
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of the canonical form, 64 hexadecimal digits."""
+        """Return the SHA-256 of the canonical form, 64 hexadecimal digits."""
         return hashlib.sha256(self.canonical.encode()).hexdigest()
 
     @property
     def short_digest(self) -> str:
-        """The first digits of the digest, which tell the folders of runs apart."""
+        """Return the first digits of the digest, which distinguish the folders of runs."""
         return self.digest[:_SHORT]
 
     def of_distribution(self, run: int | None, varied: Iterable[str]) -> ResolvedSettings:
-        """The same settings as those of a run of a parameter value distribution."""
+        """Return these settings with the number and the assigned parameters of a run of a distribution."""
         return replace(self, run=run, varied=tuple(sorted(varied)))
 
 
 def canonical_json(value: Any) -> str:
-    """JSON with sorted keys, without white space, in ASCII: equal values give equal texts."""
+    """Return JSON with sorted keys, without white space, in ASCII: equal values give equal texts."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
 
 
 def sha256_of(content: bytes) -> str:
-    """SHA-256 as 64 hexadecimal digits."""
+    """Return the SHA-256 as 64 hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
 
 
 @cache
 def package_versions() -> Mapping[str, str]:
-    """The installed versions of the packages that decide a result."""
+    """Return the installed versions of the packages that affect the result."""
     found = {}
     for name in _PACKAGES:
         try:
@@ -116,14 +115,14 @@ def package_versions() -> Mapping[str, str]:
 
 
 def without_folders(value: Any) -> Any:
-    """Settings whose files are named without their folders, so that equal settings are equal on any machine."""
+    """Return settings with file names without folders, so that equal settings are equal on any machine."""
     if isinstance(value, Mapping):
         return {key: _names_only(item) if key in _FILE_KEYS else without_folders(item) for key, item in value.items()}
     return [without_folders(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def named_files(value: Any) -> Iterator[str]:
-    """The files that settings name, as they are written there."""
+    """Yield the file names in settings, as written there."""
     if isinstance(value, Mapping):
         for key, item in value.items():
             if key in _FILE_KEYS:
@@ -142,7 +141,7 @@ def _names_only(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Values of JSON only; numbers that JSON does not have are spelled, anything else becomes a text."""
+    """Return a value of JSON types; numbers that JSON lacks and all other types become texts."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Settings that a person typed (YAML profiles, controller properties, criterion texts) into checked pydantic models."""
+"""Validation of user settings (YAML profiles, controller properties, criterion texts) by pydantic models."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from eidrive_scenario.files.yaml_text import load_yaml as load_yaml
 from eidrive_scenario.files.yaml_text import load_yaml_file as load_yaml_file
 
 MAX_NUMBER = 1e12
-"""Size of a number in settings: no length, time, rate or power comes near it."""
+"""Maximum absolute value of a number in settings; no length, time, rate or power comes near it."""
 
 
 class Settings(BaseModel):
-    """Base of all typed settings: frozen, and an unknown key is an error."""
+    """Base class of all typed settings: frozen, and an unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -36,23 +36,24 @@ def parse_settings(
     line: int | None = None,
     lines: Mapping[str, int] | None = None,
 ) -> S:
-    """`data` as an instance of `model`.
+    """Return `data` as an instance of `model`.
 
-    `lines` gives the line of single keys where they are known, those inside others as `key_lines` has them. Raises
-    SettingError with one Problem per wrong key.
+    lines  lines of single keys, with the paths of `key_lines`; `line` applies to all others
+
+    Raise SettingError with one diagnostic per invalid key.
     """
     try:
         settings = model.model_validate(dict(data))
     except ValidationError as error:
-        collector = error.errors(include_url=False)[:MAX_DIAGNOSTICS]
-        diagnostics = [_diagnostic(model, data, finding, source, line, lines or {}) for finding in collector]
+        details = error.errors(include_url=False)[:MAX_DIAGNOSTICS]
+        diagnostics = [_diagnostic(model, data, detail, source, line, lines or {}) for detail in details]
         raise SettingError(diagnostics) from error
     immense = next(_immense(settings), None)
     if immense is not None:
-        place = _line_of(immense[0], lines or {}, line)
         path = _typed_path(immense[0], data)
-        what = f"setting {quoted(path)} is {quoted(immense[1])}"
-        raise SettingError(Diagnostic(what, f"give a number within {MAX_NUMBER:g}", source, place))
+        message = f"setting {quoted(path)} is {quoted(immense[1])}"
+        hint = f"give a number within {MAX_NUMBER:g}"
+        raise SettingError(Diagnostic(message, hint, source, _line_of(immense[0], lines or {}, line)))
     return settings
 
 
@@ -77,41 +78,40 @@ def validate_nested(model: type[S], data: Any) -> S:
 def _diagnostic(
     model: type[BaseModel],
     data: Mapping[str, Any],
-    finding: ErrorDetails,
+    detail: ErrorDetails,
     source: str,
     line: int | None,
     lines: Mapping[str, int],
 ) -> Diagnostic:
-    """What pydantic has found, with the keys as they were typed and the line of the innermost one that is known."""
-    kind, loc = finding["type"], finding["loc"]
+    """Return the diagnostic of a pydantic error, with the keys of the user and the line of the innermost known one."""
+    kind, loc = detail["type"], detail["loc"]
     path = _typed_path(loc, data)
-    place = _line_of(loc, lines, line)
+    key_line = _line_of(loc, lines, line)
     if kind == "extra_forbidden":
-        given = finding.get("ctx", {}).get("hint")
-        hint = suggestion(str(loc[-1]), _known_keys(model, loc[:-1])) if given is None else given
-        return Diagnostic(f"unknown setting {quoted(path)}", hint, source, place)
+        known_hint = detail.get("ctx", {}).get("hint")
+        hint = suggestion(str(loc[-1]), _known_keys(model, loc[:-1])) if known_hint is None else known_hint
+        return Diagnostic(f"unknown setting {quoted(path)}", hint, source, key_line)
     if kind == "missing":
-        return Diagnostic(f"setting {path!r} is missing", "add it", source, place)
+        return Diagnostic(f"setting {path!r} is missing", "add it", source, key_line)
     if kind == "union_tag_invalid":
-        word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
-        hint = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
-        place = _line_of((*loc, key), lines, line)
-        return Diagnostic(f"setting {quoted(path + '.' + key)} is {quoted(word)}", hint, source, place)
+        word, key = detail["ctx"]["tag"], detail["ctx"]["discriminator"].strip("'")
+        hint = suggestion(word, re.findall(r"'([^']*)'", detail["ctx"]["expected_tags"]))
+        key_line = _line_of((*loc, key), lines, line)
+        return Diagnostic(f"setting {quoted(path + '.' + key)} is {quoted(word)}", hint, source, key_line)
     if kind == "union_tag_not_found":
-        key = finding["ctx"]["discriminator"].strip("'")
-        return Diagnostic(
-            f"setting {path + '.' + key!r} is missing", suggestion("", _tags(model, loc, key)), source, place
-        )
-    message = f"setting {path!r} is {quoted(finding['input'])}"
+        key = detail["ctx"]["discriminator"].strip("'")
+        hint = suggestion("", _tags(model, loc, key))
+        return Diagnostic(f"setting {path + '.' + key!r} is missing", hint, source, key_line)
+    message = f"setting {path!r} is {quoted(detail['input'])}"
     if kind in _NO_MAPPING:
-        return Diagnostic(message, "a mapping is expected: {key: value, …}", source, place)
-    own = kind == "value_error"
-    hint = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
-    return Diagnostic(message if path else "settings do not fit together", hint, source, place)
+        return Diagnostic(message, "a mapping is expected: {key: value, …}", source, key_line)
+    text = detail["msg"]
+    hint = text.removeprefix("Value error, ") if kind == "value_error" else text.lower()
+    return Diagnostic(message if path else "settings contradict each other", hint, source, key_line)
 
 
 def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:
-    """The numbers beyond MAX_NUMBER in settings, with the keys that lead to them."""
+    """Yield the numbers beyond MAX_NUMBER in settings, with their key paths."""
     if isinstance(value, BaseModel):
         value = value.__dict__
     if isinstance(value, int | float):
@@ -121,30 +121,32 @@ def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tup
         for key, inner in value.items():
             yield from _immense(inner, (*path, key if isinstance(key, int) else str(key)))
     elif isinstance(value, list | tuple):
-        for place, inner in enumerate(value):
-            yield from _immense(inner, (*path, place))
+        for index, inner in enumerate(value):
+            yield from _immense(inner, (*path, index))
 
 
 _NO_MAPPING = frozenset({"model_type", "model_attributes_type", "dict_type"})
 
 
 def _typed_path(loc: tuple[int | str, ...], data: Any) -> str:
-    """The keys on the way to `loc`, with the kind of what has one: `delay.constant.seconds`. Left out is what pydantic
-    adds of its own: the types of a union, and a kind that has given its name to the thing."""
+    """Return the key path of `loc` with the kinds of tagged unions, such as `delay.constant.seconds`.
+
+    Parts that only pydantic adds are omitted: the types of a union, and a kind that equals the key before it.
+    """
     found: list[str] = []
     for part in loc:
-        inside = (
+        is_key = (
             part in data if isinstance(data, Mapping) else isinstance(data, (list, tuple)) and isinstance(part, int)
         )
-        if inside or (isinstance(data, Mapping) and str(part) not in found[-1:]):
+        if is_key or (isinstance(data, Mapping) and str(part) not in found[-1:]):
             found.append(str(part))
-        if inside and (isinstance(data, Mapping) or int(part) < len(data)):
+        if is_key and (isinstance(data, Mapping) or int(part) < len(data)):
             data = data[part]
     return ".".join(found)
 
 
 def _line_of(loc: tuple[int | str, ...], lines: Mapping[str, int], line: int | None) -> int | None:
-    """The line of the innermost key on the way to `loc` that is known; what pydantic adds of its own is passed over."""
+    """Return the line of the innermost known key of `loc`; parts that only pydantic adds are skipped."""
     path = ""
     for part in loc:
         longer = f"{path}.{part}" if path else str(part)
@@ -154,7 +156,7 @@ def _line_of(loc: tuple[int | str, ...], lines: Mapping[str, int], line: int | N
 
 
 def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:
-    """The keys allowed at `path` inside `model`; none where the path leads to one of several models."""
+    """Return the keys allowed at `path` inside `model`; none if several models are allowed there."""
     current = _at(model, path)
     models = [member for member in _members(current) if isinstance(member, type) and issubclass(member, BaseModel)]
     if len(models) == 1:
@@ -167,13 +169,13 @@ def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str
 
 
 def _tags(model: type[BaseModel], path: tuple[int | str, ...], key: str) -> list[str]:
-    """The words that `key` may have in the union at `path` inside `model`."""
+    """Return the values that `key` may have in the union at `path` inside `model`."""
     fields = [getattr(member, "model_fields", {}).get(key) for member in _members(_at(model, path))]
     return [str(word) for field in fields if field is not None for word in get_args(field.annotation)]
 
 
 def _at(model: type[BaseModel], path: tuple[int | str, ...]) -> Any:
-    """The annotation at `path` inside `model`."""
+    """Return the annotation at `path` inside `model`."""
     current: Any = model
     for part in path:
         if isinstance(current, type) and issubclass(current, BaseModel):
@@ -185,13 +187,13 @@ def _at(model: type[BaseModel], path: tuple[int | str, ...]) -> Any:
 
 
 def _members(annotation: Any) -> Iterator[Any]:
-    """The models in a union, however deep it lies in a mapping or a sequence."""
+    """Yield the models of a union, at any depth in mappings and sequences."""
     for part in get_args(annotation):
         yield part
         yield from _members(part)
 
 
 def _tagged(member: Any, tag: int | str) -> bool:
-    """Whether a member of a tagged union is the one of this tag."""
+    """Whether a member of a tagged union has this tag."""
     fields = getattr(member, "model_fields", {})
     return any(tag in get_args(field.annotation) for field in fields.values())

@@ -1,9 +1,9 @@
-"""Limit of the wall time of a run, for runs that would never return.
+"""Limit of the wall time of a run, for runs that would not terminate.
 
 A watchdog thread interrupts the thread of the run by raising LimitReached in it: through a signal in the main thread,
-which also ends system calls that wait, else between two steps of the interpreter. It repeats that until the run ends,
-as code may catch the exception. Code that never returns to the interpreter cannot be interrupted: a process that is
-given a LastResort ends then. Nothing of the run depends on the clock before the limit is reached.
+which also ends waiting system calls, else between two steps of the interpreter. It repeats that until the run ends,
+as code may catch the exception. Code that never returns to the interpreter cannot be interrupted: a process that has
+a LastResort ends in that case. The run does not depend on the clock before the limit is reached.
 """
 
 from __future__ import annotations
@@ -27,34 +27,34 @@ from eidrive_scenario.errors import Diagnostic, SettingError, WallLimitError
 REPEAT = 1.0
 """Time from one interruption to the next [s]."""
 GRACE = 3.0
-"""Time that a run gets to end after the first interruption before the last resort [s]."""
+"""Time from the first interruption to the last resort [s]."""
 _SIGNAL: int | None = getattr(signal, "SIGUSR2", None)
 
 
 class LimitReached(BaseException):
-    """Raised in a run whose limit is reached; Simulation turns it into WallLimitError."""
+    """Interruption of a run whose limit is reached; Simulation converts it to WallLimitError."""
 
 
 @dataclass
 class Limit:
-    """The limit of a run in progress.
+    """Limit of a run in progress.
 
-    seconds  [s] of wall time
-    notes    lines that are added to the report of the last resort, such as the path of the recording
+    seconds  wall time [s]
+    notes    lines that are appended to the report of the last resort, such as the path of the recording
     """
 
     seconds: float
     notes: list[str] = field(default_factory=list)
     armed: bool = True
-    """Whether the run is interrupted; False once its error is on its way."""
+    """Whether the run is interrupted at the limit; False once its error is being raised."""
 
     def add_note(self, note: str) -> None:
-        """Add a line to the report of the last resort."""
+        """Append a line to the report of the last resort."""
         self.notes.append(note)
         self.publish()
 
     def publish(self) -> None:
-        """Pass the notes on to where they outlast the process."""
+        """Pass the notes to a location that outlasts the process."""
         if _last_resort is not None and _last_resort.publish is not None:
             _last_resort.publish(self)
 
@@ -63,9 +63,9 @@ class Limit:
 class LastResort:
     """End of a process whose run cannot be interrupted.
 
-    end      called in the watchdog thread, with the limit and the topmost frame of the run; shall end the process
-    dump     file, kept open, for the stack of a process in which no thread can run; it is then ended with exit code 1
-    publish  called when a limit begins and with each of its notes: saves them for the reader of `dump`
+    end      called in the watchdog thread with the limit and the topmost frame of the run; must end the process
+    dump     open file for the stack of a process in which no thread can run; the exit code is then 1
+    publish  called at the start of a limit and with each of its notes; saves them for the reader of `dump`
     """
 
     end: Callable[[Limit, FrameType | None], None]
@@ -78,7 +78,7 @@ _last_resort: LastResort | None = None
 
 
 def set_last_resort(resort: LastResort | None) -> LastResort | None:
-    """Let all later runs of this process end it if they cannot be interrupted; None does not. Returns the earlier."""
+    """Set the last resort of all later runs of this process, None for no last resort. Return the earlier one."""
     global _last_resort
     before, _last_resort = _last_resort, resort
     return before
@@ -92,10 +92,10 @@ def check_wall_limit(seconds: float | None, origin: str = "wall_limit") -> None:
 
 @contextmanager
 def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
-    """Bound the wall time of what this block does [s]; None does not, and an outer limit of the thread stays.
+    """Limit the wall time of the block [s]. None sets no limit, and an outer limit of the thread stays in force.
 
-    Raises WallLimitError when the limit is reached, SettingError for a limit that is not positive. Outside of the main
-    thread a system call that waits is not interrupted before it returns.
+    Raise WallLimitError when the limit is reached, and SettingError for a limit that is not positive. Outside of the
+    main thread, a waiting system call is not interrupted before it returns.
     """
     check_wall_limit(seconds)
     if seconds is None or current_limit() is not None:
@@ -120,13 +120,13 @@ def current_limit() -> Limit | None:
 
 
 def running_line(trace: TracebackType | None) -> str:
-    """Return `file:line in function` of the innermost frame of a traceback, the watchdog's own aside."""
+    """Return `file:line in function` of the innermost frame of a traceback outside of this module."""
     frames = [entry for entry in traceback.extract_tb(trace) if entry.filename != __file__]
     return f"{frames[-1].filename}:{frames[-1].lineno} in {frames[-1].name}" if frames else ""
 
 
 class _Watchdog:
-    """Interrupts the thread that enters it, from the limit on."""
+    """Context manager that interrupts its thread from the limit on."""
 
     def __init__(self, limit: Limit) -> None:
         self._limit = limit

@@ -1,7 +1,8 @@
-"""The coverage table of docs/openscenario.md, made from the registries, the model and the tests.
+"""Coverage table of docs/openscenario.md, generated from the registries, the model and the tests.
 
-A test says what it shows by `@pytest.mark.element("SpeedAction", …)`. `python tests/coverage_table.py` writes the table
-between its two marks in the page; tests/test_coverage_table.py fails where page, tests or registries drift apart.
+A test declares the elements that it demonstrates by `@pytest.mark.element("SpeedAction", …)`. `python
+tests/coverage_table.py` writes the table between its two marks in the page. tests/test_coverage_table.py fails if page,
+tests or registries do not match.
 """
 
 from __future__ import annotations
@@ -28,47 +29,47 @@ BEGIN, END = "<!-- coverage table: begin -->", "<!-- coverage table: end -->"
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table: the name that tests mark, the types of the standard behind it, what it cannot show."""
+    """Line of the table: name in the marks of tests, types of the standard, and restrictions."""
 
     name: str
     types: tuple[str, ...] = ()
     note: str = ""
-    """Why it is accepted without effect, in part or as a whole; or refused."""
+    """Reason why it has no effect, a partial effect, or is rejected."""
     without_effect: bool = False
-    refused: bool = False
+    rejected: bool = False
     begins: str = ""
-    """The version that brought it, where that does not follow from the types."""
+    """First version, if it does not follow from the types."""
 
 
 def _rows(*names: str) -> tuple[Row, ...]:
     return tuple(Row(name) for name in names)
 
 
-OF_1_2 = "1.2 defines it, with no place for it in the schema"
+OF_1_2 = "defined in 1.2, but not reachable in its schema"
 
 SECTIONS: dict[str, tuple[Row, ...]] = {
     "Private actions": (
         *_rows("SpeedAction", "SpeedProfileAction", "LongitudinalDistanceAction", "LaneChangeAction"),
         *_rows("LaneOffsetAction", "LateralDistanceAction", "VisibilityAction", "SynchronizeAction"),
-        Row("ActivateControllerAction", note="controllers of other tools mean the default controller"),
-        Row("AssignControllerAction", note="other tools' controllers only; one of ours is refused during the run"),
-        Row("OverrideControllerValueAction", note="of a scripted vehicle it is recorded only: that one has no pedals"),
+        Row("ActivateControllerAction", note="a controller of another tool is replaced by the default controller"),
+        Row("AssignControllerAction", note="only for other tools; module=eidrive is rejected during the run"),
+        Row("OverrideControllerValueAction", note="for a scripted vehicle it is only recorded, as it has no pedals"),
         Row("TeleportAction"),
         Row("AssignRouteAction"),
         *_rows("FollowTrajectoryAction", "AcquirePositionAction", "RandomRouteAction"),
-        Row("LightStateAction", note=f"{OF_1_2}; a UserDefinedLight is recorded only: nothing says where it is"),
-        Row("AnimationAction", note=f"{OF_1_2}; pedestrians' motions are drawn, all others are recorded only"),
+        Row("LightStateAction", note=f"{OF_1_2}; a UserDefinedLight is only recorded, as its position is undefined"),
+        Row("AnimationAction", note=f"{OF_1_2}; motions of pedestrians are drawn, all others are only recorded"),
         *_rows("ConnectTrailerAction", "DisconnectTrailerAction"),
     ),
     "Global and user-defined actions": (
-        Row("EnvironmentAction", note="pictures, sensors and grip; temperature, pressure, dome image: recorded only"),
+        Row("EnvironmentAction", note="images, sensors and friction; temperature, pressure, dome image: only recorded"),
         *_rows("AddEntityAction", "DeleteEntityAction", "ParameterSetAction", "ParameterModifyAction"),
         *_rows(
             "VariableSetAction", "VariableModifyAction", "TrafficSignalStateAction", "TrafficSignalControllerAction"
         ),
         *_rows("TrafficSwarmAction", "TrafficSourceAction", "TrafficSinkAction", "TrafficAreaAction"),
         *_rows("TrafficStopAction", "TrafficDefinition", "TrafficDistribution", "SetMonitorAction"),
-        Row("CustomCommandAction", note="never starts a program; types that nobody knows are reported"),
+        Row("CustomCommandAction", note="never starts a program; unknown types are reported"),
     ),
     "Entity conditions": _rows(
         "EndOfRoadCondition",
@@ -152,24 +153,24 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         Row("PoissonDistribution"),
         Row("Histogram"),
         Row("ProbabilityDistributionSet"),
-        Row("UserDefinedDistribution", note="its meaning is left to a tool", refused=True),
+        Row("UserDefinedDistribution", note="specific to another tool", rejected=True),
     ),
 }
 
-LIGHTS = "no controller here steers lights or animations, so that there is nothing to switch on or off"
+LIGHTS = "no controller model controls lights or animations"
 WITHOUT_EFFECT = {
     "ActivateControllerAction.lighting": LIGHTS,
-    "AnimationFile.timeOffset": "files of animations are recorded, not played",
+    "AnimationFile.timeOffset": "animation files are recorded, not executed",
     "AssignControllerAction.activateAnimation": LIGHTS,
     "AssignControllerAction.activateLighting": LIGHTS,
     "Axle.positionZ": "wheels stand on the road",
-    "Controller.controllerType": "its property `module` says whose it is",
+    "Controller.controllerType": "the property `module` determines the tool",
     "DomeImage.azimuthOffset": "the sky is computed from sun, clouds and fog",
-    "OverrideSteeringWheelAction.maxTorque": "a wheel is held at an angle, without forces at the rim",
-    "Pedestrian.pedestrianCategory": "wheelchairs and animals move and are seen as pedestrians",
-    "Properties.CustomContent": "nothing says what it means",
-    "RoadNetwork.SceneGraphFile": "pictures are drawn from the road file",
-    "RoadNetwork.UsedArea": "the whole map is there: the area says which part would do",
+    "OverrideSteeringWheelAction.maxTorque": "the steering wheel angle is set without a torque",
+    "Pedestrian.pedestrianCategory": "wheelchairs and animals move and are detected as pedestrians",
+    "Properties.CustomContent": "the meaning is undefined",
+    "RoadNetwork.SceneGraphFile": "images are rendered from the road file",
+    "RoadNetwork.UsedArea": "the complete map is loaded",
     "Sensor.horizontalFOV": "sensors are those of the station's controller",
     "Sensor.sensorCategory": "sensors are those of the station's controller",
     "Sensor.verticalFOV": "sensors are those of the station's controller",
@@ -177,20 +178,20 @@ WITHOUT_EFFECT = {
     "SensorAttachment.sensorRef": "sensors are those of the station's controller",
     "SensorAttachments.SensorAttachment": "sensors are those of the station's controller",
     "Vehicle.SensorAttachments": "sensors are those of the station's controller",
-    "Vehicle.vehicleRole": "a word about a vehicle; traffic draws roles from its own distribution",
+    "Vehicle.vehicleRole": "only descriptive; traffic draws roles from its own distribution",
 }
-"""Attributes and children of the standard that are read and checked, and that nothing else in the engine looks at."""
+"""Attributes and children of the standard that are read and checked, but not used by the engine."""
 
 ABOUT_THE_FILE = {"FileHeader", "License"}
 TAKEN_BY_CLASS = {
     *("AppearanceAction", "CatalogLocations", "ControllerAction", "PrivateAction", "Position"),
     *("DeterministicSingleParameterDistribution", "StochasticDistribution"),
 }
-"""Elements whose children the engine takes whichever is there, by what it is, not by the name of the field."""
+"""Elements whose children the engine selects by class, not by the name of the field."""
 
 
 def marked_tests() -> dict[str, list[str]]:
-    """Which tests carry the mark of each name, as `file::function`, sorted."""
+    """Return the sorted tests with the mark of each name, as `file::function`."""
     found: dict[str, set[str]] = defaultdict(set)
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
         for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -209,14 +210,14 @@ def _marks(function: ast.FunctionDef) -> Iterator[str]:
 
 
 def since(row: Row) -> str:
-    """The first version of the standard that has a row's types somewhere below the root element."""
+    """Return the first version of the standard that has the types of a row below the root element."""
     versions = _versions()
     return row.begins or max(versions.get(name, "1.0") for name in row.types or (row.name,))
 
 
 @cache
 def _versions() -> dict[str, str]:
-    """The first version of every type: of a field that holds it, in a type that was there by then."""
+    """Return the first version of every type in which a reachable type has a field of it."""
     owners = {owner.__name__: owner for owner in _elements()}
     first = {"OpenScenario": "1.0"}
     waiting = ["OpenScenario"]
@@ -240,16 +241,17 @@ def _elements() -> Iterator[type[Element]]:
 
 MODEL = ROOT / "eidrive_scenario" / "openscenario" / "model"
 PRINTED = ("library_catalogs.py",)
-"""Modules that print attributes and give them no effect."""
+"""Modules that print attributes without using them."""
 
 
 def unread() -> set[str]:
-    """The attributes and children in the model whose names stand nowhere else in the engine.
+    """Return the attributes and children of the model whose names do not occur elsewhere in the engine.
 
-    Not counted: what is about the file itself, children that are known by their class, where it has one place only, and
-    what `eidrive list` prints.
+    Exempt are elements about the file itself, children that are selected by a class with a single field, and attributes
+    that only `eidrive list` prints.
     """
-    code = (path for room in ("eidrive_scenario", "behaviors", "criteria") for path in (ROOT / room).rglob("*.py"))
+    packages = ("eidrive_scenario", "behaviors", "criteria")
+    code = (path for package in packages for path in (ROOT / package).rglob("*.py"))
     texts = (path.read_text(encoding="utf-8") for path in code if path.parent != MODEL and path.name not in PRINTED)
     words = {word for text in texts for word in re.findall(r"\w+", text)} | {"line", "source"}
     elements = {element.__name__ for element in _elements()}
@@ -278,16 +280,16 @@ def _spelling(name: str, *, capital: bool) -> str:
 
 
 def table() -> str:
-    """The table in Markdown."""
+    """Return the table in Markdown."""
     tests = marked_tests()
     registered = {*registry("actions"), *registry("conditions")}
     lines = []
     for title, rows in SECTIONS.items():
-        lines += [f"### {title}", "", "| element | since | status | shown by |", "|---|---|---|---|"]
+        lines += [f"### {title}", "", "| element | since | status | demonstrated by |", "|---|---|---|---|"]
         for row in rows:
             status = "accepted without effect" if row.without_effect else "executed"
-            if row.refused:
-                status = "refused"
+            if row.rejected:
+                status = "rejected"
             if row.note:
                 status += f"; {row.note}" if status == "executed" else f": {row.note}"
             if row.name.endswith(("Action", "Condition")) and row.name not in registered:
@@ -295,13 +297,13 @@ def table() -> str:
             shown = "<br>".join(f"`{place}`" for place in tests.get(row.name, [])[:2]) or "**no test**"
             lines.append(f"| {row.name} | {since(row)} | {status} | {shown} |")
         lines.append("")
-    lines += ["### Attributes and children without effect", "", "| which | why |", "|---|---|"]
+    lines += ["### Attributes and children without effect", "", "| attribute or child | reason |", "|---|---|"]
     lines += [f"| {name} | {why} |" for name, why in WITHOUT_EFFECT.items()]
     return "\n".join(lines)
 
 
 def page(text: str) -> str:
-    """The page with its table made anew."""
+    """Return the page with a regenerated table."""
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
     return f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}"

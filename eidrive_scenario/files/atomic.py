@@ -1,4 +1,4 @@
-"""Files that a run leaves behind."""
+"""Atomic writing of output files."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.lock import FileLock
 
 PARTIAL = ".partial"
-"""In the name of a file, before its suffix, while its run goes on; and afterwards, if that did not end."""
+"""Part of the name of a file before its suffix, during its run and after an aborted one."""
 
 
 def create(path: str | Path) -> BinaryIO:
-    """A new file there, its folders too. Raises SettingError if it cannot be written."""
+    """Open a new file for writing and create its folders. Raise SettingError if it cannot be written."""
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         return Path(path).open("wb")
@@ -26,17 +26,18 @@ def create(path: str | Path) -> BinaryIO:
 
 
 def partial_path(path: Path) -> Path:
-    """Where a file lies whose run has not ended: `out.partial.csv` for `out.csv`."""
+    """Return the path of a file during its run: `out.partial.csv` for `out.csv`."""
     return path.with_stem(path.stem + PARTIAL)
 
 
 @contextmanager
 def atomic_output(path: Path) -> Iterator[Path]:
-    """Where to write a file that shall have its own name only once all of it is there.
+    """Yield the path to which a file is written until it is complete; then the file gets its final name.
 
-    What was written before an error or an interruption is kept under the other name, so that nobody takes it for a
-    whole run; of wrong input nothing is kept. Two runs never write one file at the same time. What is no plain file,
-    such as /dev/stdout, is written as it is. Raises SettingError if the place is a folder, or another run writes there.
+    After an error or an interruption the file keeps the partial name, so that it is not mistaken for a complete run;
+    after invalid input it is removed. Two runs never write the same file at the same time. A path that is not a
+    regular file, such as /dev/stdout, is written directly. Raise SettingError if the path is a folder, or if another
+    run writes there.
     """
     if os.path.isdir(path):
         raise SettingError(Diagnostic("cannot write: Is a directory", "choose another place", str(path)))
@@ -56,10 +57,10 @@ def atomic_output(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def exclusive(path: Path) -> Iterator[None]:
-    """Keep other processes from writing the same file through this function.
+    """Lock a file against other processes that use this function.
 
-    Raises SettingError if another one does. What is no plain file, and a place where no lock can be made, is not
-    locked.
+    Paths that are not regular files, and folders in which no lock can be created, are not locked. Raise SettingError
+    if another process has the lock.
     """
     if os.path.exists(path) and not os.path.isfile(path):
         yield

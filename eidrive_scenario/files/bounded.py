@@ -1,7 +1,7 @@
 """Bounded reading of regular files.
 
-Scenarios and all files that they refer to come from untrusted sources. A path may name a pipe, which blocks, a device,
-which never ends, or a file that does not fit into memory. All input files are therefore read here.
+Scenarios and all files that they refer to come from untrusted sources. A path may refer to a pipe, which blocks, a
+device, which is endless, or a file that does not fit into memory. All input files are therefore read here.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ _KINDS = (
 
 
 class RefusedFileError(OSError):
-    """The path does not name a regular file, or names one above the size limit; `strerror` states the reason."""
+    """Path that does not refer to a regular file within the size limit; `strerror` states the reason."""
 
     def __init__(self, reason: str, path: str | os.PathLike[str]) -> None:
         super().__init__(errno.EINVAL, reason, os.fspath(path))
 
 
 def is_regular_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a path leads to a regular file; False for a text that cannot be a path at all, as it is too long."""
+    """Whether a path refers to a regular file; False for an invalid path, such as one that is too long."""
     return os.path.isfile(path)
 
 
 def is_folder(path: str | os.PathLike[str]) -> bool:
-    """Whether a path leads to a folder; False for a text that cannot be a path at all."""
+    """Whether a path refers to a folder; False for an invalid path."""
     return os.path.isdir(path)
 
 
 def read_regular_file(path: str | os.PathLike[str], limit: int) -> bytes:
     """Return the content of a regular file of at most `limit` bytes.
 
-    Never block and never read more than `limit` + 1 bytes, whatever the path leads to and whatever happens to the file
-    meanwhile. Raise OSError if the file cannot be read, and RefusedFileError if it is not a regular file or is larger.
+    The function never blocks and never reads more than `limit` + 1 bytes, even if the file changes meanwhile. Raise
+    OSError if the file cannot be read, and RefusedFileError if it is not a regular file or is larger.
     """
-    with _opened(path) as descriptor:
+    with _open_regular(path) as descriptor:
         size = os.fstat(descriptor).st_size
         parts: list[bytes] = []
         count = 0
@@ -70,23 +70,23 @@ def read_regular_file(path: str | os.PathLike[str], limit: int) -> bytes:
 
 
 def reason_of(error: Exception) -> str:
-    """The reason why a file cannot be read, without its path; only for errors whose texts quote no content."""
+    """Return the reason why a file cannot be read, without its path; only for errors that quote no content."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def file_in_memory() -> BinaryIO:
-    """A file with a descriptor and without a name; on systems without such files, a temporary one."""
+    """Return a file with a descriptor and without a name; on systems without such files, a temporary one."""
     if hasattr(os, "memfd_create"):
         return os.fdopen(os.memfd_create("eidrive"), "w+b")
     return cast(BinaryIO, tempfile.TemporaryFile())
 
 
 @contextmanager
-def _opened(path: str | os.PathLike[str]) -> Iterator[int]:
-    """The descriptor of a regular file.
+def _open_regular(path: str | os.PathLike[str]) -> Iterator[int]:
+    """Yield the descriptor of a regular file.
 
-    The kind is checked before the file is opened, as opening a device may already have an effect, and once more
-    afterwards, as the file may have been replaced in between.
+    The kind is checked before the file is opened, as opening a device may already have an effect, and again afterwards,
+    as the file may have been replaced in between.
     """
     try:
         _check_kind(os.stat(path), path)
@@ -103,7 +103,7 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[int]:
 def _check_kind(status: os.stat_result, path: str | os.PathLike[str]) -> None:
     if not stat.S_ISREG(status.st_mode):
         kind = next((name for matches, name in _KINDS if matches(status.st_mode)), "of another kind")
-        raise RefusedFileError(f"the path leads to {kind}; a regular file is expected", path)
+        raise RefusedFileError(f"the path leads to {kind} (expected a regular file)", path)
 
 
 def _size(limit: int) -> str:
@@ -111,7 +111,7 @@ def _size(limit: int) -> str:
 
 
 def absolute(path: str | Path) -> Path:
-    """The path without symbolic links, if it can be resolved; else as it is."""
+    """Return the path without symbolic links if it can be resolved, else the path itself."""
     try:
         return Path(path).resolve()
     except (OSError, ValueError, RuntimeError):

@@ -1,4 +1,4 @@
-"""JSON from an untrusted file: bounded in size, number of values and depth."""
+"""JSON from untrusted files, bounded in size, number of values and depth."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import json
 from typing import Any
 
 MAX_VALUES = 10_000_000
-"""Maximum number of values in a document. Each takes less than 100 bytes of memory beside its text."""
+"""Maximum number of values in a document. Each takes less than 100 bytes of memory in addition to its text."""
 
 
 def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | None = None) -> Any:
     """Return the values of a JSON document.
 
-    Raises ValueError if it is not valid JSON, has more than `max_values` values, or is nested deeper than `max_depth`,
-    if that is given, or than Python can read.
+    Raise ValueError if the document is not valid JSON, has more than `max_values` values, or is nested deeper than
+    `max_depth` or than Python can read.
     """
     values = data.count(b",") + data.count(b"[") + data.count(b"{")
     if values > max_values:
@@ -25,7 +25,7 @@ def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | Non
     except RecursionError:
         raise ValueError("the document is nested too deeply") from None
     if max_depth is not None and _is_deeper(document, max_depth):
-        raise ValueError(f"the document is nested more than {max_depth} deep")
+        raise ValueError(f"the document is nested deeper than {max_depth} levels")
     return document
 
 

@@ -1,4 +1,4 @@
-"""Locks between processes. The kernel releases them with the process, so a killed one never blocks another."""
+"""Locks between processes. The kernel releases them with the process, so a killed process never blocks another."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _BUSY = frozenset({errno.EWOULDBLOCK, errno.EACCES, errno.EAGAIN})
 
 
 class FileLock:
-    """An exclusive lock on a separate file, which exists as long as the lock is held.
+    """Exclusive lock on a separate file, which exists as long as the lock is held.
 
-    A lock file that a killed process has left behind does not count: only the lock of a living process does. On a file
-    system without locks the first process that creates the file holds it.
+    The lock file of a killed process has no effect: only the lock of a running process does. On a file system without
+    locks, the process that creates the file holds the lock.
     """
 
     def __init__(self, path: Path, descriptor: int) -> None:
@@ -24,7 +24,7 @@ class FileLock:
 
     @classmethod
     def acquire(cls, path: Path) -> FileLock | None:
-        """Return the lock, or None if another holder has it. Raises OSError if the file cannot be created."""
+        """Return the lock, or None if it is held elsewhere. Raise OSError if the file cannot be created."""
         while True:
             created = not path.exists()
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0), 0o644)
@@ -43,13 +43,13 @@ class FileLock:
             os.close(descriptor)
 
     def release(self) -> None:
-        """Remove the file and give the lock free; a second call does nothing."""
+        """Remove the file and release the lock; a second call has no effect."""
         if self._descriptor < 0:
             return
         try:
             self.path.unlink(missing_ok=True)
         except OSError:
-            pass  # it does not block anybody
+            pass  # a file without a lock does not block other processes
         finally:
             os.close(self._descriptor)
             self._descriptor = -1

@@ -1,6 +1,6 @@
-"""Parsing of XML from untrusted sources: no network, no document type, no entities, bounded size and depth.
+"""Parser for XML from untrusted sources: no network, no document type, no entities, bounded size and depth.
 
-Messages never quote the content of a file that is not well-formed: the path may lead to a file of another kind.
+Messages never quote the content of a file that is not well-formed: it may be a file of another kind.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files.xml_lines import parse_numbered
 
 MAX_DEPTH = 100
-"""Levels of elements."""
+"""Maximum nesting depth of elements."""
 MAX_ATTRIBUTES = 200
-"""Attributes of one element; the time that libxml2 takes for them grows with their square."""
+"""Maximum number of attributes of an element; the parsing time of libxml2 is quadratic in this number."""
 
-_REMEDY = "every tag has to be closed, every value quoted, & written as &amp;"
-_ENCODINGS = "save the file in UTF-8 and declare encoding='UTF-8'"
+_SYNTAX_HINT = "close every tag, quote every value, write & as &amp;"
+_ENCODING_HINT = "save the file in UTF-8 and declare encoding='UTF-8'"
 _TOO_MANY = etree.XPath(f"descendant-or-self::*[@*[{MAX_ATTRIBUTES + 1}]]")
-_LEADS_TO_LINE = re.compile(r"\bline (\d+)")
+_LINE_REFERENCE = re.compile(r"\bline (\d+)")
 
 
 @dataclass(frozen=True)
 class XmlLimits:
     """Limits of one kind of file.
 
-    max_bytes   size of the file
-    max_nodes   elements and attributes in total; each takes 100 to 200 bytes of memory
+    max_bytes  maximum size of the file [B]
+    max_nodes  maximum number of elements and attributes; each takes 100 to 200 bytes of memory
     """
 
     max_bytes: int
@@ -40,7 +40,7 @@ class XmlLimits:
 
 
 class _Done(Exception):
-    """Ends the scan of a prolog or the count of nodes."""
+    """Exception that ends the scan of a prolog or the count of nodes."""
 
 
 def parse_untrusted(
@@ -53,7 +53,7 @@ def parse_untrusted(
 ) -> etree._Element:
     """Return the root element of the bytes of an XML file.
 
-    error   makes the exception that is raised for a diagnostic; each names `source` and the line
+    error  returns the exception to raise for a diagnostic; each diagnostic has `source` and the line
     """
 
     def refuse(message: str, hint: str, line: int | None) -> NoReturn:
@@ -64,10 +64,9 @@ def parse_untrusted(
     try:
         _scan(content, limits, refuse)
     except expat.ExpatError as failure:
-        what = f"not well-formed XML: {expat.ErrorString(failure.code)}"
-        refuse(what, _REMEDY, failure.lineno)
-    except (LookupError, ValueError):  # of the codec that the file names, if there is one
-        refuse("the encoding of the file is not supported", _ENCODINGS, 1)
+        refuse(f"not well-formed XML: {expat.ErrorString(failure.code)}", _SYNTAX_HINT, failure.lineno)
+    except (LookupError, ValueError):  # errors of the codec that the file declares
+        refuse("the encoding of the file is not supported", _ENCODING_HINT, 1)
     parser = etree.XMLParser(
         resolve_entities=False,
         no_network=True,
@@ -79,23 +78,24 @@ def parse_untrusted(
     try:
         root = parse_numbered(content, parser)
     except etree.XMLSyntaxError as failure:
-        refuse(f"not well-formed XML: {_described(failure)}", _REMEDY, failure.lineno or None)
+        refuse(f"not well-formed XML: {_describe_error(failure)}", _SYNTAX_HINT, failure.lineno or None)
     docinfo: Any = root.getroottree().docinfo
     if docinfo.doctype:
         refuse("the file has a document type declaration (DOCTYPE)", "remove it", 1)
     too_deep = next(iter(cast(list[etree._Element], root.xpath("/*" * (MAX_DEPTH + 1)))), None)
     if too_deep is not None:
-        refuse(f"elements are nested more than {MAX_DEPTH} deep", "flatten them", _line(too_deep))
+        refuse(f"elements are nested deeper than {MAX_DEPTH} levels", "flatten them", _line(too_deep))
     if content.count(b"=") > MAX_ATTRIBUTES:
         for element in cast(list[etree._Element], _TOO_MANY(root)):
             refuse(f"an element has more than {MAX_ATTRIBUTES} attributes", "remove them", _line(element))
     return root
 
 
-def first_elements(content: bytes, at_most: int, visit: Callable[[int, str], bool]) -> bool:
-    """Call `visit` with depth (root: 1) and name, without its prefix, of the first elements until it returns True.
+def first_elements(content: bytes, max_elements: int, visit: Callable[[int, str], bool]) -> bool:
+    """Call `visit` with the depth (root: 1) and the name without prefix of each element until it returns True.
 
-    Return whether it did. No entity is expanded. Raise ValueError if the file is not XML up to there.
+    Return True if it did within `max_elements`. No entity is expanded. Raise ValueError if the file is not XML up to
+    that element.
     """
     parser = expat.ParserCreate()
     depth = count = 0
@@ -106,7 +106,7 @@ def first_elements(content: bytes, at_most: int, visit: Callable[[int, str], boo
         depth += 1
         count += 1
         found = visit(depth, name.rsplit(":", 1)[-1])
-        if found or count >= at_most:
+        if found or count >= max_elements:
             raise _Done
 
     def end(_: str) -> None:
@@ -114,7 +114,7 @@ def first_elements(content: bytes, at_most: int, visit: Callable[[int, str], boo
         depth -= 1
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.DefaultHandler = lambda _: None  # with this handler expat leaves entities as they are
+    parser.DefaultHandler = lambda _: None  # with this handler expat does not expand entities
     try:
         parser.Parse(content, True)
     except _Done:
@@ -125,9 +125,9 @@ def first_elements(content: bytes, at_most: int, visit: Callable[[int, str], boo
 
 
 def _scan(content: bytes, limits: XmlLimits, refuse: Callable[[str, str, int | None], NoReturn]) -> None:
-    """Refuse a document type and too many nodes before a tree is built.
+    """Call `refuse` for a document type declaration or too many nodes, before a tree is built.
 
-    Beyond the prolog a file is scanned only if its size allows too many nodes.
+    A file is scanned beyond the prolog only if its size allows too many nodes.
     """
     parser = expat.ParserCreate()
     may_exceed = content.count(b"<") - content.count(b"</") + content.count(b"=") > limits.max_nodes
@@ -135,7 +135,7 @@ def _scan(content: bytes, limits: XmlLimits, refuse: Callable[[str, str, int | N
 
     def document_type(*_: object) -> None:
         refuse(
-            "the file has a document type declaration (DOCTYPE), which may bring in entities and other files",
+            "the file has a document type declaration (DOCTYPE), which may include entities and other files",
             "remove it; neither OpenSCENARIO nor OpenDRIVE needs one",
             parser.CurrentLineNumber,
         )
@@ -146,8 +146,8 @@ def _scan(content: bytes, limits: XmlLimits, refuse: Callable[[str, str, int | N
         if not may_exceed:
             raise _Done
         if nodes > limits.max_nodes:
-            what = f"the file has more than {limits.max_nodes} elements and attributes"
-            refuse(what, "split it", parser.CurrentLineNumber)
+            message = f"the file has more than {limits.max_nodes} elements and attributes"
+            refuse(message, "split it", parser.CurrentLineNumber)
 
     parser.ordered_attributes = True
     parser.StartDoctypeDeclHandler = document_type
@@ -162,21 +162,20 @@ def _line(element: etree._Element) -> int | None:
     return cast("int | None", element.sourceline)
 
 
-def _described(error: etree.XMLSyntaxError) -> str:
-    """The kind of a syntax error in words, without anything of the file but the number of a line."""
+def _describe_error(error: etree.XMLSyntaxError) -> str:
+    """Describe the kind of a syntax error, without any content of the file except a line number."""
     number = getattr(error, "code", None) or 0
     text = error.msg or ""
-    start = _LEADS_TO_LINE.search(text)
-    if number in _KINDS_OF_ERRORS:
-        what = _KINDS_OF_ERRORS[number]
-        return what.format(start=f", which begins in line {start[1]}," if start else "")
+    start = _LINE_REFERENCE.search(text)
+    if number in _ERROR_TEXTS:
+        return _ERROR_TEXTS[number].format(start=f", which begins in line {start[1]}," if start else "")
     return f"libxml2 reports error {number}"
 
 
 _CODES = etree.ErrorTypes
-_KINDS_OF_ERRORS = {
-    int(getattr(_CODES, name)): words
-    for name, words in {
+_ERROR_TEXTS = {
+    int(getattr(_CODES, name)): text
+    for name, text in {
         "ERR_DOCUMENT_EMPTY": "the document is empty",
         "ERR_DOCUMENT_END": "there is content after the end of the root element",
         "ERR_INVALID_CHAR": "a character is not allowed in XML",
@@ -190,7 +189,7 @@ _KINDS_OF_ERRORS = {
         "ERR_ATTRIBUTE_NOT_STARTED": "the value of an attribute is not quoted",
         "ERR_ATTRIBUTE_NOT_FINISHED": "the value of an attribute is not closed",
         "ERR_ATTRIBUTE_WITHOUT_VALUE": "an attribute has no value",
-        "ERR_ATTRIBUTE_REDEFINED": "an attribute stands twice in one element",
+        "ERR_ATTRIBUTE_REDEFINED": "an attribute occurs twice in one element",
         "ERR_LT_IN_ATTRIBUTE": "the value of an attribute contains <",
         "ERR_TAG_NAME_MISMATCH": "an end tag does not match its start tag{start}",
         "ERR_TAG_NOT_FINISHED": "the start tag of an element{start} is not closed",
@@ -203,7 +202,7 @@ _KINDS_OF_ERRORS = {
         "ERR_SPACE_REQUIRED": "a space is missing between attributes",
         "ERR_STRING_NOT_STARTED": "the XML declaration is not valid",
         "ERR_XMLDECL_NOT_FINISHED": "the XML declaration is not closed",
-        "ERR_RESERVED_XML_NAME": "the XML declaration does not stand at the very start",
+        "ERR_RESERVED_XML_NAME": "the XML declaration is not at the start of the file",
         "ERR_NAME_TOO_LONG": "a name is too long",
         "ERR_INTERNAL_ERROR": "a limit of the parser is exceeded, such as depth or length of a value",
         "ERR_RESOURCE_LIMIT": "a limit of the parser is exceeded, such as depth or length of a value",

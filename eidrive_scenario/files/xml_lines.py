@@ -1,7 +1,7 @@
 """Lines of XML elements in long files.
 
-libxml2 keeps the line of an element in 16 bits. Beyond line 65,534 it guesses from white space nearby, if there is any,
-and is off by a line then. In files as long as that the lines are counted once more, by expat.
+libxml2 stores the line of an element in 16 bits. Beyond line 65,534 it estimates the line from adjacent white space,
+with an error of up to one line. In longer files, expat counts the lines again.
 """
 
 from __future__ import annotations
@@ -12,47 +12,47 @@ from xml.parsers import expat
 
 from lxml import etree
 
-COUNTED = 65_534
-"""The last line that libxml2 knows for certain."""
+MAX_EXACT_LINE = 65_534
+"""Last line number that is exact in libxml2."""
 
 
-class _Numbered(etree.ElementBase):
-    """An element that knows its line, as long as somebody holds it."""
+class _NumberedElement(etree.ElementBase):
+    """Element with its own line number, which is lost when the last reference to the element is dropped."""
 
     line: int | None = None
     others: tuple[etree._Element, ...] = ()
-    """Of the root: all elements with lines of their own, which live as long as it does."""
+    """All elements with own line numbers; only the root has them, to keep these elements alive."""
 
     @property
     def sourceline(self) -> int | None:  # type: ignore[override]
-        """The line where it begins."""
+        """Return the line of the start tag."""
         return self.line if self.line is not None else cast("int | None", super().sourceline)
 
 
 def parse_numbered(content: bytes, parser: etree.XMLParser) -> etree._Element:
-    """The root of an XML text whose elements have their right `sourceline`, however long the text.
+    """Return the root of an XML text, with the exact `sourceline` of each element in texts of any length.
 
-    Raises etree.XMLSyntaxError, as the parser does.
+    Raise etree.XMLSyntaxError if the text is not well-formed.
     """
-    if content.count(b"\n") < COUNTED:
+    if content.count(b"\n") < MAX_EXACT_LINE:
         return etree.fromstring(content, parser)
-    parser.set_element_class_lookup(etree.ElementDefaultClassLookup(element=_Numbered))
+    parser.set_element_class_lookup(etree.ElementDefaultClassLookup(element=_NumberedElement))
     root = etree.fromstring(content, parser)
     docinfo: Any = root.getroottree().docinfo
     if docinfo.doctype:
         return root
     beyond = []
     for element, line in zip(root.iter("*"), _lines(content), strict=False):
-        if line > COUNTED:
-            numbered = cast(_Numbered, element)
+        if line > MAX_EXACT_LINE:
+            numbered = cast(_NumberedElement, element)
             numbered.line = line
             beyond.append(numbered)
-    cast(_Numbered, root).others = tuple(beyond)
+    cast(_NumberedElement, root).others = tuple(beyond)
     return root
 
 
 def _lines(content: bytes) -> list[int]:
-    """The line where each element begins, in the order of the text; none beyond what expat cannot read."""
+    """Return the line of each start tag in the order of the text, up to the first error of expat."""
     lines: list[int] = []
     reader = expat.ParserCreate()
     reader.StartElementHandler = lambda *_: lines.append(reader.CurrentLineNumber)

@@ -13,26 +13,25 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import read_regular_file, reason_of
 
 MAX_YAML = 2**17
-"""Characters of a YAML text."""
+"""Maximum number of characters of a YAML text."""
 MAX_DEPTH = 20
-"""Levels of lists and mappings in YAML."""
+"""Maximum nesting depth of lists and mappings."""
 MAX_NODES = 50_000
-"""Values and keys of a YAML text."""
+"""Maximum number of values and keys of a YAML text."""
 MAX_DIGITS = 40
-"""Characters of a number in YAML."""
+"""Maximum number of characters of a number."""
 
 _QUOTED = re.compile(r"'[^']{2,}'|\"[^\"]{2,}\"")
-"""Quoted words of a text, and not the brackets and commas that YAML expects."""
-
-
-_ALIAS = "anchors and aliases are not read"
-_MERGE = "merge keys are not read"
+"""Pattern of quoted words in messages of YAML; quoted single characters, such as an expected comma, are not matched."""
+_ALIAS = "anchors and aliases are not supported"
+_MERGE = "merge keys are not supported"
+_LONG_NUMBER = f"a number has more than {MAX_DIGITS} digits"
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML's safe loader, which by itself keeps the last of several equal keys, and expands aliases without bounds.
+    """Safe loader of YAML that rejects duplicate keys and aliases; the base class expands aliases without limit.
 
-    An expression `${…}` is one text, inside braces and brackets too, where YAML takes its brace for a mapping.
+    An expression `${…}` is a single text inside braces and brackets too, where YAML reads its brace as a mapping.
     """
 
     def __init__(self, stream: str) -> None:
@@ -41,7 +40,7 @@ class _Loader(yaml.SafeLoader):
         self._count = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        """Refuse aliases, which may stand for themselves or multiply, and what is too deep or too large."""
+        """Compose a node; raise MarkedYAMLError for aliases, which may be recursive, and for exceeded limits."""
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         self._count += 1
         if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
@@ -56,7 +55,7 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def scan_plain(self) -> yaml.ScalarToken:
-        """Scan a scalar without quotes."""
+        """Scan a scalar without quotes; an expression `${…}` is one scalar."""
         if self.flow_level and self.prefix(2) == "${":
             length = self._length_of_expression()
             if length:
@@ -69,7 +68,7 @@ class _Loader(yaml.SafeLoader):
         return token
 
     def _length_of_expression(self) -> int:
-        """Number of characters up to its closing brace; 0 if there is none in this line."""
+        """Return the number of characters up to the closing brace; 0 if there is none in this line."""
         length = 2
         while self.peek(length) not in "\0\r\n{}":
             length += 1
@@ -83,26 +82,24 @@ class _Loader(yaml.SafeLoader):
             if key.tag == "tag:yaml.org,2002:merge":
                 raise yaml.constructor.ConstructorError(None, None, _MERGE, key.start_mark)
             if key.value in seen:
-                what = f"{quoted(key.value, 100)} stands here twice"
-                raise yaml.constructor.ConstructorError(None, None, what, key.start_mark)
+                message = f"duplicate key {quoted(key.value, 100)}"
+                raise yaml.constructor.ConstructorError(None, None, message, key.start_mark)
             seen.add(key.value)
         found: dict[Hashable, Any] = super().construct_mapping(node, deep)
         return found
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
         if len(node.value) > MAX_DIGITS:
-            what = f"a number has more than {MAX_DIGITS} digits"
-            raise yaml.constructor.ConstructorError(None, None, what, node.start_mark)
+            raise yaml.constructor.ConstructorError(None, None, _LONG_NUMBER, node.start_mark)
         return int(super().construct_yaml_int(node))
 
     def construct_yaml_float(self, node: yaml.ScalarNode) -> float:
         if len(node.value) > MAX_DIGITS:
-            what = f"a number has more than {MAX_DIGITS} digits"
-            raise yaml.constructor.ConstructorError(None, None, what, node.start_mark)
+            raise yaml.constructor.ConstructorError(None, None, _LONG_NUMBER, node.start_mark)
         return float(super().construct_yaml_float(node))
 
     def construct_undefined(self, node: yaml.Node) -> NoReturn:
-        raise yaml.constructor.ConstructorError(None, None, "tags are not read", node.start_mark)
+        raise yaml.constructor.ConstructorError(None, None, "tags are not supported", node.start_mark)
 
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
@@ -111,12 +108,12 @@ _Loader.add_constructor(None, _Loader.construct_undefined)
 
 
 def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = True) -> Any:
-    """YAML without object tags, aliases and merge keys, of bounded size and depth.
+    """Load YAML without object tags, aliases and merge keys, of bounded size and depth.
 
-    quote   whether messages may quote words of the text; False for files, which may be of another kind
+    quote  whether messages may quote words of the text; False for files, which may be of another kind
 
-    A key that stands twice is a mistake, as one of its values would be lost. Raises SettingError with the line of the
-    mistake, counted from `line` if given.
+    A duplicate key is an error, as one of its values would be lost. Raise SettingError with the line of the error,
+    counted from `line` if given.
     """
     if len(text) > MAX_YAML:
         diagnostic = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
@@ -125,29 +122,31 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
-        place = (line or 1) + min(mark.line, text.count("\n")) if mark is not None else line
-        what = getattr(error, "problem", None) or "a character is not allowed"
-        what = what if quote else _QUOTED.sub("…", what)
-        hint = "write the value out in each place" if what in (_ALIAS, _MERGE) else "check the syntax there"
-        raise SettingError(Diagnostic(f"not valid YAML: {what}", hint, source, place)) from error
-    except (ValueError, ArithmeticError) as error:  # what looks like a date or a number and is none
-        what = f"not valid YAML: {_QUOTED.sub('…', str(error))}"
-        raise SettingError(Diagnostic(what, "put it in quotes", source, line)) from error
+        error_line = (line or 1) + min(mark.line, text.count("\n")) if mark is not None else line
+        reason = getattr(error, "problem", None) or "a character is not allowed"
+        reason = reason if quote else _QUOTED.sub("…", reason)
+        hint = "repeat the value at each use" if reason in (_ALIAS, _MERGE) else "check the syntax in this line"
+        raise SettingError(Diagnostic(f"not valid YAML: {reason}", hint, source, error_line)) from error
+    except (ValueError, ArithmeticError) as error:  # invalid text in the form of a date or a number
+        message = f"not valid YAML: {_QUOTED.sub('…', str(error))}"
+        raise SettingError(Diagnostic(message, "put it in quotes", source, line)) from error
 
 
 def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:
-    """A YAML file and the line of each of its keys. Raises SettingError."""
+    """Return the content of a YAML file and the line of each of its keys. Raise SettingError if it is invalid."""
     try:
         text = read_regular_file(path, 4 * MAX_YAML).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = "it is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
+        reason = "the file is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
         raise SettingError(Diagnostic(f"cannot read: {reason}", "give the path of a YAML file", str(path))) from error
     return load_yaml(text, source=str(path), quote=False), key_lines(text)
 
 
 def key_lines(text: str, first: int = 1) -> dict[str, int]:
-    """The line of each key of a text that `load_yaml` has accepted, the first line having the number `first`. Keys
-    inside others have dots, and entries of lists numbers: `delay`, `delay.seconds`, `limits.0`."""
+    """Return the line of each key of a text that `load_yaml` accepts; the first line has the number `first`.
+
+    Nested keys are joined by dots, and entries of lists are numbered: `delay`, `delay.seconds`, `limits.0`.
+    """
     lines: dict[str, int] = {}
     waiting = [("", yaml.compose(text, Loader=_Loader))]
     while waiting:
@@ -156,9 +155,9 @@ def key_lines(text: str, first: int = 1) -> dict[str, int]:
         if isinstance(node, yaml.MappingNode):
             entries = [(str(key.value), key, value) for key, value in node.value]
         elif isinstance(node, yaml.SequenceNode):
-            entries = [(str(place), value, value) for place, value in enumerate(node.value)]
-        for name, where, value in entries:
+            entries = [(str(index), value, value) for index, value in enumerate(node.value)]
+        for name, start, value in entries:
             inner = f"{path}.{name}" if path else name
-            lines[inner] = first + where.start_mark.line
+            lines[inner] = first + start.start_mark.line
             waiting.append((inner, value))
     return lines

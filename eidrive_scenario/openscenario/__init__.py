@@ -1,4 +1,4 @@
-"""OpenSCENARIO XML 1.0 to 1.3: files into a frozen, checked Scenario; distributions of parameter values into runs."""
+"""Reader of OpenSCENARIO XML 1.0 to 1.3: files to a frozen, validated Scenario, distributions to concrete runs."""
 
 from eidrive_scenario.openscenario.distributions import ConcreteRun, DistributionExpansion, load_distribution
 from eidrive_scenario.openscenario.reading.document import read_document

@@ -1,4 +1,4 @@
-"""Entries of catalogs: found where the scenario says that its catalogs lie, and read with the values they get."""
+"""Catalog entries: search in the catalog locations of the scenario, and reading with the assigned parameters."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from eidrive_scenario.openscenario.values.scalars import Version
 
 @dataclass(frozen=True)
 class CatalogFile:
-    """A catalog and its entries by name."""
+    """Catalog and its entries by name."""
 
     name: str
     document: Document
     version: Version
     entries: dict[str, etree._Element]
     twins: Mapping[str, Diagnostic]
-    """The error for each name that several entries have."""
+    """Error for each name that several entries have."""
 
 
 class CatalogLibrary:
-    """The catalogs that a scenario can reach. Each file is read once, each entry once for each set of values.
+    """Catalogs in the locations of a scenario. Each file is read once, each entry once for each set of values.
 
-    An entry should declare the parameters that it uses; where it does not, the scenario's are lent, with a warning.
+    An entry should declare the parameters that it uses; otherwise those of the scenario are used, with a warning.
     """
 
     def __init__(
@@ -63,18 +63,21 @@ class CatalogLibrary:
         self._unreadable: dict[Path, tuple[Diagnostic, ...]] = {}
 
     def resolve(self, found: Iterable[FoundReference], active: tuple[tuple[str, str], ...] = ()) -> None:
-        """Reads the entries that the references name, and those that these refer to in turn."""
+        """Read the referenced entries, and recursively those to which they refer."""
         for one in found:
             reference = one.reference
             names = (reference.catalog_name, reference.entry_name)
             if not all(isinstance(name, str) for name in names):
                 continue
             if names in active:
-                self._wrong(reference, f"the catalog entry {quoted(names[1])} refers to itself", "break the circle")
+                self._error(
+                    reference, f"catalog entry {quoted(names[1])} refers to itself", "remove the circular reference"
+                )
                 self._circular.add(reference)
                 continue
             if len(active) >= MAX_NESTED_REFERENCES:
-                self._wrong(reference, f"entries of catalogs are nested more than {len(active)} deep", "flatten them")
+                message = f"catalog entries are nested deeper than {len(active)} levels"
+                self._error(reference, message, "flatten them")
                 self._circular.add(reference)
                 continue
             if reference not in self.entries:
@@ -85,7 +88,7 @@ class CatalogLibrary:
 
     @property
     def digests(self) -> dict[str, str]:
-        """SHA-256 of each catalog file that an entry was taken from, by the name of the file."""
+        """Return the SHA-256 of each catalog file of which an entry is used, by name of the file."""
         used = {entry.source for entry in self.entries.values()}
         documents = [catalog.document for catalog in self._files.values() if catalog is not None]
         return {document.name: document.digest for document in documents if document.name in used}
@@ -97,9 +100,9 @@ class CatalogLibrary:
             return None
         node = catalog.entries.get(reference.entry_name)
         if node is None:
-            self._wrong(
+            self._error(
                 reference,
-                f"the catalog {quoted(catalog.name)} has no entry {quoted(reference.entry_name)}",
+                f"catalog {quoted(catalog.name)} has no entry {quoted(reference.entry_name)}",
                 suggestion(reference.entry_name, catalog.entries),
             )
             return None
@@ -108,7 +111,7 @@ class CatalogLibrary:
             return None
         rule = rules(Catalog, catalog.version).children.get(node.tag)
         if rule is None:
-            self._wrong(reference, f"{node.tag} is nothing that a catalog may hold", str(catalog.document.name))
+            self._error(reference, f"{node.tag} is not allowed in a catalog", str(catalog.document.name))
             return None
         try:
             self._collector.budget.enter_catalog_element(sum(1 for _ in node.iter()))
@@ -120,8 +123,8 @@ class CatalogLibrary:
         entry = reader.read(node, rule.cls, _assignments(reference), lent)
         for name in sorted(lent.lent or ()):
             self._collector.warning(
-                f"the catalog entry {quoted(reference.entry_name)} uses the scenario's parameter {quoted(name)}",
-                "declare it in the entry and assign it where the entry is used",
+                f"catalog entry {quoted(reference.entry_name)} uses the parameter {quoted(name)} of the scenario",
+                "declare it in the entry, and assign it in the CatalogReference",
                 source=entry.source,
                 line=entry.line,
             )
@@ -131,20 +134,21 @@ class CatalogLibrary:
     def _check_kind(self, found: FoundReference) -> None:
         entry = self.entries.get(found.reference)
         if entry is not None and not isinstance(entry, found.kinds):
-            wanted = " or ".join(kind.__name__ for kind in found.kinds)
-            self._wrong(
+            expected = " or ".join(kind.__name__ for kind in found.kinds)
+            self._error(
                 found.reference,
-                f"the catalog entry {quoted(found.reference.entry_name)} is of the kind {type(entry).__name__}",
-                f"{wanted} is wanted here",
+                f"catalog entry {quoted(found.reference.entry_name)} is a {type(entry).__name__}",
+                f"expected {expected}",
             )
 
     def _catalog(self, found: FoundReference) -> CatalogFile | None:
-        """The catalog of that name: a file of the name first, then any that says so within."""
+        """Return the catalog of that name: first in a file of that name, then in any other file."""
         name = found.reference.catalog_name
         places = self._ordered_places(found.kinds)
         if not places:
-            wanted = " or ".join(f"{kind.__name__}Catalog" for kind in found.kinds)
-            self._wrong(found.reference, f"no place is given for the catalog {quoted(name)}", f"add {wanted}")
+            expected = " or ".join(f"{kind.__name__}Catalog" for kind in found.kinds)
+            message = f"catalog {quoted(name)} has no location in CatalogLocations"
+            self._error(found.reference, message, f"add {expected}")
             return None
         catalogs: dict[Path, CatalogFile] = {}
         unreadable: list[Diagnostic] = []
@@ -169,22 +173,22 @@ class CatalogLibrary:
         if beside is not None:
             place = Path(beside.document.name).parent
             self._collector.warning(
-                f"the catalog {quoted(name)} lies in none of the places given, but in {place}",
-                f"name that place, {place}",
+                f"catalog {quoted(name)} is not in the given folders, but in {place}",
+                f"specify the folder {place}",
                 source=found.reference.source,
                 line=found.reference.line,
             )
             return beside
-        self._wrong(found.reference, *_nowhere(name, places, {catalog.name for catalog in catalogs.values()}))
+        self._error(found.reference, *_missing_catalog(name, places, {catalog.name for catalog in catalogs.values()}))
         return None
 
     def _beside(self, name: str) -> CatalogFile | None:
-        """The catalog in a folder beside those that are given, which files find that were moved in parts."""
+        """Return the catalog from a sibling of the given folders; this finds it if only some files were moved."""
         folders = {
             folder
             for place in self._places.values()
             if is_folder(place)
-            for folder in _entries(place.parent)
+            for folder in _listing(place.parent)
             if is_folder(folder) and folder not in self._places.values()
         }
         for folder in sorted(folders):
@@ -196,12 +200,12 @@ class CatalogLibrary:
         return None
 
     def _ordered_places(self, kinds: Iterable[type[Element]]) -> list[Path]:
-        """Where catalogs of these kinds lie, then all other places: not every author keeps them apart."""
+        """Return the folders for these kinds, then all others, as files may use one folder for several kinds."""
         own = [self._places[kind.__name__] for kind in kinds if kind.__name__ in self._places]
         return list(dict.fromkeys([*own, *self._places.values()]))
 
     def _file(self, path: Path) -> CatalogFile | None:
-        """The catalog in a file, or None if it has none or cannot be read; `_unreadable` has what is wrong with it."""
+        """Return the catalog in a file; None if it has none or is unreadable, with the errors in `_unreadable`."""
         if path not in self._files:
             collector = DiagnosticCollector()
             try:
@@ -214,12 +218,12 @@ class CatalogLibrary:
                 self._unreadable[path] = tuple(collector.errors)
         return self._files[path]
 
-    def _wrong(self, reference: CatalogReference, message: str, hint: str) -> None:
+    def _error(self, reference: CatalogReference, message: str, hint: str) -> None:
         self._collector.error(message, hint, source=reference.source, line=reference.line)
 
 
-def _entries(folder: Path) -> list[Path]:
-    """The entries of a folder; none of one that may be passed through and not listed."""
+def _listing(folder: Path) -> list[Path]:
+    """Return the content of a folder; an empty list if it cannot be listed."""
     try:
         return list(folder.iterdir())
     except OSError:
@@ -227,7 +231,7 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def catalog_place(directory: str, folder: Path) -> Path:
-    """The folder or file that a Directory names; `eidrive_library/catalogs` is the library's from any folder."""
+    """Return the folder or file of a Directory; `eidrive_library/catalogs` is in the library for any folder."""
     return place_of(directory.replace("\\", "/"), folder)
 
 
@@ -253,33 +257,33 @@ def twins_in(catalog: etree._Element, source: str) -> dict[str, Diagnostic]:
         if name is None or first.setdefault(name, child) is child or name in found:
             continue
         message = f"the catalog has a second entry {name!r}; the first is at line {line_of(first[name])}"
-        found[name] = Diagnostic(message, "give each entry its own name", source, line_of(child))
+        found[name] = Diagnostic(message, "use unique names", source, line_of(child))
     return found
 
 
-def _nowhere(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, str]:
-    """What is wrong where a catalog is in none of the places given, and what would be right."""
-    gone = [shortened(str(place), 300) for place in places if not os.path.exists(place)]
+def _missing_catalog(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, str]:
+    """Return message and hint for a catalog that is not in the given folders."""
+    missing = [shortened(str(place), 300) for place in places if not os.path.exists(place)]
     message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(place), 300) for place in places)
-    if gone:
+    if missing:
         hint = "correct the Directory"
         if is_regular_file(library_path() / "catalogs" / f"{name}.xosc"):
             hint += f"; that of the library is {LIBRARY_FOLDER}/catalogs"
-        return f"{message}; {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} not there", hint
+        return f"{message}; {', '.join(missing)} {'does' if len(missing) == 1 else 'do'} not exist", hint
     return message, suggestion(name, known)
 
 
 def _assignments(reference: CatalogReference) -> dict[str, Assignment]:
-    given = reference.parameter_assignments
+    assignments = reference.parameter_assignments
     return {
         one.parameter_ref: Assignment(one.value, Diagnostic("", "", one.source, one.line))
-        for one in (given.parameter_assignment if given else ())
+        for one in (assignments.parameter_assignment if assignments else ())
         if isinstance(one.parameter_ref, str) and isinstance(one.value, str)
     }
 
 
 def _candidates(places: Iterable[Path], name: str) -> Iterator[Path]:
-    """Files that may hold a catalog of that name, the likely ones first."""
+    """Yield files that may contain a catalog of that name, those with this file name first."""
     for place in places:
         if is_regular_file(place):
             yield place

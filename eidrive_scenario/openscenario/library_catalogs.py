@@ -1,4 +1,4 @@
-"""The catalogs of the library, and what their entries are."""
+"""Catalogs of the library and their entries."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from eidrive_scenario.openscenario.model import Element, MiscObject, Pedestrian,
 from eidrive_scenario.openscenario.reading.document import read_document
 
 CATALOGS = "catalogs"
-"""Their folder in the library."""
+"""Folder of the catalogs in the library."""
 
 
 @dataclass(frozen=True)
 class CatalogEntry:
-    """An entry of a catalog.
+    """Entry of a catalog.
 
-    catalog    name of its catalog
-    name       of the entry
+    catalog    name of the catalog
+    name       name of the entry
     kind       element of the standard, such as `Vehicle`
-    category   of the standard, such as `car`; empty if the kind has none
-    size       length, width and height [m]; None for entries without a body
-    mass       [kg]; None if the file does not state it
+    category   category of the standard, such as `car`; "" if the kind has none
+    size       length, width and height [m]; None for entries without a bounding box
+    mass       mass [kg]; None if the file omits it
     """
 
     catalog: str

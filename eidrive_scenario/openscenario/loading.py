@@ -1,4 +1,4 @@
-"""Load a scenario for one run: from any source, with the parameters that its seed draws."""
+"""Loading of a scenario for one run: from any source, with the parameters that its seed draws."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def load_for_seed(
 ) -> Scenario:
     """Load a scenario with the parameters that its `eidrive.variation` commands draw for this seed.
 
-    source      path, library name, one run of a distribution, a Scenario that is loaded already (returned as it is if
-                no parameter changes), or any other source of `load_scenario`
-    parameters  values that win over drawn ones and over those of the distribution
+    source      path, library name, one run of a distribution, a loaded Scenario (returned itself if no parameter
+                changes), or any other source of `load_scenario`
+    parameters  values that take precedence over drawn ones and over those of the distribution
 
-    Raises ScenarioError for a wrong file, SettingError for a wrong variation.
+    Raise ScenarioError for an invalid file, SettingError for an invalid variation.
     """
     scenario = _load(source, parameters)
     return _draw(scenario, seed, parameters)
@@ -39,23 +39,23 @@ def _load(source: Scenario | Source | ConcreteRun, parameters: Mapping[str, str 
 
 
 def _draw(scenario: Scenario, seed: int, parameters: Mapping[str, str | Assignment] | None) -> Scenario:
-    """The scenario with what the caller assigns and the seed draws; loaded again only if that changes a value."""
+    """Return the scenario with assigned and drawn parameters; it is loaded again only if a value changes."""
     given = {**scenario.assigned, **as_assignments(parameters)}
     drawn = {name: Assignment(text) for name, text in drawn_parameters(scenario, seed).items() if name not in given}
-    wanted = {**drawn, **given}
-    if all(scenario.parameters.get(name) == value.text for name, value in wanted.items()):
+    values = {**drawn, **given}
+    if all(scenario.parameters.get(name) == value.text for name, value in values.items()):
         return scenario
-    return replace(load_scenario(scenario.source, wanted), assigned=given)
+    return replace(load_scenario(scenario.source, values), assigned=given)
 
 
 def load_for_run(
     source: Scenario | Source | ConcreteRun,
     seed: int,
     parameters: Mapping[str, str | Assignment],
-    together: ErrorCollector,
+    collector: ErrorCollector,
 ) -> Scenario:
-    """As `load_for_seed`; a wrong variation is one of several mistakes that are reported at once."""
+    """Load a scenario like `load_for_seed`; errors of its variation are stored in `collector`."""
     scenario = _load(source, parameters)
-    with together:
+    with collector:
         scenario = _draw(scenario, seed, parameters)
     return scenario

@@ -1,4 +1,4 @@
-"""Where the road file of a scenario lies."""
+"""Search for the road file of a scenario."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import File, RoadNetwork
 
 MAPS = "EIDRIVE_MAPS"
-"""Environment variable: folders in which a road file is looked for by its name."""
+"""Environment variable with the folders in which a road file is searched by its name."""
 SUFFIX = ".xodr"
 
 
 def find_road_file(network: RoadNetwork | None, folder: Path, collector: DiagnosticCollector) -> Path | None:
-    """The road file that the scenario names, or None if it names none.
+    """Return the road file of a scenario; None if it has none.
 
-    It is looked for beside the scenario, then by its bare name in the folders of EIDRIVE_MAPS; a name without a
-    suffix, such as Town01, means Town01.xodr.
+    The file is searched relative to the scenario, then by its name in the folders of EIDRIVE_MAPS. A name without a
+    suffix, such as Town01, is completed to Town01.xodr.
     """
     logic = network.logic_file if network else None
     if logic is None or not isinstance(logic.filepath, str) or not logic.filepath.strip():
@@ -30,7 +30,7 @@ def find_road_file(network: RoadNetwork | None, folder: Path, collector: Diagnos
         if is_regular_file(candidate):
             return candidate
     collector.error(
-        f"no road file '{shortened(logic.filepath, 300)}' {_from(folder)} nor in the folders of {MAPS}",
+        f"road file '{shortened(logic.filepath, 300)}' is neither {_location(folder)} nor in the folders of {MAPS}",
         _hint(logic, folder),
         source=logic.source,
         line=logic.line,
@@ -38,9 +38,9 @@ def find_road_file(network: RoadNetwork | None, folder: Path, collector: Diagnos
     return None
 
 
-def _from(folder: Path) -> str:
-    """Where its path starts from; a scenario without a file has the current folder."""
-    return "in the current folder" if folder == Path() else "beside the scenario"
+def _location(folder: Path) -> str:
+    """Describe the base of relative paths; for a scenario without a file it is the current folder."""
+    return "in the current folder" if folder == Path() else "in the folder of the scenario"
 
 
 def _candidates(logic: File, folder: Path) -> Iterator[Path]:
@@ -61,4 +61,4 @@ def _hint(logic: File, folder: Path) -> str:
     known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{SUFFIX}")}
     if known:
         return suggestion(named.name.removesuffix(SUFFIX), known)
-    return f"check LogicFile, or set {MAPS} to where the maps lie"
+    return f"check LogicFile, or set {MAPS} to the folders of the maps"

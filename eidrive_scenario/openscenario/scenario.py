@@ -1,4 +1,4 @@
-"""A scenario, read and checked: what everything above this room works with."""
+"""Scenario that was read and validated: the input of all higher layers."""
 
 from __future__ import annotations
 
@@ -43,23 +43,23 @@ EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scenario whose parameters are put in and whose catalog references lead somewhere.
+    """Scenario with parameters substituted and catalog references resolved.
 
-    name         the file's name without its suffix; the header's description, on one line, where there is no file
-    version      of the standard that the file is written for, as (1, 3)
-    parameters   of the scenario as a whole, with the values that count
-    variables    of the scenario, with their values at the start
-    entities     by name, trailers included; catalog references resolved
-    external     those entities that another tool defines: `entities` has a body of no size for them
-    controllers  of each entity, in the order of the file; catalog references resolved
-    road_file    None if the scenario names none
-    text         of a scenario that came without a file
-    warnings     what the file's version of the standard deprecates
-    source       of this scenario, to load it again with other values
-    assigned     values that the caller gave to parameters; they win over drawn ones
-    digest       SHA-256 of the scenario's content, as hexadecimal digits
-    catalogs     the same of each catalog file that is used, by its path
-    scope        its parameters with their types, for references in settings that are given beside the file
+    name         name of the file without its suffix; without a file, the description of the header in one line
+    version      version of the standard in the header, such as (1, 3)
+    parameters   parameters of the scenario, with their final values
+    variables    variables of the scenario, with their initial values
+    entities     entities by name, including trailers; catalog references resolved
+    external     entities with an ExternalObjectReference; their bodies in `entities` have no size
+    controllers  controllers of each entity in the order of the file; catalog references resolved
+    road_file    path of the OpenDRIVE file; None if the scenario has none
+    text         content of a scenario without a file
+    warnings     warnings of the reader, such as deprecated elements
+    source       source of this scenario, to load it again with other values
+    assigned     parameter values of the caller; they take precedence over drawn ones
+    digest       SHA-256 of the content, as hexadecimal digits
+    catalogs     SHA-256 of each used catalog file, by its path
+    scope        parameters with their types, for references in settings outside the file
     """
 
     name: str
@@ -83,30 +83,30 @@ class Scenario:
 
     @property
     def storyboard(self) -> Storyboard:
-        """What happens when."""
+        """Return the storyboard."""
         assert self.document.storyboard is not None
         return self.document.storyboard
 
     @cached_property
     def custom_commands(self) -> tuple[CustomCommandAction, ...]:
-        """All CustomCommandActions of the storyboard, in the order of the file."""
+        """Return all CustomCommandActions of the storyboard in the order of the file."""
         return tuple(one for one in self.storyboard.walk() if isinstance(one, CustomCommandAction))
 
     def resolved(self, reference: CatalogReference) -> Element:
-        """The catalog's entry, with the values that the reference assigns to its parameters."""
+        """Return the catalog entry with the parameters that the reference assigns."""
         return self.entries[reference]
 
 
 def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | None = None) -> Scenario:
-    """Reads a scenario, with other values for its parameters.
+    """Read a scenario, with other values for its parameters.
 
-    source        a file's path, or the library name of a scenario; the bytes of a file; an XML tree of lxml or of
-                  Python's ElementTree; or an object whose `get_element()` gives such a tree, as a Scenario of
-                  scenariogeneration. Relative paths in a scenario without a file count from the current folder
-    parameters    values by name; an Assignment also knows the file and line that gave the value
+    source      path of a file, or library name of a scenario; the bytes of a file; an XML tree of lxml or
+                ElementTree; or an object whose `get_element()` returns such a tree, such as a Scenario of
+                scenariogeneration. Relative paths in a scenario without a file are relative to the current folder
+    parameters  values by name; an Assignment also has the file and line of the value
 
-    Raises ScenarioError with everything that is wrong with the file and its catalogs, each as file:line; it is a
-    ConstraintError where all of it is that parameters have values outside their constraints.
+    Raise ScenarioError with all errors of the file and its catalogs, each with file and line; ConstraintError if all
+    errors are parameter values that violate their constraints.
     """
     if isinstance(source, str | Path):
         source = from_library(source)
@@ -147,7 +147,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
 
 
 def _body(one: ScenarioObject, body: Element | None) -> EntityObject | None:
-    """What an entity is made of; one that another tool defines is made of nothing in particular."""
+    """Return the body of an entity; an external object has a body without size."""
     if isinstance(body, ExternalObjectReference):
         box = BoundingBox(center=Center(x=0.0, y=0.0, z=0.0), dimensions=Dimensions(length=0.0, width=0.0, height=0.0))
         return MiscObject(
@@ -171,21 +171,21 @@ def _values(declarations: ParameterDeclarations | VariableDeclarations | None) -
 
 def _controllers(one: ScenarioObject, entries: Mapping[CatalogReference, Element]) -> tuple[Controller, ...]:
     found: list[Element | None] = []
-    for given in one.object_controller:
-        found.append(entries.get(given.catalog_reference) if given.catalog_reference else given.controller)
+    for assigned in one.object_controller:
+        found.append(entries.get(assigned.catalog_reference) if assigned.catalog_reference else assigned.controller)
     return tuple(controller for controller in found if isinstance(controller, Controller))
 
 
 def _other_kind(root: OpenScenario | None, name: str) -> Diagnostic:
     if root is not None and root.catalog is not None:
         return Diagnostic(
-            "this is a catalog, not a scenario", "name a scenario that refers to it", name, root.catalog.line
+            "the file is a catalog, not a scenario", "specify a scenario that refers to it", name, root.catalog.line
         )
     distribution = root.parameter_value_distribution if root else None
     if distribution is None:
-        return Diagnostic("this is no scenario", "", name)
+        return Diagnostic("the file is not a scenario", "", name)
     return Diagnostic(
-        "this is a distribution of parameter values, not a scenario",
+        "the file is a parameter value distribution, not a scenario",
         f"its scenario is {distribution.scenario_file.filepath!r}",
         name,
         distribution.line,

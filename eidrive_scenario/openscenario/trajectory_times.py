@@ -1,4 +1,4 @@
-"""Whether a trajectory says when it is passed."""
+"""Check whether a trajectory has times."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from eidrive_scenario.openscenario.model import Clothoid, ClothoidSpline, Elemen
 
 
 def has_times(shape: Element) -> bool:
-    """Return True if a shape has the times that a Timing scales: all of them, and not all equal."""
+    """Return True if a shape has all times that a Timing scales, and they are not all equal."""
     if isinstance(shape, Polyline):
         return _ascend([vertex.time for vertex in shape.vertex])
     if isinstance(shape, Nurbs):

@@ -1,10 +1,10 @@
-"""Parameters that differ from seed to seed, as a scenario's `eidrive.variation` commands state them.
+"""Random parameters per seed, specified by `eidrive.variation` commands of a scenario.
 
     <CustomCommandAction type="eidrive.variation">
         {EgoStart: {uniform: [-0.15, 0.15]}, EgoSpeedFactor: {normal: [1.0, 0.005]}}
     </CustomCommandAction>
 
-The parameters are declared in the file as any other; their declared value is what other engines use.
+The parameters are declared in the file like all others; other engines use their declared value.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ COMMAND = "eidrive.variation"
 
 
 class Distribution(Settings):
-    """How one parameter is drawn: exactly one of the two."""
+    """Distribution of one parameter: either uniform or normal."""
 
     uniform: tuple[float, float] | None = None
     """Lower and upper bound."""
     normal: tuple[float, Annotated[float, Field(ge=0)]] | None = None
-    """Mean and standard deviation, cut at three standard deviations."""
+    """Mean and standard deviation; draws are clipped at three standard deviations."""
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Distribution:
@@ -41,7 +41,7 @@ class Distribution(Settings):
         return self
 
     def draw(self, seed: int, name: str) -> float:
-        """The value of the parameter `name` for this seed."""
+        """Return the value of the parameter `name` for this seed."""
         random = generator(seed, "variation", name)
         if self.uniform is not None:
             return float(random.uniform(*self.uniform))
@@ -50,9 +50,10 @@ class Distribution(Settings):
 
 
 def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
-    """The parameters that this scenario draws for `seed`. Raises SettingError with file:line.
+    """Return the parameters that this scenario draws for `seed`.
 
-    The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but to none that is drawn itself.
+    The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but not to drawn ones. Raise SettingError with
+    file and line if a command is invalid.
     """
     found: list[tuple[CustomCommandAction, dict[Any, Any]]] = []
     for action in _commands(scenario):
@@ -60,7 +61,7 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
         if not isinstance(data, dict):
             raise SettingError(
                 Diagnostic(
-                    f"{COMMAND} holds {quoted(data)}",
+                    f"{COMMAND} is {quoted(data)}",
                     "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}",
                     action.source,
                     action.line,
@@ -81,7 +82,7 @@ def _distribution(scenario: Scenario, action: CustomCommandAction, name: str, sp
     if name not in scenario.parameters:
         raise SettingError(
             Diagnostic(
-                f"{COMMAND} names the undeclared parameter {quoted(name)}",
+                f"{COMMAND}: parameter {quoted(name)} is not declared",
                 suggestion(name, scenario.parameters),
                 action.source,
                 action.line,

@@ -63,7 +63,7 @@ def test_infinite_visual_range_and_extreme_wind_are_accepted(run: Run) -> None:
 
 
 def test_negative_wind_speed_is_rejected(run: Run) -> None:
-    with pytest.raises(InputError, match=r"scene\.xosc:\d+: speed of Wind is -1; give a number that is not negative"):
+    with pytest.raises(InputError, match=r"scene\.xosc:\d+: speed of Wind is -1; a number of at least 0 is expected"):
         run(0.2, ("Ego", everywhere(WEATHER.format(wind=-1, fog=100))), driven=False)
 
 

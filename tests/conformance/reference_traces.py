@@ -1,4 +1,4 @@
-"""Plays scenarios of third parties in the engine, and measures how far the runs go from recorded reference traces.
+"""Runs of third-party scenarios, and their deviations from recorded reference traces.
 
 As a program it prints a table: `python tests/conformance/reference_traces.py [NAME…]`, with EIDRIVE_CORPORA set.
 """
@@ -24,33 +24,34 @@ from eidrive_scenario.storyboard.kinematics.trailers import pairs
 from eidrive_scenario.storyboard.state.states import StateChange
 
 RMS_LIMIT = 0.10
-"""Distance to the reference, root mean square over time [m]."""
+"""Maximum root mean square distance to the reference over time [m]."""
 WORST_LIMIT = 0.5
-"""Distance to the reference at any time [m]."""
+"""Maximum distance to the reference at any time [m]."""
 HEADING_LIMIT = 0.02
-"""Heading against the reference, root mean square over time [rad]."""
+"""Maximum root mean square heading difference over time [rad]."""
 EVENT_LIMIT = 0.05
-"""State changes against the reference [s]."""
+"""Maximum time difference of state changes [s]."""
 ROUNDING = 1e-6
 ENDINGS = {"endTransition", "stopTransition"}
-"""Which of the two leads to completeState, the reference says otherwise than the standard in three cases: it ends what
-is overridden and what is around a stopped action, where the standard stops it, and stops actions that are done at
-once, where the standard ends them. State and time are compared all the same."""
+"""Transitions to completeState. The reference deviates from the standard in three cases: it ends overridden elements
+and parents of a stopped action, where the standard stops them; it stops immediately completed actions, where the
+standard
+ends them. State and time are still compared."""
 
 LINE = "line of the reference table"
-"""Name of the property by which a test hands on its line of the table, from whatever worker it ran on."""
+"""Name of the property with the table line of a test."""
 
 END = "how a scenario of the corpora ended"
-"""Name of the property by which a test hands on the end of its run."""
+"""Name of the property with the end of the run of a test."""
 
-STAND_INS = {
+CONTROLLER_MODELS = {
     "ACCController": "adaptive_cruise",
     "ALKSController": "adaptive_cruise",
     "ALKS_R157SM_Controller": "alks",
     "ExternalController": "external",
     "InteractiveController": "external",
 }
-"""Controllers of esmini that the reference was recorded with, and who plays their part here."""
+"""Controllers of esmini in the reference recordings, with their controller models."""
 
 FOLDERS = {
     "esmini": "esmini/xosc",
@@ -69,7 +70,7 @@ Rows = Mapping[int, Mapping[str, Row]]
 
 @dataclass
 class Run:
-    """What a play came to."""
+    """Result of a run."""
 
     rows: dict[int, dict[str, Row]] = field(default_factory=lambda: defaultdict(dict))
     changes: list[StateChange] = field(default_factory=list)
@@ -78,18 +79,18 @@ class Run:
     ticks: int = 0
     cpu: float = 0.0
     played_by: tuple[str, ...] = ()
-    """Who stood in for controllers of esmini."""
+    """Controller models of esmini controllers in the run."""
 
 
 @dataclass(frozen=True)
 class Drift:
-    """How far one actor is from its reference."""
+    """Deviation of one actor from its reference."""
 
     rms: float
     worst: float
     heading: float
     absent: int
-    """Instants at which only one of the two runs has it."""
+    """Number of instants at which only one of the two runs has the actor."""
 
     @property
     def within(self) -> bool:
@@ -100,15 +101,15 @@ class Drift:
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far a run is from its reference."""
+    """Deviation of a run from its reference."""
 
     actors: Mapping[str, Drift]
     events: float
-    """Largest difference in time of a state change that both made [s]."""
+    """Maximum time difference of state changes that both runs have [s]."""
     unmatched: tuple[str, ...]
-    """State changes that are late or early by more than the limit, or that only one of the two made."""
+    """State changes with a time difference above the limit, or in only one of the runs."""
     renamed: int
-    """State changes that the reference calls an end and we a stop, or the other way round."""
+    """State changes that are ends in one run and stops in the other one."""
     run: Run
 
     @property
@@ -116,16 +117,17 @@ class Deviation:
         return not self.unmatched and all(drift.within for drift in self.actors.values())
 
     def worst(self, measure: str) -> float:
-        """The largest of a measure over the actors."""
+        """Return the maximum of a measure over the actors."""
         return max((getattr(drift, measure) for drift in self.actors.values()), default=0.0)
 
 
 def play(path: Path, *, limit: float) -> Run:
-    """Play a scenario file at steps of 0.01 s to its end or to the time limit [s]."""
-    settings = RunSettings(dt=0.01, time_limit=limit, controllers=STAND_INS)
+    """Run a scenario file in steps of 0.01 s to its end or to the time limit [s]."""
+    settings = RunSettings(dt=0.01, time_limit=limit, controllers=CONTROLLER_MODELS)
     simulation = Simulation(load_scenario(path), settings=settings)
     held = [one.name for controllers in simulation.scenario.controllers.values() for one in controllers]
-    run, end = Run(played_by=tuple(sorted({STAND_INS[name] for name in held if name in STAND_INS}))), None
+    models = {CONTROLLER_MODELS[name] for name in held if name in CONTROLLER_MODELS}
+    run, end = Run(played_by=tuple(sorted(models))), None
     started = time.process_time()
     with simulation:
         names = _names(simulation)
@@ -140,7 +142,7 @@ def play(path: Path, *, limit: float) -> Run:
 
 
 def _names(simulation: Simulation) -> dict[str, str]:
-    """Trailers that are described inside of what draws them, as the reference calls them: its name and a `+`."""
+    """Return trailers defined inside their towing vehicle, by their name in the reference: its name and `+`."""
     declared = {one.name for one in simulation.scenario.document.entities.scenario_object}
     names: dict[str, str] = {}
     for front, back in pairs(simulation.storyboard.context.actors):
@@ -157,7 +159,7 @@ def _keep(run: Run, frame: Frame, names: Mapping[str, str]) -> None:
 
 
 def compare(path: Path, reference: Path, name: str) -> Deviation:
-    """Play a file and compare it with its reference up to the reference's end."""
+    """Run a file and compare it with its reference up to the end of the reference."""
     recorded = _recorded(reference / f"{name}.csv.gz")
     run = play(path, limit=max(recorded) / 100 + 1.0)
     worst, unmatched, renamed = _events(run, reference / f"{name}.events.csv", max(recorded) / 100)
@@ -220,19 +222,19 @@ def _events(run: Run, path: Path, until: float) -> tuple[float, tuple[str, ...],
 
 
 def source_of(corpora: Path, name: str) -> Path:
-    """The scenario file of a reference trace."""
+    """Return the scenario file of a reference trace."""
     corpus, _, file = name.partition("__")
     return corpora / FOLDERS[corpus] / f"{file}.xosc"
 
 
 def comparable(corpora: Path) -> list[str]:
-    """The names of the reference traces that can be compared."""
+    """Return the names of the reference traces that can be compared."""
     lines = (corpora / "reference" / "comparable.txt").read_text().splitlines()
     return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
 def line_of(name: str, found: Deviation) -> str:
-    """One line of the table."""
+    """Return one line of the table."""
     return (
         f"{name:66s} {'ok ' if found.agrees else 'NOT'} rms {found.worst('rms'):7.3f} m  "
         f"max {found.worst('worst'):7.3f} m  heading {found.worst('heading'):6.4f} rad  events {found.events:5.2f} s  "

@@ -1,4 +1,4 @@
-"""Every scenario that third parties wrote loads and plays to its stop trigger, its end or the time limit."""
+"""Runs of all third-party scenarios to their stop trigger, their end or the time limit."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ ENDS = {"stop trigger", "storyboard complete", "time limit"}
 BROKEN = {
     "esmini/xosc/car_walk.xosc": "its catalogs are those of another repository, at an absolute path",
 }
-"""Scenarios that nobody can play as they are, and why."""
+"""Scenarios that cannot be run, with the reason."""
 SMALLEST = {"esmini": 65, "alks": 15, "asam-1.2.0": 13, "asam-1.3.1": 14, "scenario_runner": 16}
-"""So many scenarios each corpus has at least."""
+"""Minimum number of scenarios of each corpus."""
 
 
 def scenarios() -> list[str]:
-    """Files with a storyboard; the others are catalogs and distributions."""
+    """Return the files with a storyboard; the others are catalogs and distributions."""
     found = []
     for path in sorted(Path(CORPORA).rglob("*.xosc")) if CORPORA else ():
         root = etree.parse(path, etree.XMLParser(recover=True)).getroot()
@@ -37,8 +37,8 @@ def scenarios() -> list[str]:
     return found or ["none"]
 
 
-class Watch:
-    """Who was seen in a run, and whether everybody was somewhere."""
+class PresenceObserver:
+    """Observer of the actors of a run and of the validity of their positions."""
 
     def __init__(self) -> None:
         self.seen: set[str] = set()
@@ -62,8 +62,8 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", [name for name in scenarios() if name not in BROKEN])
 @pytest.mark.filterwarnings("default")
-def test_a_scenario_loads_and_plays_to_an_end(name: str, record_property: pytest.RecordProperty) -> None:
-    scenario, watch = load_scenario(Path(CORPORA) / name), Watch()
+def test_corpora_scenario_runs_to_its_end(name: str, record_property: pytest.RecordProperty) -> None:
+    scenario, watch = load_scenario(Path(CORPORA) / name), PresenceObserver()
     settings = RunSettings(dt=0.05, time_limit=60.0)
     result = Simulation(scenario, settings=settings, observers=[watch]).run()
     record_property(END, f"{name}: {result.end_reason} at {result.simulated_s:.2f} s")
@@ -79,14 +79,14 @@ def _placed(private: object) -> bool:
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_scenario_says_what_is_wrong_with_it(name: str, record_property: pytest.RecordProperty) -> None:
+def test_corpora_invalid_scenario_has_expected_error(name: str, record_property: pytest.RecordProperty) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(Path(CORPORA) / name)
     assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
     record_property(END, f"{name}: refused, as {BROKEN[name]} at line {caught.value.diagnostics[0].line}")
 
 
-def test_no_scenario_is_left_out() -> None:
+def test_corpora_scenarios_are_all_covered() -> None:
     names = scenarios()
     for corpus, least in SMALLEST.items():
         assert sum(name.startswith(f"{corpus}/") for name in names) >= least
@@ -102,8 +102,8 @@ def test_no_scenario_is_left_out() -> None:
         ("LaneOffsetActionExample", "hero", ("4", -1)),
     ],
 )
-def test_scenarios_for_carla_start_on_their_lanes_in_its_direction(name: str, entity: str, lane: tuple) -> None:
-    """Their world positions have CARLA's axes: seen with y to the left they lie outside of the town."""
+def test_carla_scenarios_start_on_lanes_in_driving_direction(name: str, entity: str, lane: tuple) -> None:
+    """Their world positions have the left-handed axes of CARLA; with y to the left they are outside of the town."""
     scenario = load_scenario(Path(CORPORA) / "scenario_runner" / f"{name}.xosc")
     with Simulation(scenario, settings=RunSettings(dt=0.05)) as simulation:
         simulation.tick()

@@ -1,4 +1,4 @@
-"""The distribution files of the corpora: how many runs they stand for, and that each value makes a scenario."""
+"""Distribution files of the corpora: number of runs, and validity of each value."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def distributions() -> list[Path]:
     return [path for path in sorted(CORPORA.rglob("*.xosc")) if definition(path) == "distribution"] if CORPORA else []
 
 
-def test_all_files_are_counted() -> None:
-    """The sums are those that others counted: 121,060 runs in all variations of ALKS, 52,500 in the largest."""
+def test_distribution_files_are_all_covered() -> None:
+    """The expected sums are from an independent count: 121,060 runs in all ALKS variations, 52,500 in the largest."""
     counts = {path: len(load_distribution(path)) for path in distributions()}
     assert len(counts) == 21
     assert sum(count for path, count in counts.items() if path.parent.name == "alks") == 121_060
     assert counts[next(path for path in counts if path.name == LARGEST)] == 52_500
 
 
-def test_the_largest_is_counted_at_once_and_walked_in_constant_memory() -> None:
+def test_largest_distribution_iterates_in_constant_memory() -> None:
     path = next(path for path in distributions() if path.name == LARGEST)
     started = time.process_time()
     runs = load_distribution(path)
@@ -54,8 +54,8 @@ def test_the_largest_is_counted_at_once_and_walked_in_constant_memory() -> None:
 
 
 @pytest.mark.filterwarnings("default")
-def test_a_cut_in_at_a_gap_of_less_than_nothing_never_begins() -> None:
-    """Run 12,394: `dx0_m` is 0, and no free space is less than 0 m; without the cut-in nothing ends the run."""
+def test_cut_in_at_negative_gap_never_starts() -> None:
+    """In run 12,394 `dx0_m` is 0, and free space is never negative; the stop trigger waits for the cut-in."""
     path = next(path for path in distributions() if path.name == LARGEST)
     runs = load_distribution(path)
     assert sum(run.parameters[TRIGGER] == "0" for run in runs) == 7_500
@@ -72,18 +72,18 @@ def test_a_cut_in_at_a_gap_of_less_than_nothing_never_begins() -> None:
     )
 
 
-def test_check_tells_of_such_runs() -> None:
-    """In the others the condition can hold."""
+def test_check_distribution_reports_impossible_conditions() -> None:
+    """In the other runs the condition can hold."""
     path = next(path for path in distributions() if path.name == LARGEST)
     (told,) = (one for one in check_distribution(path).warnings if one.rule == "impossible-condition")
     number, _, what = told.message.removeprefix("in run ").partition(": ")
     assert load_distribution(path)[int(number)].parameters[TRIGGER] == "0"
-    assert what.startswith("condition 'CutInStartCondition' never counts as true: a distance is never negative")
+    assert what.startswith("condition 'CutInStartCondition' is never true: a distance is never negative")
 
 
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
-def test_every_value_makes_a_scenario(path: Path) -> None:
-    """Nothing is wrong with any; some of their combinations are outside constraints, which is a warning."""
+def test_every_value_loads_as_scenario(path: Path) -> None:
+    """No file has errors; some combinations violate constraints, which is a warning."""
     collector = check_distribution(path)
     assert collector.errors == ()
     own = [warning for warning in collector.warnings if warning.source == str(path)]
@@ -92,7 +92,7 @@ def test_every_value_makes_a_scenario(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
-def test_a_run_has_the_values_of_its_combination(path: Path) -> None:
+def test_run_has_the_values_of_its_combination(path: Path) -> None:
     runs = load_distribution(path)
     for number in runs.spread(5):
         run = runs[number]

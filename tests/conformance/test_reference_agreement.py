@@ -1,4 +1,4 @@
-"""Scenarios of third parties against what esmini 3.6.0 does with them at the same step of 0.01 s.
+"""Comparison of third-party scenarios with runs of esmini 3.6.0 at the same step of 0.01 s.
 
 Every actor within 0.10 m root mean square and 0.5 m at worst, headings within 0.02 rad root mean square, every state
 change of a named element within 0.05 s. A table of all deviations stands at the end of pytest's report.
@@ -54,7 +54,7 @@ NOT_MET = {
         "into the next lane"
     ),
 }
-"""What is not met: which of the two is right by the standard, and why."""
+"""Known deviations, with the engine that is correct by the standard and the reason."""
 
 
 def names() -> list[str]:
@@ -64,7 +64,7 @@ def names() -> list[str]:
 @pytest.mark.timeout(240)
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("name", names())
-def test_a_scenario_agrees_or_it_is_known_why_not(name: str, record_property: pytest.RecordProperty) -> None:
+def test_scenario_matches_reference_or_known_deviation(name: str, record_property: pytest.RecordProperty) -> None:
     found = compare(source_of(Path(CORPORA), name), Path(CORPORA) / "reference", name)
     record_property(LINE, line_of(name, found) + (f"  - {NOT_MET[name]}" if name in NOT_MET else ""))
     beyond = {actor: drift for actor, drift in found.actors.items() if not drift.within}
@@ -75,14 +75,14 @@ def test_a_scenario_agrees_or_it_is_known_why_not(name: str, record_property: py
         assert found.unmatched == ()
 
 
-def test_the_list_of_what_is_not_met_is_of_scenarios_that_are_compared() -> None:
+def test_known_deviations_are_compared_scenarios() -> None:
     assert set(NOT_MET) <= set(names())
     assert len(NOT_MET) <= 8
 
 
 @pytest.mark.parametrize("name", ["ALKS__alks_scenario_4_2_1_fully_blocking_target_template", "esmini__acc-test"])
 @pytest.mark.filterwarnings("default")
-def test_without_a_stand_in_an_unknown_controller_leaves_lane_and_speed(name: str) -> None:
+def test_unknown_controller_without_model_keeps_lane_and_speed(name: str) -> None:
     scenario = load_scenario(source_of(Path(CORPORA), name))
     with Simulation(scenario, settings=RunSettings(dt=0.1)) as simulation:
         frames = [simulation.tick()[0] for _ in range(100)]

@@ -1,4 +1,4 @@
-"""Our reader against ASAM's schemas: the same judgment, valid or invalid, on every file and on 3,300 mutants of them.
+"""Agreement of the reader with the ASAM schemas on the validity of all files and of 3,300 mutants.
 
 The schemas and the files are in the folder that EIDRIVE_CORPORA names. Where the two do not agree, a table that the
 test prints says on what, how often, and why; a disagreement that it does not explain fails.
@@ -43,20 +43,20 @@ VALUES += ["1e5", "--1", "nan", "1_0", "lessThan", "${1+1}", "${a<b}", "$", "$No
 VALUES += ["2020-02-30T00:00:00", "2020-02-29T00:00:00+14:00"]
 
 
-OURS_ALONE = {
+READER_ONLY = {
     "unknown parameter": "the schema sees that a reference is well-formed, not whether its parameter is declared",
     "declared twice": "the schema has no rule for names",
-    r"\$\w+ is '.*', which is no": "the schema does not put in parameters; this one's value is not of the type needed",
+    r"\$\w+ is '.*', which is no": "the schema does not substitute parameters; the value is not of the required type",
     "the expression '.*' (is .*, which is not|has no)": "the schema does not calculate",
-    "the parameter '.*' is '.*', which is not": "the schema does not hold a parameter's value against its type",
-    "a constraint of the parameter '.*' is not": "the schema does not hold a constraint against the parameter's type",
+    "parameter '.*' is '.*', which is not": "the schema does not check a parameter value against its type",
+    "a constraint of parameter '.*' is not": "the schema does not check a constraint against the parameter type",
     "outside its constraints": "the schema does not compare; the standard has such a scenario not evaluated",
     "is empty$": "up to 1.2 the schema lets an element choose none of its alternatives, which then means nothing",
     "FileHeader has the rev": "the schema takes any number for the version, and a parameter too; it decides all else",
-    "the file is written for OpenSCENARIO": "the schema takes any number for the version",
+    "FileHeader has the version": "the schema takes any number for the version",
 }
-"""What we refuse and the schema does not: a pattern of our message, and why."""
-THEIRS_ALONE = {
+"""Patterns of reader errors without a schema error, with the reason."""
+SCHEMA_ONLY = {
     "Character content is not allowed, because the content type is empty": (
         "the schema wants nothing at all in such an element; files have white space there, which is a warning"
     ),
@@ -76,27 +76,27 @@ THEIRS_ALONE = {
         "scenariogeneration writes the word of 1.3 in files of 1.2, which is a warning"
     ),
 }
-"""What the schema refuses and we do not: a pattern of its message, and why."""
+"""Patterns of schema errors without a reader error, with the reason."""
 
 
 @dataclass(frozen=True)
-class Judged:
-    """One file or mutant, as both see it."""
+class Verdict:
+    """Errors of the schema and of the reader for one file or mutant."""
 
     what: str
     schema: tuple[str, ...]
-    """What the schema has against it."""
+    """Errors of the schema."""
     errors: tuple[str, ...]
 
     @property
     def agreed(self) -> bool:
-        """Whether both find it valid, or both find it invalid."""
+        """Whether both accept or both reject the file."""
         return bool(self.schema) == bool(self.errors)
 
     def explanations(self) -> set[tuple[str, str, str]]:
-        """Why they disagree: who refuses it, for what, and why the other does not; what is unexplained has no why."""
-        return {self._explained("we", message, OURS_ALONE) for message in self.errors} | {
-            self._explained("the schema", message, THEIRS_ALONE) for message in self.schema
+        """Return source, message pattern and reason of each disagreement; an unexplained one has no reason."""
+        return {self._explained("we", message, READER_ONLY) for message in self.errors} | {
+            self._explained("the schema", message, SCHEMA_ONLY) for message in self.schema
         }
 
     @staticmethod
@@ -105,35 +105,37 @@ class Judged:
         return next(found, (who, message, ""))
 
 
-class Judge:
-    """Both judges. A file is held against the schema of the version that it names; where that is no known one, against
-    the schema of the file that it was made from."""
+class Validator:
+    """Validation by schema and reader.
+
+    The schema is that of the version in the file; for an unknown version, that of the original file.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._schemas = {version: etree.XMLSchema(etree.parse(folder / name)) for version, name in SCHEMAS.items()}
 
     def version_of(self, root: etree._Element) -> tuple[str, str] | None:
-        """The version that a file names, if it is a known one."""
+        """Return the version in the header of a file, None if it is unknown."""
         header = root.find("FileHeader")
         named = None if header is None else (header.get("revMajor", "").strip(), header.get("revMinor", "").strip())
         return named if named in self._schemas else None
 
-    def judge(self, what: str, xml: bytes, otherwise: tuple[str, str]) -> Judged:
-        """Ask both about a file's bytes."""
+    def judge(self, what: str, xml: bytes, otherwise: tuple[str, str]) -> Verdict:
+        """Validate the bytes of a file by schema and reader."""
         root = etree.fromstring(xml)
         schema = self._schemas[self.version_of(root) or otherwise]
         valid = schema.validate(root)
         complaints = () if valid else tuple(str(entry.message) for entry in schema.error_log)
         collector = DiagnosticCollector()
         read_root(open_document(xml), collector)
-        return Judged(what, complaints, tuple(diagnostic.message for diagnostic in collector.errors))
+        return Verdict(what, complaints, tuple(diagnostic.message for diagnostic in collector.errors))
 
 
 Mutation = Callable[[etree._Element, random.Random, "Pool"], None]
 
 
 class Pool:
-    """Elements and attributes that occur anywhere, to put where they do not belong."""
+    """Elements and attributes of all files, for insertion at wrong positions."""
 
     def __init__(self, trees: list[etree._Element]) -> None:
         nodes = [node for tree in trees for node in tree.iter(etree.Element)]
@@ -158,7 +160,7 @@ def rename_element(node: etree._Element, dice: random.Random, pool: Pool) -> Non
 
 
 def move_element(node: etree._Element, dice: random.Random, _: Pool) -> None:
-    """To another place among its siblings, or to another parent that is not below it."""
+    """Move an element among its siblings, or to another parent outside of it."""
     parent = node.getparent()
     if parent is None:
         return
@@ -228,7 +230,7 @@ def name_of(path: Path) -> str:
 
 
 def mutants(count: int, seed: int, changes: int = 1) -> Iterator[tuple[Path, str, bytes]]:
-    """`count` changed files for each kind of mutation, from all files alike; none that is as it was."""
+    """Yield `count` changed files for each kind of mutation, evenly from all files."""
     dice = random.Random(seed)
     trees = {path: etree.parse(path).getroot() for path in files()}
     pool = Pool(list(trees.values()))
@@ -248,13 +250,13 @@ def mutants(count: int, seed: int, changes: int = 1) -> Iterator[tuple[Path, str
 
 
 @pytest.fixture(scope="module")
-def judge() -> Judge:
+def judge() -> Validator:
     assert CORPORA is not None
-    return Judge(CORPORA / "schema")
+    return Validator(CORPORA / "schema")
 
 
-def table(judged: list[Judged]) -> list[str]:
-    """The disagreements, the most frequent first."""
+def table(judged: list[Verdict]) -> list[str]:
+    """Return the lines of all disagreements, the most frequent first."""
     lines: Counter[tuple[str, str, str]] = Counter()
     examples: dict[tuple[str, str, str], str] = {}
     for one in judged:
@@ -267,7 +269,7 @@ def table(judged: list[Judged]) -> list[str]:
     ]
 
 
-def assert_explained(judged: list[Judged], capsys: pytest.CaptureFixture[str]) -> None:
+def assert_explained(judged: list[Verdict], capsys: pytest.CaptureFixture[str]) -> None:
     lines = table(judged)
     valid = sum(one.agreed and not one.errors for one in judged)
     invalid = sum(one.agreed and bool(one.errors) for one in judged)
@@ -278,15 +280,15 @@ def assert_explained(judged: list[Judged], capsys: pytest.CaptureFixture[str]) -
     assert [line for line in lines if NOT_EXPLAINED in line] == []
 
 
-def test_both_judge_every_file_alike(judge: Judge, capsys: pytest.CaptureFixture[str]) -> None:
-    """Five catalogs are written for 0.9, which has no schema here; that of 1.0 refuses them, and so do we."""
+def test_reader_and_schema_agree_on_every_file(judge: Validator, capsys: pytest.CaptureFixture[str]) -> None:
+    """Five catalogs have version 0.9 without a schema; the schema of 1.0 and the reader reject them."""
     judged = [judge.judge(name_of(path), path.read_bytes(), ("1", "0")) for path in files()]
     assert len(judged) > 150
     assert sum(not one.agreed for one in judged) <= 1
     assert_explained(judged, capsys)
 
 
-def test_both_judge_mutants_alike(judge: Judge, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reader_and_schema_agree_on_mutants(judge: Validator, capsys: pytest.CaptureFixture[str]) -> None:
     judged = []
     for path, kind, xml in mutants(MUTANTS_OF_A_KIND, SEED):
         version = judge.version_of(etree.parse(path).getroot()) or ("1", "0")
@@ -297,8 +299,8 @@ def test_both_judge_mutants_alike(judge: Judge, capsys: pytest.CaptureFixture[st
     assert_explained(judged, capsys)
 
 
-def test_mutants_bring_out_nothing_but_our_errors(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The file is loaded with its catalogs and the name of its road, or unfolded."""
+def test_mutants_raise_only_scenario_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file is loaded with its catalogs and the path of its road file, or expanded."""
     assert CORPORA is not None
     folders = sorted({str(path.parent) for path in CORPORA.rglob("*.xodr")})
     monkeypatch.setenv("EIDRIVE_MAPS", os.pathsep.join(folders))

@@ -17,7 +17,7 @@ VEHICLE = """<Vehicle name="car" vehicleCategory="car">
 </Vehicle>"""
 
 SCENARIO = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="{minor}" date="2026-01-31T12:00:00" description="a test" author="nobody"/>
+<FileHeader revMajor="1" revMinor="{minor}" date="2026-01-31T12:00:00" description="a test" author="test"/>
 {declarations}
 <CatalogLocations>{catalogs}</CatalogLocations>
 <RoadNetwork>{road}</RoadNetwork>
@@ -47,7 +47,7 @@ TIME = '<SimulationTimeCondition rule="greaterThan" value="1"/>'
 
 @pytest.fixture
 def scenario_xml() -> Callable[..., bytes]:
-    """A whole scenario around the parts that a test is about."""
+    """Return a function that builds a complete scenario from the parts of a test."""
 
     def build(
         *,
@@ -76,7 +76,7 @@ def scenario_xml() -> Callable[..., bytes]:
 
 @pytest.fixture
 def story_xml() -> Callable[..., str]:
-    """A story with one event; its action and the value of its condition may be given."""
+    """Return a function that builds a story with one event, with an optional action and condition."""
 
     def build(*, action: str = "", speed: str = "10", condition: str = TIME) -> str:
         return STORY.format(
@@ -88,7 +88,7 @@ def story_xml() -> Callable[..., str]:
 
 @pytest.fixture
 def parameters_xml() -> Callable[..., str]:
-    """Parameter declarations from `name=(type, value)`."""
+    """Return a function that builds parameter declarations from `name=(type, value)`."""
 
     def build(**declared: tuple[str, str]) -> str:
         one = '<ParameterDeclaration name="{}" parameterType="{}" value="{}"/>'

@@ -36,7 +36,7 @@ def test_elements_forgotten_and_found_again_keep_their_lines() -> None:
 def test_messages_name_the_line_of_a_long_file(tmp_path: Path) -> None:
     path = tmp_path / "long.xosc"
     path.write_text(f'<OpenSCENARIO>{FAR}<FileHeader revMajor="1" revMinor="9"/></OpenSCENARIO>')
-    with pytest.raises(ScenarioError, match=r"long\.xosc:70001: the file is written for OpenSCENARIO 1\.9"):
+    with pytest.raises(ScenarioError, match=r"long\.xosc:70001: FileHeader has the version 1\.9"):
         load_scenario(path)
     with pytest.raises(RoadError, match=r"town:70001: road '1' has no <lanes>"):
         RoadNetwork.parse(f'<OpenDRIVE>{FAR}<road id="1" length="5"><planView/></road></OpenDRIVE>', "town")

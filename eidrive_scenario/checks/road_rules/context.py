@@ -1,4 +1,4 @@
-"""A scenario and its roads, as the rules look at them that ask where something is."""
+"""Lint context of the rules that need the road network."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from eidrive_scenario.world.view import WorldView
 
 
 class RoadLintContext(LintContext):
-    """What the rules ask about a scenario and its roads, before anybody is in the world."""
+    """Lint context of a scenario with its road network, without actors in the world."""
 
     def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
         super().__init__(scenario)
         self.roads = roads
-        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=_nobody())
+        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=_empty_view())
 
     def place(self, position: Position) -> ResolvedPosition | None:
-        """Where a position is, None where that depends on where somebody is. Raises InputError if it is nowhere."""
+        """Return the resolved position; None if it depends on an entity. Raise InputError if it does not exist."""
         if referenced_entities(position):
             return None
         try:
@@ -38,10 +38,10 @@ class RoadLintContext(LintContext):
 
     @cached_property
     def unresolved(self) -> dict[int, InputError]:
-        """Why a position is nowhere, by the identity of the position."""
-        return dict(self._lost())
+        """Return the errors of positions that cannot be resolved, by identity of the position."""
+        return dict(self._unresolved())
 
-    def _lost(self) -> Iterator[tuple[int, InputError]]:
+    def _unresolved(self) -> Iterator[tuple[int, InputError]]:
         for element in self.elements:
             if isinstance(element, Position):
                 try:
@@ -50,12 +50,12 @@ class RoadLintContext(LintContext):
                     yield id(element), error
 
     def outside(self, x: list[float], y: list[float]) -> list[float]:
-        """How far points lie from the nearest road's edge [m]; 0 on a road."""
+        """Return the distances of points from the edge of the nearest road [m]; 0 on a road."""
         assert self.roads is not None
-        found: list[float] = self.roads.locate(x, y, reach=np.inf).outside.tolist()
-        return found
+        distances: list[float] = self.roads.locate(x, y, reach=np.inf).outside.tolist()
+        return distances
 
 
-def _nobody() -> WorldView:
+def _empty_view() -> WorldView:
     none, points = np.empty(0), np.empty((0, 3))
     return WorldView(0.0, -1, (), (), points, none, none, none, points, points, none, none, points, points)

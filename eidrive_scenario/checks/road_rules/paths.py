@@ -1,4 +1,4 @@
-"""Rules on ways: trajectories and waypoints off the road, routes that lead nowhere."""
+"""Rules about trajectories and waypoints outside of roads, and about impossible routes."""
 
 from __future__ import annotations
 
@@ -23,55 +23,56 @@ from eidrive_scenario.storyboard.kinematics.route import build_route
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, sample_trajectory
 
 MARGIN = 2.0
-"""How far from the outermost lane a vehicle may be and still count as on the road [m]: a bay, a verge."""
+"""Maximum distance from the outermost lane that counts as on the road [m], for bays and verges."""
 SPACING = 2.0
-"""Distance between the points of a trajectory that are looked at [m]."""
+"""Distance between the checked points of a trajectory [m]."""
 MAX_POINTS = 5000
-"""Maximum number of these points: those of a trajectory of more than 10 km are further apart."""
+"""Maximum number of checked points; their distance is larger on trajectories of more than 10 km."""
 
 
-class _Relative(Exception):
-    """A position depends on where somebody is."""
+class _RelativePosition(Exception):
+    """Position that depends on the pose of an entity."""
 
 
 def trajectories_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """A trajectory of a vehicle that leaves all roads."""
+    """Yield trajectories of vehicles that leave all roads."""
     if context.roads is None:
         return
     for action, actors in context.performances:
         for element in action.walk():
             if isinstance(element, FollowTrajectoryAction) and _vehicles(context, actors):
                 trajectory = _trajectory(context, element.trajectory_ref or element)
-                layout = _layout(context, trajectory) if trajectory is not None else None
-                if trajectory is not None and layout is not None:
-                    yield from _leaves(context, element, trajectory, layout)
+                curve = _curve(context, trajectory) if trajectory is not None else None
+                if trajectory is not None and curve is not None:
+                    yield from _departure(context, element, trajectory, curve)
 
 
-def _leaves(
-    context: RoadLintContext, action: FollowTrajectoryAction, trajectory: Trajectory, layout: TrajectoryCurve
+def _departure(
+    context: RoadLintContext, action: FollowTrajectoryAction, trajectory: Trajectory, curve: TrajectoryCurve
 ) -> Iterator[Diagnostic]:
-    count = min(max(2, math.ceil(layout.length / SPACING) + 1), MAX_POINTS)
-    along = [layout.length * number / (count - 1) for number in range(count)]
-    points = [layout.at(s) for s in along]
+    """Yield a diagnostic at the first point of a curve outside of the road."""
+    count = min(max(2, math.ceil(curve.length / SPACING) + 1), MAX_POINTS)
+    distances = [curve.length * number / (count - 1) for number in range(count)]
+    points = [curve.at(s) for s in distances]
     outside = context.outside([point.x for point in points], [point.y for point in points])
     first = next((number for number, gap in enumerate(outside) if gap > MARGIN), None)
     if first is not None:
-        where = points[first]
+        point = points[first]
         yield at(
             action,
-            f"the trajectory {trajectory.name!r} leaves the road after {along[first]:.0f} m, at x = {where.x:.1f}, "
-            f"y = {where.y:.1f}; it gets {max(outside):.1f} m away from it",
+            f"trajectory {trajectory.name!r} leaves the road after {distances[first]:.0f} m, at x = {point.x:.1f}, "
+            f"y = {point.y:.1f}; its maximum distance from the road is {max(outside):.1f} m",
             "move its points onto a lane, or check the road file",
         )
 
 
-def _layout(context: RoadLintContext, trajectory: Trajectory) -> TrajectoryCurve | None:
-    """The trajectory in the world, None where it depends on somebody or a point of it is nowhere."""
+def _curve(context: RoadLintContext, trajectory: Trajectory) -> TrajectoryCurve | None:
+    """Return the trajectory in the world frame; None if a point depends on an entity or cannot be resolved."""
 
     def pose(position: Position) -> Pose:
         place = context.place(position)
         if place is None:
-            raise _Relative
+            raise _RelativePosition
         return place.pose
 
     spline = trajectory.shape.clothoid_spline
@@ -79,19 +80,19 @@ def _layout(context: RoadLintContext, trajectory: Trajectory) -> TrajectoryCurve
         return None
     try:
         return sample_trajectory(trajectory, pose)
-    except (_Relative, InputError, ValueError, ZeroDivisionError):
+    except (_RelativePosition, InputError, ValueError, ZeroDivisionError):
         return None
 
 
-def _trajectory(context: RoadLintContext, given: TrajectoryRef | FollowTrajectoryAction) -> Trajectory | None:
-    if given.trajectory is not None or given.catalog_reference is None:
-        return given.trajectory
-    entry = context.scenario.entries.get(given.catalog_reference)
+def _trajectory(context: RoadLintContext, holder: TrajectoryRef | FollowTrajectoryAction) -> Trajectory | None:
+    if holder.trajectory is not None or holder.catalog_reference is None:
+        return holder.trajectory
+    entry = context.scenario.entries.get(holder.catalog_reference)
     return entry if isinstance(entry, Trajectory) else None
 
 
 def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """A waypoint beside the road."""
+    """Yield waypoints outside of the road."""
     if context.roads is None:
         return
     for route in _routes(context):
@@ -100,11 +101,11 @@ def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
                 continue
             gap = context.outside([place.pose.x], [place.pose.y])[0]
             if gap > MARGIN:
-                yield at(waypoint, f"the waypoint is {gap:.1f} m off the road", "move it onto a lane")
+                yield at(waypoint, f"the waypoint is {gap:.1f} m outside the road", "move it onto a lane")
 
 
 def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """A route between whose waypoints no lanes lead."""
+    """Yield routes whose waypoints are not connected by lanes."""
     if context.roads is None:
         return
     for route in _routes(context):
@@ -119,7 +120,7 @@ def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:
 
 
 def _routes(context: RoadLintContext) -> Iterator[Route]:
-    """Routes that the scenario uses, each once."""
+    """Yield the routes that the scenario uses, each once."""
     routes = []
     for element in context.elements:
         if isinstance(element, AssignRouteAction | RouteRef):

@@ -1,4 +1,4 @@
-"""Rules on stations: conflict areas that lie off the road."""
+"""Rules about stations: conflict areas outside of the road."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eidrive_scenario.errors import Diagnostic, InputError
 
 
 def conflict_areas_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """A conflict area of which no part lies on a road; wrong settings are reported elsewhere."""
+    """Yield conflict areas without a part on a road; invalid settings are reported by the run setup."""
     try:
         settings = declared_settings(context.scenario, None, None)
     except InputError:

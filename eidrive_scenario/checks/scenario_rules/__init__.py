@@ -1,6 +1,6 @@
-"""What is likely wrong with a scenario though the schema allows it: one rule, one function, one name.
+"""Rules about probable mistakes in scenarios that the schema allows: one function per rule.
 
-docs/checks.md says of each rule what it means, with an example that breaks it and the remedy.
+docs/checks.md describes each rule with an example that violates it and the correction.
 """
 
 from __future__ import annotations
@@ -8,22 +8,28 @@ from __future__ import annotations
 from eidrive_scenario.checks.rule import Level, Rule, at
 from eidrive_scenario.checks.scenario_rules import actions, counterparts, declarations, entities, triggers
 from eidrive_scenario.checks.scenario_rules.context import LintContext
+from eidrive_scenario.checks.scenario_rules.truth_intervals import (
+    IMPOSSIBLE_CONDITION,
+    IMPOSSIBLE_STATE,
+    UNOBSERVED_EDGE,
+    UNREACHABLE,
+)
 
 RULES: tuple[Rule[LintContext], ...] = (
-    Rule("no-stop-trigger", Level.WARNING, "nothing says when the run ends", triggers.no_stop_trigger),
-    Rule("unreachable", Level.WARNING, "it waits for what never comes", triggers.never_seen("unreachable")),
-    Rule("unobserved-edge", Level.WARNING, "an edge that is never seen", triggers.never_seen("unobserved-edge")),
+    Rule("no-stop-trigger", Level.WARNING, "a storyboard without a stop trigger", triggers.no_stop_trigger),
+    Rule(UNREACHABLE, Level.WARNING, "a wait for a state that is never reached", triggers.never_true(UNREACHABLE)),
+    Rule(UNOBSERVED_EDGE, Level.WARNING, "an edge that is never observed", triggers.never_true(UNOBSERVED_EDGE)),
     Rule(
-        "impossible-condition",
+        IMPOSSIBLE_CONDITION,
         Level.WARNING,
         "a condition that can never hold",
-        triggers.never_seen("impossible-condition"),
+        triggers.never_true(IMPOSSIBLE_CONDITION),
     ),
     Rule(
-        "impossible-state",
+        IMPOSSIBLE_STATE,
         Level.WARNING,
         "a state that its element never has",
-        triggers.never_seen("impossible-state"),
+        triggers.never_true(IMPOSSIBLE_STATE),
     ),
     Rule(
         "contradictory-group",
@@ -31,27 +37,32 @@ RULES: tuple[Rule[LintContext], ...] = (
         "conditions of one group that exclude each other",
         triggers.contradictory_groups,
     ),
-    Rule("simultaneous-edges", Level.WARNING, "edges that must come at the same instant", triggers.coinciding_edges),
-    Rule("exact-time-comparison", Level.WARNING, "a time that is met exactly or not at all", triggers.equal_times),
-    Rule("zero-executions", Level.WARNING, "an element that may not be executed", triggers.zero_executions),
-    Rule("no-actors", Level.WARNING, "private actions of nobody", entities.groups_without_actors),
-    Rule("entity-without-position", Level.WARNING, "an entity that is nowhere", entities.never_placed),
-    Rule("unused-entity", Level.WARNING, "an entity that is never spoken of", entities.unused_entities),
-    Rule("zero-wheelbase", Level.WARNING, "a vehicle without a wheelbase", entities.axles_not_apart),
-    Rule("self-reference", Level.WARNING, "an action that relates someone to oneself", entities.relations_to_oneself),
+    Rule("simultaneous-edges", Level.WARNING, "edges that must occur at the same instant", triggers.simultaneous_edges),
+    Rule("exact-time-comparison", Level.WARNING, "a comparison with an exact time", triggers.exact_time_comparisons),
+    Rule("zero-executions", Level.WARNING, "an element with maximumExecutionCount 0", triggers.zero_executions),
+    Rule("no-actors", Level.WARNING, "private actions without actors", entities.groups_without_actors),
+    Rule("entity-without-position", Level.WARNING, "an entity that is never placed", entities.unplaced_entities),
+    Rule("unused-entity", Level.WARNING, "an entity without references", entities.unused_entities),
+    Rule("zero-wheelbase", Level.WARNING, "a vehicle without a wheelbase", entities.zero_wheelbases),
+    Rule("self-reference", Level.WARNING, "an action that refers to its own actor", entities.self_references),
     Rule("conflicting-actions", Level.WARNING, "actions of one event that end each other", actions.conflicting_actions),
-    Rule("above-max-speed", Level.WARNING, "a speed above the vehicle's maxSpeed", actions.too_fast),
-    Rule("zero-rate-transition", Level.NOTE, "a transition at the rate 0", actions.no_progress),
-    Rule("untimed-trajectory", Level.WARNING, "times that are missing or all the same", actions.untimed_trajectories),
-    Rule("unknown-traffic", Level.WARNING, "a stop of traffic that nobody starts", counterparts.unknown_traffic),
-    Rule("unconnected-trailer", Level.WARNING, "a trailer that nothing holds", counterparts.unconnected_trailers),
-    Rule("ineffective-parameter-action", Level.WARNING, "a parameter set for nobody", declarations.unread_parameters),
-    Rule("unused-parameter", Level.WARNING, "a parameter that nothing uses", declarations.unused_parameters),
-    Rule("unused-variable", Level.WARNING, "a variable that nothing uses", declarations.unused_variables),
-    Rule("unused-monitor", Level.WARNING, "a monitor that nothing sets", declarations.unused_monitors),
-    Rule("unused-selection", Level.WARNING, "a selection that nothing uses", declarations.unused_selections),
-    Rule("unused-catalog", Level.NOTE, "a catalog that nothing uses", declarations.unused_catalogs),
+    Rule("above-max-speed", Level.WARNING, "a speed above the vehicle's maxSpeed", actions.speeds_above_max),
+    Rule("zero-rate-transition", Level.NOTE, "a transition with the rate 0", actions.zero_rate_transitions),
+    Rule("untimed-trajectory", Level.WARNING, "a trajectory with missing or equal times", actions.untimed_trajectories),
+    Rule("unknown-traffic", Level.WARNING, "a stop of traffic that no action starts", counterparts.unknown_traffic),
+    Rule("unconnected-trailer", Level.WARNING, "a trailer without hitch or coupler", counterparts.unconnected_trailers),
+    Rule(
+        "ineffective-parameter-action",
+        Level.WARNING,
+        "a set parameter that no condition reads",
+        declarations.ineffective_parameter_actions,
+    ),
+    Rule("unused-parameter", Level.WARNING, "a parameter without references", declarations.unused_parameters),
+    Rule("unused-variable", Level.WARNING, "a variable without references", declarations.unused_variables),
+    Rule("unused-monitor", Level.WARNING, "a monitor that no action sets", declarations.unused_monitors),
+    Rule("unused-selection", Level.WARNING, "a selection without references", declarations.unused_selections),
+    Rule("unused-catalog", Level.NOTE, "a catalog location without references", declarations.unused_catalogs),
 )
-"""The rules that need nothing but the file and its catalogs."""
+"""Rules that need only the file and its catalogs."""
 
 __all__ = ["RULES", "Level", "LintContext", "Rule", "at"]

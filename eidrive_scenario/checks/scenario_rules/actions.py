@@ -1,4 +1,4 @@
-"""Rules on actions: what takes a domain from its neighbor, what is too fast, what never gets anywhere."""
+"""Rules about actions: conflicts of control domains, speeds, transitions and trajectory times."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import combinations
 
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
-from eidrive_scenario.checks.scenario_rules.termination import at_once, has_zero_rate
+from eidrive_scenario.checks.scenario_rules.termination import has_zero_rate, is_immediate
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.model import (
     AbsoluteSpeed,
@@ -44,65 +44,68 @@ _DOMAINS: Mapping[type[Element], str] = {
     LateralDistanceAction: "lateral",
     FollowTrajectoryAction: "lateral",
 }
-"""Actions that take time, and what of an entity they control (ASAM OpenSCENARIO XML, control strategies)."""
+"""Control domain of each action with a duration (ASAM OpenSCENARIO XML, control strategies)."""
 
 TIME_ATTRIBUTES: Mapping[type[Element], str] = {
     Clothoid: "startTime and stopTime",
     ClothoidSpline: "timeEnd",
-    Nurbs: "each control point a time",
+    Nurbs: "the time of each control point",
 }
-"""By shape, the attributes that state its times."""
+"""Attributes of a shape that specify its times."""
 
 
 def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
-    """Two actions of one event that control the same domain of the same entities: the second ends the first."""
+    """Yield actions of one event that end another one, as both control the same domain of the same entities."""
     for node in context.nodes:
         if not isinstance(node.element, Event) or not context.actors(node):
             continue
-        lasting = [(action, leaf) for action in node.element.action if (leaf := _lasting(action)) is not None]
-        for (first, one), (second, other) in combinations(lasting, 2):
-            shared = _controls(one) & _controls(other)
+        leaves = [(action, _with_duration(action)) for action in node.element.action]
+        for (first, one), (second, other) in combinations(leaves, 2):
+            shared = _domains(one) & _domains(other)
             if shared:
                 yield at(
                     second,
-                    f"action {second.name!r} ends action {first.name!r} of the same event at once: both control "
+                    f"action {second.name!r} immediately ends action {first.name!r} of the same event: both control "
                     f"the {' and '.join(sorted(shared))} domain of {', '.join(context.actors(node))}",
-                    "let an event of its own start it, when the other has ended",
+                    "start it by a separate event after the end of the other one",
                 )
 
 
-def _lasting(action: Action) -> Element | None:
-    """What a private action does that takes time."""
+def _with_duration(action: Action) -> Element | None:
+    """Return the specific action of a private action that has a duration."""
     if action.private_action is None:
         return None
     leaf = next((one for one in action.private_action.walk() if type(one) in _DOMAINS), None)
-    if leaf is None or any(isinstance(one, TransitionDynamics) and at_once(one) for one in leaf.walk()):
+    if leaf is None or any(isinstance(one, TransitionDynamics) and is_immediate(one) for one in leaf.walk()):
         return None
     return leaf
 
 
-def _controls(leaf: Element) -> set[str]:
+def _domains(leaf: Element | None) -> set[str]:
+    """Return the control domains of a specific action with a duration."""
+    if leaf is None:
+        return set()
     domains = {_DOMAINS[type(leaf)]}
     if isinstance(leaf, FollowTrajectoryAction) and leaf.time_reference.timing is not None:
         domains.add("longitudinal")
     return domains
 
 
-def too_fast(context: LintContext) -> Iterator[Diagnostic]:
-    """A speed beyond the maxSpeed of the vehicle that shall drive it, forwards or backwards."""
+def speeds_above_max(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield speeds above the maxSpeed of the vehicle, forwards or backwards."""
     for action, actors in context.performances:
         for element in action.walk():
             speed = _speed(element)
             if speed is None:
                 continue
             for name in actors:
-                body = context.scenario.entities.get(name)
-                limit = body.performance.max_speed if isinstance(body, Vehicle) else None
+                entity = context.scenario.entities.get(name)
+                limit = entity.performance.max_speed if isinstance(entity, Vehicle) else None
                 if limit is not None and abs(speed) > limit + 1e-9:
                     yield at(
                         element,
-                        f"{speed:g} m/s is asked of {name!r}, whose maxSpeed is {limit:g} m/s",
-                        "speeds are in m/s; lower it, or raise maxSpeed of the vehicle's Performance",
+                        f"speed {speed:g} m/s of {name!r} exceeds its maxSpeed of {limit:g} m/s",
+                        "speeds are in m/s; lower the speed, or raise maxSpeed in Performance",
                     )
 
 
@@ -112,15 +115,15 @@ def _speed(element: Element) -> float | None:
     return element.speed if isinstance(element, SpeedProfileEntry) else None
 
 
-def no_progress(context: LintContext) -> Iterator[Diagnostic]:
-    """A transition at the rate 0 never reaches its target."""
+def zero_rate_transitions(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield transitions that never reach their target because their rate is 0."""
     for element in context.elements:
         if isinstance(element, TransitionDynamics) and has_zero_rate(element):
-            yield at(element, "at a rate of 0 the action never reaches its target", "give a rate above 0")
+            yield at(element, "with a rate of 0 the action never reaches its target", "specify a rate above 0")
 
 
 def untimed_trajectories(context: LintContext) -> Iterator[Diagnostic]:
-    """Times that count, and are not there or all the same."""
+    """Yield trajectories with a Timing whose times are missing or all equal."""
     for element in context.elements:
         if not isinstance(element, FollowTrajectoryAction) or element.time_reference.timing is None:
             continue
@@ -130,23 +133,24 @@ def untimed_trajectories(context: LintContext) -> Iterator[Diagnostic]:
             yield from _times(shape)
         elif shape is not None and not has_times(shape):
             name = type(shape).__name__
-            what = f"the Timing has nothing to scale: this {name} has no times, so the actor keeps its own speed"
-            yield at(shape, what, f"give {TIME_ATTRIBUTES[type(shape)]}, or write <None/> for the TimeReference")
+            message = f"Timing has no effect: this {name} has no times, so the actor keeps its speed"
+            hint = f"specify {TIME_ATTRIBUTES[type(shape)]}, or write <None/> as the TimeReference"
+            yield at(shape, message, hint)
 
 
 def _times(shape: Polyline) -> Iterator[Diagnostic]:
     for vertex in shape.vertex:
         if vertex.time is None:
-            what = "the Timing has nothing to scale: this vertex has no time, so the actor keeps its own speed"
-            yield at(vertex, what, "give each vertex a time")
+            message = "Timing has no effect: this vertex has no time, so the actor keeps its speed"
+            yield at(vertex, message, "specify the time of each vertex")
     known = [vertex.time for vertex in shape.vertex if vertex.time is not None]
     if len(known) == len(shape.vertex) and all(time == known[0] for time in known):
-        yield at(shape, f"all its vertices have the time {known[0]:g} s", "say when each vertex is passed")
+        yield at(shape, f"all vertices have the time {known[0]:g} s", "specify when each vertex is passed")
 
 
 def _trajectory(action: FollowTrajectoryAction, context: LintContext) -> Trajectory | None:
-    given = action.trajectory_ref or action
-    if given.trajectory is not None or given.catalog_reference is None:
-        return given.trajectory
-    entry = context.scenario.entries.get(given.catalog_reference)
+    holder = action.trajectory_ref or action
+    if holder.trajectory is not None or holder.catalog_reference is None:
+        return holder.trajectory
+    entry = context.scenario.entries.get(holder.catalog_reference)
     return entry if isinstance(entry, Trajectory) else None

@@ -1,4 +1,4 @@
-"""What the rules ask about a scenario; worked out once, when first asked."""
+"""Lint context of the rules without roads; results are computed once, on first use."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnal
 
 
 class LintContext(Outline):
-    """The outline of a scenario, and what its triggers can ever see."""
+    """Outline of a scenario and the analysis of its triggers."""
 
     @cached_property
-    def watches(self) -> tuple[TriggerAnalysis, ...]:
-        """All triggers that are asked at all."""
-        return tuple(ReachabilityAnalysis(self).watches())
+    def triggers(self) -> tuple[TriggerAnalysis, ...]:
+        """Return the analyses of all triggers that are evaluated at some time."""
+        return tuple(ReachabilityAnalysis(self).triggers())

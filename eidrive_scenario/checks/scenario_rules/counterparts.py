@@ -1,4 +1,4 @@
-"""Rules on actions that need a partner: traffic that nobody starts, trailers that nothing holds."""
+"""Rules about actions that need a counterpart: traffic to stop, a hitch or coupler to connect."""
 
 from __future__ import annotations
 
@@ -11,26 +11,28 @@ from eidrive_scenario.openscenario.model import ConnectTrailerAction, TrafficAct
 
 
 def unknown_traffic(context: LintContext) -> Iterator[Diagnostic]:
-    """A TrafficStopAction for traffic of a name that no action gives."""
+    """Yield TrafficStopActions with a traffic name that no other action defines."""
     actions = [element for element in context.elements if isinstance(element, TrafficAction)]
     started = {one.traffic_name for one in actions if one.traffic_stop_action is None and one.traffic_name is not None}
     for one in actions:
         if one.traffic_stop_action is not None and one.traffic_name is not None and one.traffic_name not in started:
-            yield at(one, f"no traffic has the name {one.traffic_name!r}", suggestion(one.traffic_name, started))
+            message = f"TrafficStopAction: no traffic action is named {one.traffic_name!r}"
+            yield at(one, message, suggestion(one.traffic_name, started))
 
 
 def unconnected_trailers(context: LintContext) -> Iterator[Diagnostic]:
-    """A ConnectTrailerAction where the vehicle has no hitch, or the trailer no coupler."""
-    bodies = context.scenario.entities
+    """Yield ConnectTrailerActions of a vehicle without a hitch or a trailer without a coupler."""
+    entities = context.scenario.entities
     for action, actors in context.performances:
         trailer = action.trailer_action
         connect = None if trailer is None else trailer.connect_trailer_action
         if not isinstance(connect, ConnectTrailerAction):
             continue
         for name, part in (*((actor, "TrailerHitch") for actor in actors), (connect.trailer_ref, "TrailerCoupler")):
-            body = bodies.get(name)
-            held = isinstance(body, Vehicle) and (
-                body.trailer_hitch if part == "TrailerHitch" else body.trailer_coupler
+            entity = entities.get(name)
+            has_part = isinstance(entity, Vehicle) and (
+                entity.trailer_hitch if part == "TrailerHitch" else entity.trailer_coupler
             )
-            if not held:
-                yield at(connect, f"{name!r} has no {part}: it is coupled at its reference point", f"give it a {part}")
+            if not has_part:
+                message = f"entity {name!r} has no {part}: it is coupled at its reference point"
+                yield at(connect, message, f"add a {part}")

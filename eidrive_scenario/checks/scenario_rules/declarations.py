@@ -1,4 +1,4 @@
-"""Rules on what is declared: parameters, variables, monitors, selections and catalogs that nobody uses."""
+"""Rules about unused declarations: parameters, variables, monitors, selections and catalogs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _WORD = re.compile(r"\w+")
 
 
 def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:
-    """A declared parameter to whose value nothing in its scope refers."""
+    """Yield declared parameters without a reference in their scope."""
     if not context.files:
         return
     scenario, *catalogs = context.files
@@ -43,15 +43,15 @@ def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:
             name = declaration.get("name", "").removeprefix("$")
             if name not in used:
                 yield Diagnostic(
-                    f"the parameter {name!r} is never used",
-                    f"take it out, or write ${name} where its value belongs",
+                    f"parameter {name!r} is never used",
+                    f"remove it, or use its value as ${name}",
                     context.scenario.document.source,
                     cast("int | None", declaration.sourceline),
                 )
 
 
 def _used(root: etree._Element) -> set[str]:
-    """The parameters whose value is asked for below an element; every word of a text counts, as commands are texts."""
+    """Return the parameters that are used below an element; each word of a text counts, as commands are texts."""
     used: set[str] = set()
     for node in root.iter(etree.Element):
         for key, value in cast(list[tuple[str, str]], node.items()):
@@ -64,43 +64,44 @@ def _used(root: etree._Element) -> set[str]:
     return used
 
 
-def unread_parameters(context: LintContext) -> Iterator[Diagnostic]:
-    """A ParameterAction sets what no condition looks at: `$name` has got its value when the file was read."""
+def ineffective_parameter_actions(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield ParameterActions whose parameter no condition reads; `$name` is replaced when the file is read."""
     read = {one.parameter_ref for one in context.elements if isinstance(one, ParameterCondition)}
     for element in context.elements:
         if isinstance(element, ParameterAction) and element.parameter_ref not in read:
             yield at(
                 element,
-                f"no condition looks at the parameter {element.parameter_ref!r} that is set here",
-                f"${element.parameter_ref} keeps the value that it had when the file was read",
+                f"ParameterAction has no effect: no condition reads parameter {element.parameter_ref!r}",
+                f"${element.parameter_ref} keeps the value from the start of the run",
             )
 
 
 def unused_variables(context: LintContext) -> Iterator[Diagnostic]:
-    """A variable that no condition and no action names."""
-    named = context.named.get("variable", set()) | _in_commands(context)
+    """Yield variables without a reference."""
+    referenced = context.referenced.get("variable", set()) | _words_of_commands(context)
     for element in context.elements:
-        if isinstance(element, VariableDeclaration) and element.name not in named:
-            yield at(element, f"the variable {element.name!r} is never used", "take it out")
+        if isinstance(element, VariableDeclaration) and element.name not in referenced:
+            yield at(element, f"variable {element.name!r} is never used", "remove it")
 
 
 def unused_monitors(context: LintContext) -> Iterator[Diagnostic]:
-    """A monitor that no action sets."""
+    """Yield monitors that no action sets."""
+    referenced = context.referenced.get("monitor", set())
     for element in context.elements:
-        if isinstance(element, MonitorDeclaration) and element.name not in context.named.get("monitor", set()):
-            yield at(element, f"no SetMonitorAction sets the monitor {element.name!r}", "set it, or take it out")
+        if isinstance(element, MonitorDeclaration) and element.name not in referenced:
+            yield at(element, f"monitor {element.name!r} is set by no SetMonitorAction", "set it or remove it")
 
 
 def unused_selections(context: LintContext) -> Iterator[Diagnostic]:
-    """A selection of entities that nothing refers to."""
-    named = context.named.get("entity", set()) | _in_commands(context)
+    """Yield entity selections without a reference."""
+    referenced = context.referenced.get("entity", set()) | _words_of_commands(context)
     for element in context.elements:
-        if isinstance(element, EntitySelection) and element.name not in named:
-            yield at(element, f"the selection {element.name!r} is never used", "take it out")
+        if isinstance(element, EntitySelection) and element.name not in referenced:
+            yield at(element, f"selection {element.name!r} is never used", "remove it")
 
 
 def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:
-    """A place for catalogs from which no entry is taken."""
+    """Yield catalog locations of which no entry is used."""
     locations, path = context.scenario.document.catalog_locations, context.scenario.path
     if locations is None:
         return
@@ -113,11 +114,11 @@ def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:
             continue
         place = absolute(catalog_place(directory.path, folder))
         if not any(file == place or file.parent == place for file in used):
-            gone = "" if os.path.exists(place) else ", which is not there,"
-            yield at(location, f"nothing is taken from the {kind} {directory.path!r}{gone}".rstrip(","), "take it out")
+            missing = "" if os.path.exists(place) else ", which does not exist"
+            yield at(location, f"no entry of the {kind} {directory.path!r} is used{missing}", "remove it")
 
 
-def _in_commands(context: LintContext) -> set[str]:
-    """All words in custom commands: whoever executes them may look a name up."""
+def _words_of_commands(context: LintContext) -> set[str]:
+    """Return all words in custom commands, as their executors may use names in them."""
     texts = [one.content for one in context.elements if isinstance(one, CustomCommandAction)]
     return {word for text in texts for word in _WORD.findall(text)}

@@ -1,4 +1,4 @@
-"""Rules on entities: who is never there, who is never spoken of, groups in which nobody acts."""
+"""Rules about entities: unused or unplaced entities, groups without actors, wheelbases, self-references."""
 
 from __future__ import annotations
 
@@ -26,88 +26,91 @@ _WORD = re.compile(r"\w+")
 
 
 def _objects(context: LintContext) -> Iterator[ScenarioObject]:
-    """The scenario objects that stand in the file for an entity of their own."""
+    """Yield the scenario objects of the file that are not trailers of another entity."""
     entities = context.scenario.document.entities
     for one, _ in scenario_objects(entities, context.scenario.entries):
         if one.name in context.scenario.entities and one.name not in context.trailers:
             yield one
 
 
-def _spoken_of(context: LintContext) -> set[str]:
-    names = {one for name in context.named.get("entity", set()) for one in context.members(name)}
+def _referenced_entities(context: LintContext) -> set[str]:
+    names = {one for name in context.referenced.get("entity", set()) for one in context.members(name)}
     commands = [one.content for one in context.elements if isinstance(one, CustomCommandAction)]
     return names | {word for text in commands for word in _WORD.findall(text)}
 
 
 def unused_entities(context: LintContext) -> Iterator[Diagnostic]:
-    """An entity that is declared, and then never spoken of; what has a controller may be known to that."""
-    spoken_of = _spoken_of(context)
+    """Yield entities without a reference and without a controller, which may use its entity."""
+    referenced = _referenced_entities(context)
     for one in _objects(context):
-        if one.name not in spoken_of | context.placed and not one.object_controller:
-            yield at(one, f"the entity {one.name!r} is never used", "place it with a TeleportAction, or take it out")
+        if one.name not in referenced | context.placed and not one.object_controller:
+            yield at(one, f"entity {one.name!r} is never used", "place it with a TeleportAction, or remove it")
 
 
-def never_placed(context: LintContext) -> Iterator[Diagnostic]:
-    """An entity that acts or is asked about, but is nowhere."""
-    spoken_of = _spoken_of(context)
+def unplaced_entities(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield entities that are referenced but never placed."""
+    referenced = _referenced_entities(context)
     for one in _objects(context):
-        if one.name in spoken_of and one.name not in context.placed:
+        if one.name in referenced and one.name not in context.placed:
             yield at(
                 one,
-                f"the entity {one.name!r} is never placed, so it is not in the world",
-                "give it a TeleportAction in Init, or an AddEntityAction",
+                f"entity {one.name!r} is never in the world: no action places it",
+                "add a TeleportAction in Init, or an AddEntityAction",
             )
 
 
 def groups_without_actors(context: LintContext) -> Iterator[Diagnostic]:
-    """Private actions for which there is nobody."""
+    """Yield maneuver groups with private actions and without actors."""
     for node in context.nodes:
         group = node.element
         if not isinstance(group, ManeuverGroup) or context.actors(node):
             continue
-        acting = [event for event in node.walk() if _acts(event)]
+        acting = [event for event in node.walk() if _has_private_action(event)]
         if not acting:
             continue
         if not group.actors.select_triggering_entities:
             yield at(
                 group,
-                f"{node.title} has no actors, so nobody does what is private in {acting[0].title}",
-                "name them in Actors",
+                f"{node.title} has no actors for the private actions of {acting[0].title}",
+                "list them in Actors",
             )
-        elif node.parent is not None and not _about_entities(node.parent):
+        elif node.parent is not None and not _has_entity_condition(node.parent):
             yield at(
                 group,
-                f"{node.title} is for those who trigger {node.parent.title}, whose start trigger asks about nobody",
-                "name the actors, or start the act by a ByEntityCondition",
+                f"{node.title} selects the triggering entities of {node.parent.title}, "
+                "whose start trigger has no ByEntityCondition",
+                "list the actors, or start the act by a ByEntityCondition",
             )
 
 
-def _acts(node: Node) -> bool:
+def _has_private_action(node: Node) -> bool:
     actions = node.element.action if isinstance(node.element, Event) else ()
     return any(isinstance(action, Action) and action.private_action is not None for action in actions)
 
 
-def _about_entities(node: Node) -> bool:
+def _has_entity_condition(node: Node) -> bool:
     trigger = node.start
     groups = trigger.condition_group if trigger is not None else ()
     return any(condition.by_entity_condition is not None for group in groups for condition in group.condition)
 
 
-def axles_not_apart(context: LintContext) -> Iterator[Diagnostic]:
-    """A vehicle whose front axle is not ahead of the rear axle: it has no wheelbase to drive on."""
-    for name, body in context.scenario.entities.items():
-        front = body.axles.front_axle if isinstance(body, Vehicle) else None
-        if isinstance(body, Vehicle) and front is not None and front.position_x <= body.axles.rear_axle.position_x:
+def zero_wheelbases(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield vehicles without a positive wheelbase."""
+    for name, entity in context.scenario.entities.items():
+        if not isinstance(entity, Vehicle):
+            continue
+        front, rear = entity.axles.front_axle, entity.axles.rear_axle
+        if front is not None and front.position_x <= rear.position_x:
             yield at(
                 front,
-                f"the front axle of {name!r} is at {front.position_x:g} m, the rear axle at "
-                f"{body.axles.rear_axle.position_x:g} m: it cannot drive by itself",
-                "positionX counts forwards; the front axle has the greater one",
+                f"vehicle {name!r} cannot drive by itself: its front axle is at {front.position_x:g} m, "
+                f"its rear axle at {rear.position_x:g} m",
+                "positionX increases forwards; specify a greater one for the front axle",
             )
 
 
-def relations_to_oneself(context: LintContext) -> Iterator[Diagnostic]:
-    """An action that keeps an entity at a distance from itself, or synchronizes it with itself."""
+def self_references(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield distance and synchronization actions that refer to their own actor."""
     for action, actors in context.performances:
         for element in action.walk():
             if isinstance(element, LateralDistanceAction | LongitudinalDistanceAction):
@@ -118,4 +121,4 @@ def relations_to_oneself(context: LintContext) -> Iterator[Diagnostic]:
                 continue
             if other in actors:
                 kind = type(element).__name__
-                yield at(element, f"{kind} of {other!r} refers to {other!r} itself", "name another entity")
+                yield at(element, f"{kind} of {other!r} refers to {other!r} itself", "specify another entity")

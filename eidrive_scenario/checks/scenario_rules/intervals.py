@@ -1,4 +1,4 @@
-"""Sets of instants, as ascending closed intervals [s], and what edges and delays make of them."""
+"""Sets of instants as ascending closed intervals [s], and the effect of edges and delays on them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Intervals = tuple[tuple[float, float], ...]
 NEVER: Intervals = ()
 ALWAYS: Intervals = ((0.0, math.inf),)
 STEP = 0.25
-"""An edge is seen at the first tick after it: no later than one step, which is shorter than this [s]."""
+"""Upper bound of the time step [s]: an edge is observed at the first tick after it."""
 
 
-def compared(rule: Rule, value: float) -> Intervals:
-    """The instants at which the time is as the rule says."""
-    spans = {
+def times_that_satisfy(rule: Rule, value: float) -> Intervals:
+    """Return the instants at which the simulation time satisfies a rule."""
+    intervals = {
         Rule.GREATER_THAN: ((value + EPSILON, math.inf),),
         Rule.GREATER_OR_EQUAL: ((value - EPSILON, math.inf),),
         Rule.LESS_THAN: ((-math.inf, value - EPSILON),),
@@ -26,51 +26,51 @@ def compared(rule: Rule, value: float) -> Intervals:
         Rule.EQUAL_TO: ((value - EPSILON, value + EPSILON),),
         Rule.NOT_EQUAL_TO: ((-math.inf, value - EPSILON), (value + EPSILON, math.inf)),
     }[rule]
-    return clip_before(spans, 0.0)
+    return clip_before(intervals, 0.0)
 
 
-def clip_before(spans: Intervals, first: float) -> Intervals:
-    """What of the spans is not before `first`."""
-    return tuple((max(low, first), high) for low, high in spans if high >= first)
+def clip_before(intervals: Intervals, first: float) -> Intervals:
+    """Remove all instants before `first`."""
+    return tuple((max(low, first), high) for low, high in intervals if high >= first)
 
 
 def intersection(one: Intervals, other: Intervals) -> Intervals:
-    """The instants that are in both."""
-    met = ((max(a, c), min(b, d)) for a, b in one for c, d in other)
-    return tuple(sorted((low, high) for low, high in met if low <= high))
+    """Return the instants that are in both."""
+    overlaps = ((max(a, c), min(b, d)) for a, b in one for c, d in other)
+    return tuple(sorted((low, high) for low, high in overlaps if low <= high))
 
 
 def union(several: Iterable[Intervals]) -> Intervals:
-    """The instants that are in one of them."""
-    joined: list[tuple[float, float]] = []
-    for low, high in sorted(span for spans in several for span in spans):
-        if joined and low <= joined[-1][1]:
-            joined[-1] = (joined[-1][0], max(high, joined[-1][1]))
+    """Return the instants that are in at least one of them."""
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(interval for intervals in several for interval in intervals):
+        if merged and low <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(high, merged[-1][1]))
         else:
-            joined.append((low, high))
-    return tuple(joined)
+            merged.append((low, high))
+    return tuple(merged)
 
 
-def shifted(spans: Intervals, delay: float) -> Intervals:
-    """The spans, later by a delay."""
-    return tuple((low + delay, high + delay) for low, high in spans) if delay > 0.0 else spans
+def shift(intervals: Intervals, delay: float) -> Intervals:
+    """Shift all instants by a delay [s]."""
+    return tuple((low + delay, high + delay) for low, high in intervals) if delay > 0.0 else intervals
 
 
-def rising_edges(spans: Intervals, first: float) -> Intervals:
-    """Where something that is true in these spans is seen to become true by one who looks from `first` on."""
-    return tuple((low, low + STEP) for low, _ in spans if low > first)
+def rising_edges(intervals: Intervals, first: float) -> Intervals:
+    """Return when evaluations from `first` on observe a rising edge of a condition that is true in `intervals`."""
+    return tuple((low, low + STEP) for low, _ in intervals if low > first)
 
 
-def falling_edges(spans: Intervals, first: float) -> Intervals:
-    """Where it is seen to become false."""
-    return tuple((high, high + STEP) for _, high in spans if first <= high < math.inf)
+def falling_edges(intervals: Intervals, first: float) -> Intervals:
+    """Return when evaluations from `first` on observe a falling edge of a condition that is true in `intervals`."""
+    return tuple((high, high + STEP) for _, high in intervals if first <= high < math.inf)
 
 
-def format_intervals(spans: Intervals) -> str:
-    """The first and the last instant in words."""
-    if not spans:
+def format_intervals(intervals: Intervals) -> str:
+    """Describe the first and the last instant."""
+    if not intervals:
         return "never"
-    low, high = round(spans[0][0], 3), spans[-1][1]
+    low, high = round(intervals[0][0], 3), intervals[-1][1]
     if high == math.inf:
         return f"from {low:g} s on" if low > 0.0 else "at any time"
     if high - low <= STEP + 2 * EPSILON:

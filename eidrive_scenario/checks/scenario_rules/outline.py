@@ -1,4 +1,4 @@
-"""A scenario as the rules look at it: the storyboard with its catalog maneuvers, who acts, who is placed, and when."""
+"""Outline of a scenario for the rules: storyboard with catalog maneuvers, actors, placed entities and references."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _OBJECT_TYPES = {"vehicle": Vehicle, "pedestrian": Pedestrian, "miscellaneous": 
 
 @dataclass(eq=False)
 class Node:
-    """An element of the storyboard, with maneuvers from catalogs in their places; the root has no level."""
+    """Element of the storyboard, with catalog references to maneuvers resolved; the root has no level."""
 
     element: Element
     level: StoryboardElementType | None
@@ -50,37 +50,37 @@ class Node:
 
     @property
     def title(self) -> str:
-        """What messages call it."""
+        """Return the name of the element for messages."""
         return f"{self.level.value} {self.path[-1]!r}" if self.level else "the storyboard"
 
     @property
     def start(self) -> Trigger | None:
-        """Its start trigger; None where it starts with its parent. A trigger without groups counts as none."""
+        """Return the start trigger; None if the element starts with its parent, as without condition groups."""
         trigger = self.element.start_trigger if isinstance(self.element, Act | Event) else None
         return trigger if trigger is not None and trigger.condition_group else None
 
     @property
     def limit(self) -> int:
-        """How often it may be executed."""
+        """Return the maximum number of executions."""
         if isinstance(self.element, Event | ManeuverGroup) and self.element.maximum_execution_count is not None:
             return self.element.maximum_execution_count
         return 1
 
     def above(self) -> Iterator[Node]:
-        """The elements around it, the nearest first."""
+        """Yield the ancestors, the nearest first."""
         node = self.parent
         while node is not None:
             yield node
             node = node.parent
 
     def walk(self) -> Iterator[Node]:
-        """This element and all below."""
+        """Yield this element and its descendants."""
         yield self
         for child in self.children:
             yield from child.walk()
 
     def group(self) -> ManeuverGroup | None:
-        """The maneuver group that it is or belongs to."""
+        """Return the maneuver group that contains this element."""
         for node in (self, *self.above()):
             if isinstance(node.element, ManeuverGroup):
                 return node.element
@@ -88,14 +88,14 @@ class Node:
 
 
 class Outline:
-    """The storyboard of a scenario and what stands around it."""
+    """Storyboard of a scenario, its entities and its references."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.root = Node(scenario.storyboard, None, ("storyboard",), None)
         self.root.children = [self._node(story, self.root, ()) for story in scenario.storyboard.story]
         self.nodes = tuple(self.root.walk())
-        self._meant = ReferenceMatch((node.path, node) for node in self.nodes)
+        self._references = ReferenceMatch((node.path, node) for node in self.nodes)
 
     def _node(self, element: Element, parent: Node, above: tuple[str, ...]) -> Node:
         path = (*above, str(getattr(element, "name", "")))
@@ -107,11 +107,14 @@ class Outline:
         return node
 
     def find(self, level: StoryboardElementType, reference: str) -> list[Node]:
-        """The elements that a reference means."""
-        return [node for node in self._meant.by(reference) if node.level is level]
+        """Return the elements of a level to which a reference applies."""
+        return [node for node in self._references.by(reference) if node.level is level]
 
-    def members(self, name: str, around: tuple[str, ...] = ()) -> tuple[str, ...]:
-        """The entity of this name, or those of the selection of this name; `around` are selections that it is in."""
+    def members(self, name: str, enclosing: tuple[str, ...] = ()) -> tuple[str, ...]:
+        """Return the entity of this name, or the members of the selection of this name.
+
+        enclosing  selections that contain it, to end recursion
+        """
         if name in self.scenario.entities:
             return (name,)
         entities = self.scenario.document.entities
@@ -120,28 +123,28 @@ class Outline:
             if selection.name != name:
                 continue
             for ref in selection.members.entity_ref:
-                if ref.entity_ref not in (name, *around):
-                    found += self.members(ref.entity_ref, (*around, name))
-            for given in selection.members.by_type:
-                kind = _OBJECT_TYPES.get(given.object_type.value)
+                if ref.entity_ref not in (name, *enclosing):
+                    found += self.members(ref.entity_ref, (*enclosing, name))
+            for by_type in selection.members.by_type:
+                kind = _OBJECT_TYPES.get(by_type.object_type.value)
                 found += [one for one, body in self.scenario.entities.items() if kind and isinstance(body, kind)]
         return tuple(dict.fromkeys(found)) or (name,)
 
     def actors(self, node: Node) -> tuple[str, ...]:
-        """The entities that act in an element of the storyboard, as far as the file names them."""
+        """Return the actors of a storyboard element that the file lists."""
         group = node.group()
         names = [name for ref in (group.actors.entity_ref if group else ()) for name in self.members(ref.entity_ref)]
         return tuple(dict.fromkeys(names))
 
     @cached_property
     def elements(self) -> tuple[Element, ...]:
-        """All elements of the file and of the catalog entries that it uses."""
+        """Return all elements of the file and of the catalog entries that it uses."""
         trees = (self.scenario.document, *self.scenario.entries.values())
         return tuple(element for tree in trees for element in tree.walk())
 
     @cached_property
     def performances(self) -> tuple[tuple[PrivateAction, tuple[str, ...]], ...]:
-        """Every private action, and who performs it; those of Init first."""
+        """Return every private action and its actors; those of Init first."""
         init = [
             (action, self.members(private.entity_ref))
             for private in self.scenario.storyboard.init.actions.private
@@ -156,17 +159,17 @@ class Outline:
 
     @cached_property
     def trailers(self) -> frozenset[str]:
-        """Entities that another one draws: they come and go with it."""
-        drawn: set[str] = set()
+        """Return entities that another one tows; they are present with it."""
+        towed: set[str] = set()
         for element in self.elements:
             if isinstance(element, Trailer):
-                drawn |= {element.trailer.name} if element.trailer else set()
-                drawn |= {element.trailer_ref.entity_ref} if element.trailer_ref else set()
-        return frozenset(drawn)
+                towed |= {element.trailer.name} if element.trailer else set()
+                towed |= {element.trailer_ref.entity_ref} if element.trailer_ref else set()
+        return frozenset(towed)
 
     @cached_property
     def at_start(self) -> frozenset[str]:
-        """The entities that Init puts into the world, and those that are there anyway as the road network has them."""
+        """Return the entities that Init places in the world, and those that the road network contains."""
         actions = self.scenario.storyboard.init.actions
         teleported = {
             name
@@ -187,7 +190,7 @@ class Outline:
 
     @cached_property
     def placed(self) -> frozenset[str]:
-        """The entities that are in the world at some time."""
+        """Return the entities that are in the world at some time."""
         later = {name for action, actors in self.performances if _places(action) for name in actors}
         added = {
             name
@@ -198,11 +201,11 @@ class Outline:
         return self.at_start | later | added
 
     @cached_property
-    def named(self) -> dict[str, set[str]]:
-        """By kind ("entity", "variable", …) the names to which elements refer."""
+    def referenced(self) -> dict[str, set[str]]:
+        """Return the names to which elements refer, by kind ("entity", "variable", …)."""
         found: dict[str, set[str]] = {}
         for element in self.elements:
-            for kind, name_field in _pointers(type(element)):
+            for kind, name_field in _reference_fields(type(element)):
                 name = getattr(element, name_field, None)
                 if isinstance(name, str):
                     found.setdefault(kind, set()).add(name)
@@ -210,7 +213,7 @@ class Outline:
 
     @cached_property
     def files(self) -> tuple[etree._Element, ...]:
-        """The scenario as it is written, with `$` and all, then the catalogs that it uses; () where it has no text."""
+        """Return the XML of the scenario with unresolved parameters, then of its catalogs; () without a text."""
         scenario = self.scenario.path or self.scenario.text
         if scenario is None:
             return ()
@@ -219,13 +222,13 @@ class Outline:
 
 
 def _places(action: PrivateAction) -> bool:
-    """Whether an action puts its actor somewhere: one that is not in the world begins a trajectory at its start."""
+    """Whether an action places its actor; an absent actor starts a trajectory at its first point."""
     return any(isinstance(below, TeleportAction | FollowTrajectoryAction) for below in action.walk())
 
 
-def _pointers(cls: type[Element]) -> Sequence[tuple[str, str]]:
-    """What the attributes of a class point to in any version, and their fields."""
-    known = _POINTERS.get(cls)
+def _reference_fields(cls: type[Element]) -> Sequence[tuple[str, str]]:
+    """Return the kinds to which attributes of a class refer in any version, and the names of their fields."""
+    known = _REFERENCE_FIELDS.get(cls)
     if known is None:
         pairs = [
             (rule.points_to, rule.field)
@@ -233,8 +236,8 @@ def _pointers(cls: type[Element]) -> Sequence[tuple[str, str]]:
             for rule in rules(cls, version).attributes.values()
             if rule.points_to
         ]
-        known = _POINTERS[cls] = tuple(dict.fromkeys(pairs))
+        known = _REFERENCE_FIELDS[cls] = tuple(dict.fromkeys(pairs))
     return known
 
 
-_POINTERS: dict[type[Element], tuple[tuple[str, str], ...]] = {}
+_REFERENCE_FIELDS: dict[type[Element], tuple[tuple[str, str], ...]] = {}

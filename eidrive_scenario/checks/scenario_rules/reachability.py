@@ -1,8 +1,8 @@
-"""When each element of the storyboard can start at the earliest, and which conditions keep it from ever starting.
+"""Earliest start times of storyboard elements, and conditions that prevent a start.
 
-The times are lower bounds: what is said to be impossible is so in every run. They are found as a least fixed point:
-at first nothing can start, then whatever the triggers allow, until nothing changes any more. What waits for itself,
-or for something that comes only after it, is never reached.
+The times are lower bounds: a reported impossibility holds in every run. They are computed as a least fixed point:
+initially no element can start, then all elements that the triggers allow, until no bound changes. An element that
+waits for itself, or for an element that starts only after it, is never reached.
 """
 
 from __future__ import annotations
@@ -19,45 +19,53 @@ from eidrive_scenario.checks.scenario_rules.intervals import (
     falling_edges,
     intersection,
     rising_edges,
-    shifted,
+    shift,
     union,
 )
 from eidrive_scenario.checks.scenario_rules.outline import Node, Outline
-from eidrive_scenario.checks.scenario_rules.states import States, asks_for_state
-from eidrive_scenario.checks.scenario_rules.truth_intervals import TruthIntervals, truth_intervals
+from eidrive_scenario.checks.scenario_rules.states import States, is_state_condition
+from eidrive_scenario.checks.scenario_rules.truth_intervals import (
+    IMPOSSIBLE_CONDITION,
+    UNOBSERVED_EDGE,
+    TruthIntervals,
+    truth_intervals,
+)
 from eidrive_scenario.openscenario.model import Act, Condition, ConditionEdge, ConditionGroup, Storyboard, Trigger
 from eidrive_scenario.openscenario.validation.names import CRITERIA
-
-UNOBSERVED_EDGE = "unobserved-edge"
 
 
 @dataclass(frozen=True)
 class ConditionAnalysis:
-    """What a trigger can see of one of its conditions, with edge and delay.
+    """Analysis of one condition of a trigger, with its edge and delay.
 
-    spans   the instants at which it can count as true
-    rule    by which rule that is never; "" where it can
-    reason  why
+    intervals  instants at which the condition can be true
+    rule       name of the rule by which it is never true; "" if it can be
+    reason     explanation of the rule
     """
 
     condition: Condition
-    spans: Intervals
+    intervals: Intervals
     rule: str = ""
     reason: str = ""
 
 
 @dataclass(frozen=True)
 class GroupAnalysis:
-    """A condition group, its conditions as seen, and when all of them can hold together."""
+    """Analysis of a condition group: its conditions, and the instants at which all of them can be true."""
 
     group: ConditionGroup
-    seen: tuple[ConditionAnalysis, ...]
-    spans: Intervals
+    conditions: tuple[ConditionAnalysis, ...]
+    intervals: Intervals
 
 
 @dataclass(frozen=True)
 class TriggerAnalysis:
-    """A trigger at work: whose it is, whether it starts or stops that, and since when it is asked at the earliest."""
+    """Analysis of a trigger.
+
+    owner   element that the trigger starts or stops
+    starts  True for a start trigger, False for a stop trigger
+    first   earliest evaluation [s]
+    """
 
     owner: Node
     trigger: Trigger
@@ -66,41 +74,44 @@ class TriggerAnalysis:
     groups: tuple[GroupAnalysis, ...]
 
     @property
-    def spans(self) -> Intervals:
-        """When it can fire."""
-        return union(group.spans for group in self.groups)
+    def intervals(self) -> Intervals:
+        """Return the instants at which the trigger can be fulfilled."""
+        return union(group.intervals for group in self.groups)
 
 
 class ReachabilityAnalysis:
-    """The earliest times of an outline's elements [s]; inf for never."""
+    """Earliest start times of the elements of an outline [s]; inf for never."""
 
     def __init__(self, outline: Outline) -> None:
         self._outline = outline
         self._truths: dict[int, TruthIntervals] = {}
         self._states = States(outline)
-        watchers = self._watchers()
-        waiting = dict.fromkeys(outline.nodes)
-        while waiting:
-            node = next(iter(waiting))
-            del waiting[node]
+        dependents = self._dependents()
+        pending = dict.fromkeys(outline.nodes)
+        while pending:
+            node = next(iter(pending))
+            del pending[node]
             if self._advance(node):
-                waiting |= dict.fromkeys((node, *node.children))
-                for near in (*node.above(), *node.walk()):
-                    waiting |= dict.fromkeys(watchers.get(near, ()))
+                pending |= dict.fromkeys((node, *node.children))
+                for related in (*node.above(), *node.walk()):
+                    pending |= dict.fromkeys(dependents.get(related, ()))
 
     @property
     def start(self) -> Mapping[Node, float]:
-        """When each element starts at the earliest [s]."""
+        """Return the earliest start of each element [s]."""
         return self._states.start
 
-    def _watchers(self) -> Mapping[Node, list[Node]]:
-        """By element, whose triggers ask for its state. That depends on what is below it and around it, too."""
+    def _dependents(self) -> Mapping[Node, list[Node]]:
+        """Return, by element, the elements whose triggers depend on its state.
+
+        The state also depends on the ancestors and descendants of the element.
+        """
         found: dict[Node, list[Node]] = {}
         for node in self._outline.nodes:
             for trigger in (node.start, stop_trigger(node)):
                 conditions = [one for group in (trigger.condition_group if trigger else ()) for one in group.condition]
-                for asked in dict.fromkeys(asked for one in conditions for asked in self._states.looked_at(one)):
-                    found.setdefault(asked, []).append(node)
+                for other in dict.fromkeys(node for one in conditions for node in self._states.dependencies(one)):
+                    found.setdefault(other, []).append(node)
         return found
 
     def _advance(self, node: Node) -> bool:
@@ -111,7 +122,7 @@ class ReachabilityAnalysis:
         return states.improve(node, start, stopped)
 
     def _first(self, node: Node, *, starts: bool) -> float:
-        """Since when its trigger is asked: its parent runs, or for a stop trigger it does so itself."""
+        """Return the earliest evaluation of a start trigger (start of the parent) or stop trigger (own start) [s]."""
         if node.parent is None:
             return 0.0
         return self._states.start[node.parent if starts else node]
@@ -120,74 +131,75 @@ class ReachabilityAnalysis:
         first = self._first(node, starts=starts)
         if first == math.inf:
             return first
-        spans = union(self._judge(group, node, starts, first).spans for group in trigger.condition_group)
-        return spans[0][0] if spans else math.inf
+        intervals = union(self._analyze(group, node, starts, first).intervals for group in trigger.condition_group)
+        return intervals[0][0] if intervals else math.inf
 
-    def watches(self) -> Iterator[TriggerAnalysis]:
-        """All triggers that are asked at all."""
+    def triggers(self) -> Iterator[TriggerAnalysis]:
+        """Yield the analyses of all triggers that are evaluated at some time."""
         for node in self._outline.nodes:
             for trigger, starts in ((node.start, True), (stop_trigger(node), False)):
                 first = self._first(node, starts=starts)
                 if trigger is not None and first < math.inf:
-                    groups = tuple(self._judge(group, node, starts, first) for group in trigger.condition_group)
+                    groups = tuple(self._analyze(group, node, starts, first) for group in trigger.condition_group)
                     yield TriggerAnalysis(node, trigger, starts, first, groups)
 
-    def _judge(self, group: ConditionGroup, owner: Node, starts: bool, first: float) -> GroupAnalysis:
-        seen = tuple(self._see(condition, owner, starts, first) for condition in group.condition)
-        spans = clip_before(ALWAYS, first)
-        for one in seen:
-            spans = intersection(spans, one.spans)
-        return GroupAnalysis(group, seen, spans)
+    def _analyze(self, group: ConditionGroup, owner: Node, starts: bool, first: float) -> GroupAnalysis:
+        conditions = tuple(self._analyze_condition(one, owner, starts, first) for one in group.condition)
+        intervals = clip_before(ALWAYS, first)
+        for one in conditions:
+            intervals = intersection(intervals, one.intervals)
+        return GroupAnalysis(group, conditions, intervals)
 
-    def _see(self, condition: Condition, owner: Node, starts: bool, first: float) -> ConditionAnalysis:
-        known = self._truth(condition, owner, starts)
-        spans = clip_before(known.spans, first)
-        if not spans:
-            if known.rule:
-                return ConditionAnalysis(condition, NEVER, known.rule, known.reason)
-            return ConditionAnalysis(
-                condition, NEVER, "impossible-condition", f"that is over before {owner.title} looks for it"
-            )
+    def _analyze_condition(self, condition: Condition, owner: Node, starts: bool, first: float) -> ConditionAnalysis:
+        truth = self._truth(condition, owner, starts)
+        intervals = clip_before(truth.intervals, first)
+        if not intervals:
+            if truth.rule:
+                return ConditionAnalysis(condition, NEVER, truth.rule, truth.reason)
+            reason = f"it holds only before the first evaluation by {owner.title}"
+            return ConditionAnalysis(condition, NEVER, IMPOSSIBLE_CONDITION, reason)
         edge = condition.condition_edge
-        dead = _unseen(known, edge, first)
-        if dead:
-            return ConditionAnalysis(condition, NEVER, UNOBSERVED_EDGE, dead)
-        if known.certain and edge is not ConditionEdge.NONE:
-            up = rising_edges(known.spans, first) if edge is not ConditionEdge.FALLING else NEVER
-            down = falling_edges(known.spans, first) if edge is not ConditionEdge.RISING else NEVER
-            spans = union((up, down))
-        return ConditionAnalysis(condition, shifted(spans, condition.delay))
+        reason = _unobserved_reason(truth, edge, first)
+        if reason:
+            return ConditionAnalysis(condition, NEVER, UNOBSERVED_EDGE, reason)
+        if truth.certain and edge is not ConditionEdge.NONE:
+            rising = rising_edges(truth.intervals, first) if edge is not ConditionEdge.FALLING else NEVER
+            falling = falling_edges(truth.intervals, first) if edge is not ConditionEdge.RISING else NEVER
+            intervals = union((rising, falling))
+        return ConditionAnalysis(condition, shift(intervals, condition.delay))
 
     def _truth(self, condition: Condition, owner: Node, starts: bool) -> TruthIntervals:
-        if asks_for_state(condition):
+        if is_state_condition(condition):
             return self._states.truth(condition, owner, starts)
-        known = self._truths.get(id(condition))
-        if known is None:
-            known = self._truths[id(condition)] = truth_intervals(condition, self._outline)
-        return known
+        truth = self._truths.get(id(condition))
+        if truth is None:
+            truth = self._truths[id(condition)] = truth_intervals(condition, self._outline)
+        return truth
 
 
-def _unseen(known: TruthIntervals, edge: ConditionEdge, first: float) -> str:
-    """Why an edge is never seen, "" where it can be."""
+def _unobserved_reason(truth: TruthIntervals, edge: ConditionEdge, first: float) -> str:
+    """Return why an edge is never observed; "" if it can be."""
     if edge is ConditionEdge.NONE:
         return ""
-    if known.steady:
-        return known.steady
-    if edge is ConditionEdge.RISING and known.risen:
-        return known.risen
-    if not known.certain:
+    if truth.steady:
+        return truth.steady
+    if edge is ConditionEdge.RISING and truth.risen:
+        return truth.risen
+    if not truth.certain:
         return ""
-    if edge is not ConditionEdge.FALLING and rising_edges(known.spans, first):
+    if edge is not ConditionEdge.FALLING and rising_edges(truth.intervals, first):
         return ""
-    if edge is not ConditionEdge.RISING and falling_edges(known.spans, first):
+    if edge is not ConditionEdge.RISING and falling_edges(truth.intervals, first):
         return ""
     if edge is ConditionEdge.FALLING:
         return "it never becomes false"
-    return "it is already true at the first evaluation" if clip_before(known.spans, first) else "it never becomes true"
+    return (
+        "it is already true at the first evaluation" if clip_before(truth.intervals, first) else "it never becomes true"
+    )
 
 
 def stop_trigger(node: Node) -> Trigger | None:
-    """The stop trigger of an element, without the criteria that ScenarioRunner keeps there; None if nothing is left."""
+    """Return the stop trigger of an element without the criteria of ScenarioRunner; None if no condition remains."""
     if not isinstance(node.element, Act | Storyboard) or node.element.stop_trigger is None:
         return None
     kept = []

@@ -1,4 +1,4 @@
-"""When the elements of the storyboard can be in a state at the earliest, and when a condition can see that."""
+"""Earliest times of the states of storyboard elements, and the intervals in which conditions on them can hold."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from collections.abc import Iterator
 from eidrive_scenario.checks.scenario_rules.intervals import ALWAYS
 from eidrive_scenario.checks.scenario_rules.outline import Node, Outline
 from eidrive_scenario.checks.scenario_rules.termination import never_ends
-from eidrive_scenario.checks.scenario_rules.truth_intervals import OPEN, STATE, WAITS, TruthIntervals, never
+from eidrive_scenario.checks.scenario_rules.truth_intervals import (
+    IMPOSSIBLE_STATE,
+    OPEN,
+    UNREACHABLE,
+    TruthIntervals,
+    never,
+)
 from eidrive_scenario.openscenario.model import (
     Action,
     Condition,
@@ -27,12 +33,12 @@ _AFTER = (
 )
 
 
-def asks_for_state(condition: Condition) -> bool:
-    """Whether a condition looks at the storyboard itself."""
-    return _question(condition) is not None
+def is_state_condition(condition: Condition) -> bool:
+    """Whether a condition is a StoryboardElementStateCondition."""
+    return _state_condition(condition) is not None
 
 
-def _question(condition: Condition) -> StoryboardElementStateCondition | None:
+def _state_condition(condition: Condition) -> StoryboardElementStateCondition | None:
     by_value = condition.by_value_condition
     return by_value.storyboard_element_state_condition if by_value is not None else None
 
@@ -46,55 +52,60 @@ class States:
         self._stopped: dict[Node, float] = dict.fromkeys(outline.nodes, math.inf)
 
     def improve(self, node: Node, start: float, stopped: float) -> bool:
-        """Earlier times for an element; False where these were known."""
-        better = start < self.start[node] or stopped < self._stopped[node]
+        """Lower the bounds of an element; return whether one of them was lowered."""
+        lowered = start < self.start[node] or stopped < self._stopped[node]
         self.start[node] = min(start, self.start[node])
         self._stopped[node] = min(stopped, self._stopped[node])
-        return better
+        return lowered
 
-    def looked_at(self, condition: Condition) -> Iterator[Node]:
-        """The elements that a condition asks for; whether one is stopped depends on all events of its maneuver."""
-        question = _question(condition)
-        if question is None:
+    def dependencies(self, condition: Condition) -> Iterator[Node]:
+        """Yield the elements on whose state a condition depends.
+
+        For the stop of an event or action it is the maneuver, as all of its events may cause the stop.
+        """
+        leaf = _state_condition(condition)
+        if leaf is None:
             return
-        for node in self._outline.find(question.storyboard_element_type, question.storyboard_element_ref):
+        for node in self._outline.find(leaf.storyboard_element_type, leaf.storyboard_element_ref):
             event = node.parent if isinstance(node.element, Action) else node
-            stops = question.state is StoryboardElementState.STOP_TRANSITION
-            rivalry = stops and event is not None and isinstance(event.element, Event)
-            yield event.parent if rivalry and event is not None and event.parent is not None else node
+            is_stop = leaf.state is StoryboardElementState.STOP_TRANSITION
+            of_maneuver = is_stop and event is not None and isinstance(event.element, Event)
+            yield event.parent if of_maneuver and event is not None and event.parent is not None else node
 
     def truth(self, condition: Condition, owner: Node, starts: bool) -> TruthIntervals:
-        """When a condition on states can hold for a trigger that starts or stops its owner."""
-        question = _question(condition)
-        assert question is not None
-        state = question.state
-        meant = self._outline.find(question.storyboard_element_type, question.storyboard_element_ref)
-        if not meant:
+        """Return the intervals in which a state condition can hold, for a trigger that starts or stops its owner."""
+        leaf = _state_condition(condition)
+        assert leaf is not None
+        state = leaf.state
+        nodes = self._outline.find(leaf.storyboard_element_type, leaf.storyboard_element_ref)
+        if not nodes:
             return OPEN
-        around = [*owner.above(), *(() if starts else (owner,))]
-        if all(node in around for node in meant):
-            return _around(meant[0], state, owner)
-        if meant == [owner] and owner.limit == 1:
+        running = [*owner.above(), *(() if starts else (owner,))]
+        if all(node in running for node in nodes):
+            return _truth_of_running(nodes[0], state, owner)
+        if nodes == [owner] and owner.limit == 1:
             if state is StoryboardElementState.STANDBY_STATE:
-                return TruthIntervals(steady=f"{owner.title} stands by as long as it waits")
-            return never(f"{owner.title} waits for itself", WAITS)
-        spoken = " or ".join(reason for node in meant if (reason := self._unreal(node, state)))
-        if spoken and all(self._unreal(node, state) for node in meant):
-            return never(spoken, STATE)
-        earliest = min(self._earliest(node, state) for node in meant)
+                return TruthIntervals(steady=f"{owner.title} is in standbyState as long as it waits")
+            return never(f"{owner.title} waits for itself", UNREACHABLE)
+        reasons = [reason for node in nodes if (reason := self._impossible(node, state))]
+        if len(reasons) == len(nodes):
+            return never(" or ".join(reasons), IMPOSSIBLE_STATE)
+        earliest = min(self._earliest(node, state) for node in nodes)
         if earliest == math.inf:
-            return never(self._missed(meant[0], state), WAITS)
+            return never(self._unreached(nodes[0], state), UNREACHABLE)
         return TruthIntervals(((earliest, math.inf),))
 
-    def _unreal(self, node: Node, state: StoryboardElementState) -> str:
-        """Why an element of this make never is in a state, "" where it may be."""
+    def _impossible(self, node: Node, state: StoryboardElementState) -> str:
+        """Return why an element of this kind is never in a state; "" if it may be."""
         if state is StoryboardElementState.SKIP_TRANSITION:
             if not isinstance(node.element, Event):
-                return f"only events are skipped, {node.title} is none"
+                return f"only events can be skipped, but not {node.title}"
             if node.element.priority is not Priority.SKIP:
-                return f"{node.title} has the priority {node.element.priority.value!r}; only 'skip' is ever skipped"
+                return (
+                    f"{node.title} has the priority {node.element.priority.value!r}; only 'skip' events can be skipped"
+                )
         if state is StoryboardElementState.STOP_TRANSITION and not _can_be_stopped(node):
-            return f"nothing stops {node.title}"
+            return f"{node.title} cannot be stopped"
         if state is StoryboardElementState.END_TRANSITION and isinstance(node.element, Action):
             endless = never_ends(node.element)
             return f"{node.title} does not end by itself: {endless}" if endless else ""
@@ -125,45 +136,48 @@ class States:
         return latest
 
     def _stop(self, node: Node) -> float:
-        """By its own trigger, with those above it, by another event of its maneuver, by another action."""
-        times = [self._halted(node)]
+        """Return the earliest stop by a trigger, by another event of the maneuver, or by another action [s]."""
+        times = [self._stopped_by_trigger(node)]
         event = node.parent if isinstance(node.element, Action) else node
         if isinstance(node.element, Action):
             times.append(self.start[node])
         if event is not None and isinstance(event.element, Event):
-            times += [max(self.start[event], self.start[rival]) for rival in _rivals(event)]
+            times += [max(self.start[event], self.start[other]) for other in _overriding_events(event)]
         return min(times)
 
-    def _halted(self, node: Node) -> float:
-        """By its own trigger, or with those above it."""
+    def _stopped_by_trigger(self, node: Node) -> float:
+        """Return the earliest stop by the trigger of the element or of an element above [s]."""
         return min(self._stopped[one] for one in (node, *node.above()))
 
     def _complete(self, node: Node) -> float:
-        """Whatever displaces an event or an action does so after its start, at which it may be over."""
-        return min(self._end(node), self._halted(node))
+        """Return the earliest completion [s].
 
-    def _missed(self, node: Node, state: StoryboardElementState) -> str:
-        """Why a state is never reached."""
+        A preemption of an event or action needs no term: it follows the start, at which the element may already end.
+        """
+        return min(self._end(node), self._stopped_by_trigger(node))
+
+    def _unreached(self, node: Node, state: StoryboardElementState) -> str:
+        """Return why a state is never reached."""
         if self.start[node] == math.inf:
             return f"{node.title} never starts"
         if state is StoryboardElementState.STOP_TRANSITION:
             return f"{node.title} is never stopped"
-        late = next((one for one in node.walk() if self.start[one] == math.inf), None)
-        return f"{node.title} never ends, as {late.title} never starts" if late else f"{node.title} never ends"
+        missing = next((one for one in node.walk() if self.start[one] == math.inf), None)
+        return f"{node.title} never ends, as {missing.title} never starts" if missing else f"{node.title} never ends"
 
 
-def _around(node: Node, state: StoryboardElementState, owner: Node) -> TruthIntervals:
-    """Of an element that runs as long as the trigger is asked."""
+def _truth_of_running(node: Node, state: StoryboardElementState, owner: Node) -> TruthIntervals:
+    """Return the intervals for an element that runs during all evaluations of the trigger."""
     runs = f"{node.title} runs as long as {owner.title} waits" if node is not owner else f"{node.title} runs"
     if state is StoryboardElementState.RUNNING_STATE:
         return TruthIntervals(ALWAYS, steady=runs)
     if state is StoryboardElementState.START_TRANSITION:
-        return TruthIntervals(ALWAYS, risen=f"{node.title} has started before {owner.title} first looks")
+        return TruthIntervals(ALWAYS, risen=f"{node.title} has started before the first evaluation by {owner.title}")
     if state is StoryboardElementState.STANDBY_STATE:
-        return never(f"{runs}, so it does not stand by", STATE)
+        return never(f"{runs}, so it is not in standbyState", IMPOSSIBLE_STATE)
     if state in _AFTER:
-        return never(f"{node.title} is not over before {owner.title} is", WAITS)
-    return never(f"only events are skipped, {node.title} is none", STATE)
+        return never(f"{node.title} does not end before {owner.title}", UNREACHABLE)
+    return never(f"only events can be skipped, but not {node.title}", IMPOSSIBLE_STATE)
 
 
 def _can_be_stopped(node: Node) -> bool:
@@ -171,11 +185,11 @@ def _can_be_stopped(node: Node) -> bool:
         return True
     acts = [one for one in (node, *node.above()) if one.level is StoryboardElementType.ACT]
     stopped = any(getattr(act.element, "stop_trigger", None) is not None for act in acts)
-    return stopped or any(True for _ in _rivals(node))
+    return stopped or any(True for _ in _overriding_events(node))
 
 
-def _rivals(node: Node) -> Iterator[Node]:
-    """The other events of its maneuver that end it when they start."""
+def _overriding_events(node: Node) -> Iterator[Node]:
+    """Yield the other events of the maneuver that stop an event by their start."""
     if not isinstance(node.element, Event) or node.parent is None:
         return
     for one in node.parent.children:

@@ -1,4 +1,4 @@
-"""Which actions go on until something else takes over."""
+"""Actions that do not end by themselves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _CONTINUOUS = (LaneOffsetAction, LateralDistanceAction, LongitudinalDistanceActi
 
 
 def never_ends(action: Action) -> str:
-    """Why an action never reaches an end of its own, "" where it may."""
+    """Return why an action does not end by itself; "" if it may."""
     for element in action.walk():
         if isinstance(element, _CONTINUOUS) and element.continuous:
             return f"{type(element).__name__} is continuous"
@@ -27,12 +27,12 @@ def never_ends(action: Action) -> str:
 
 
 def has_zero_rate(dynamics: TransitionDynamics) -> bool:
-    """Whether a transition never gets anywhere, as its rate is 0."""
+    """Whether a transition never reaches its target because its rate is 0."""
     by_rate = dynamics.dynamics_dimension is DynamicsDimension.RATE and dynamics.value == 0.0
     return by_rate and dynamics.dynamics_shape is not DynamicsShape.STEP
 
 
-def at_once(dynamics: TransitionDynamics) -> bool:
-    """Whether a transition is over as soon as it begins."""
-    in_no_time = dynamics.dynamics_dimension is not DynamicsDimension.RATE and dynamics.value == 0.0
-    return dynamics.dynamics_shape is DynamicsShape.STEP or in_no_time
+def is_immediate(dynamics: TransitionDynamics) -> bool:
+    """Whether a transition ends at its start."""
+    is_zero = dynamics.dynamics_dimension is not DynamicsDimension.RATE and dynamics.value == 0.0
+    return dynamics.dynamics_shape is DynamicsShape.STEP or is_zero

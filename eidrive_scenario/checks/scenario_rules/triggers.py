@@ -1,4 +1,4 @@
-"""Rules on triggers: what can never fire, what is likely to be missed."""
+"""Rules about triggers that can never be fulfilled or are likely to be missed."""
 
 from __future__ import annotations
 
@@ -7,114 +7,124 @@ from collections.abc import Callable, Iterator
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.intervals import format_intervals
-from eidrive_scenario.checks.scenario_rules.reachability import UNOBSERVED_EDGE, ConditionAnalysis, TriggerAnalysis
-from eidrive_scenario.checks.scenario_rules.truth_intervals import IMPOSSIBLE, STATE, WAITS
+from eidrive_scenario.checks.scenario_rules.reachability import ConditionAnalysis, TriggerAnalysis
+from eidrive_scenario.checks.scenario_rules.truth_intervals import (
+    IMPOSSIBLE_CONDITION,
+    IMPOSSIBLE_STATE,
+    UNOBSERVED_EDGE,
+    UNREACHABLE,
+)
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.model import Condition, ConditionEdge, Rule, SimulationTimeCondition
 
-_REMEDIES = {
-    UNOBSERVED_EDGE: 'an edge needs a change between two evaluations; write conditionEdge="none"',
-    IMPOSSIBLE: "change the condition or take it out",
-    STATE: "wait for another state",
-    WAITS: "break the circle, or wait for something else",
+_HINTS = {
+    UNOBSERVED_EDGE: 'an edge requires a change between two evaluations; write conditionEdge="none"',
+    IMPOSSIBLE_CONDITION: "change or remove the condition",
+    IMPOSSIBLE_STATE: "wait for another state",
+    UNREACHABLE: "resolve the circular wait, or wait for another element",
 }
 
 
-def never_seen(name: str) -> Callable[[LintContext], Iterator[Diagnostic]]:
-    """A rule on conditions that never count as true, for the reason that goes by this name."""
+def never_true(rule: str) -> Callable[[LintContext], Iterator[Diagnostic]]:
+    """Return the check of a rule about conditions that are never true."""
 
     def check(context: LintContext) -> Iterator[Diagnostic]:
-        for watch in context.watches:
-            for group in watch.groups:
-                for one in group.seen:
-                    if one.rule == name:
-                        message = f"{_called(one.condition)} never counts as true: {one.reason}"
-                        yield at(one.condition, f"{message}; {_consequence(watch)}", _REMEDIES[name])
+        for trigger in context.triggers:
+            for group in trigger.groups:
+                for one in group.conditions:
+                    if one.rule == rule:
+                        message = f"{_describe_condition(one.condition)} is never true: {one.reason}"
+                        yield at(one.condition, f"{message}; {_consequence(trigger)}", _HINTS[rule])
 
     return check
 
 
 def contradictory_groups(context: LintContext) -> Iterator[Diagnostic]:
-    """Each condition of a group can be true, but never all of them together."""
-    for watch in context.watches:
-        for group in watch.groups:
-            if not group.spans and all(one.spans for one in group.seen):
+    """Yield groups whose conditions can be true, but never all at the same time."""
+    for trigger in context.triggers:
+        for group in trigger.groups:
+            if not group.intervals and all(one.intervals for one in group.conditions):
                 yield at(
                     group.group,
-                    f"the conditions of this group are never true together: {_windows(group.seen)}; "
-                    f"{_consequence(watch)}",
-                    "conditions of one group are joined by AND; put alternatives into groups of their own",
+                    f"the conditions of this group are never true together: {_describe_intervals(group.conditions)}; "
+                    f"{_consequence(trigger)}",
+                    "conditions of one group are combined by AND; use separate groups for alternatives",
                 )
 
 
-def coinciding_edges(context: LintContext) -> Iterator[Diagnostic]:
-    """Several edges in one group have to be seen at the very same evaluation."""
-    for watch in context.watches:
-        for group in watch.groups:
-            edged = [one.condition for one in group.seen if one.condition.condition_edge is not ConditionEdge.NONE]
-            if group.spans and len(edged) > 1:
-                names = " and ".join(_called(condition) for condition in edged)
+def simultaneous_edges(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield groups with several edges, which must all be observed at the same evaluation."""
+    for trigger in context.triggers:
+        for group in trigger.groups:
+            conditions = [one.condition for one in group.conditions]
+            edges = [one for one in conditions if one.condition_edge is not ConditionEdge.NONE]
+            if group.intervals and len(edges) > 1:
+                names = " and ".join(_describe_condition(condition) for condition in edges)
                 yield at(
                     group.group,
-                    f"{names} have to change at the very same evaluation",
-                    'keep the edge of the one that comes last, and write conditionEdge="none" for the rest',
+                    f"{names} must change at the same evaluation",
+                    'keep the edge of the last condition, and write conditionEdge="none" for the others',
                 )
 
 
-def equal_times(context: LintContext) -> Iterator[Diagnostic]:
-    """A time that is met exactly, or not at all."""
-    for watch in context.watches:
-        for group in watch.groups:
-            for one in group.seen:
+def exact_time_comparisons(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield comparisons of the simulation time by `equalTo`."""
+    for trigger in context.triggers:
+        for group in trigger.groups:
+            for one in group.conditions:
                 time = _time(one.condition)
-                if time is not None and time.rule is Rule.EQUAL_TO and time.value > 0.0 and one.spans:
+                if time is not None and time.rule is Rule.EQUAL_TO and time.value > 0.0 and one.intervals:
                     yield at(
                         time,
-                        f"simulation time = {time.value:g} s holds only if a step ends there to the microsecond",
+                        f"simulation time = {time.value:g} s holds only if a time step ends there to the microsecond",
                         'write rule="greaterOrEqual"',
                     )
 
 
 def no_stop_trigger(context: LintContext) -> Iterator[Diagnostic]:
-    """Nothing in the file says when the run is over."""
+    """Yield the storyboard if it has no stop trigger."""
     trigger = context.scenario.storyboard.stop_trigger
     if trigger is None or not trigger.condition_group:
-        what = "has no stop trigger" if trigger is None else "has an empty stop trigger"
-        ends = "the run ends when every story has ended" if context.root.children else "the run does not end by itself"
+        problem = "has no stop trigger" if trigger is None else "has an empty stop trigger"
+        end = "the run ends when every story has ended" if context.root.children else "the run does not end by itself"
         yield at(
             trigger or context.scenario.storyboard,
-            f"the storyboard {what}; {ends}",
+            f"the storyboard {problem}; {end}",
             "add a StopTrigger, such as a SimulationTimeCondition",
         )
 
 
 def zero_executions(context: LintContext) -> Iterator[Diagnostic]:
-    """A count of 0 says that an element is never executed."""
+    """Yield elements with maximumExecutionCount 0, which are never executed."""
     for node in context.nodes:
         if node.limit == 0:
-            yield at(node.element, f"{node.title} has the maximumExecutionCount 0", "write 1 or more, or take it out")
+            yield at(
+                node.element,
+                f"{node.title} has the maximumExecutionCount 0",
+                "specify 1 or more, or remove the element",
+            )
 
 
-def _consequence(watch: TriggerAnalysis) -> str:
-    if watch.spans:
-        return "this group never holds"
-    return f"{watch.owner.title} never starts" if watch.starts else f"this never stops {watch.owner.title}"
+def _consequence(trigger: TriggerAnalysis) -> str:
+    if trigger.intervals:
+        return "this group is never fulfilled"
+    return f"{trigger.owner.title} never starts" if trigger.starts else f"this never stops {trigger.owner.title}"
 
 
-def _called(condition: Condition) -> str:
+def _describe_condition(condition: Condition) -> str:
     time = _time(condition)
     if time is not None:
         return f"simulation time {_SIGNS[time.rule]} {time.value:g} s"
     return f"condition {condition.name!r}"
 
 
-def _windows(seen: tuple[ConditionAnalysis, ...]) -> str:
-    told = [
-        f"{_called(one.condition)} {format_intervals(one.spans)}"
-        for one in seen
-        if format_intervals(one.spans) != "at any time"
+def _describe_intervals(conditions: tuple[ConditionAnalysis, ...]) -> str:
+    texts = [
+        f"{_describe_condition(one.condition)} {format_intervals(one.intervals)}"
+        for one in conditions
+        if format_intervals(one.intervals) != "at any time"
     ]
-    return ", ".join(told)
+    return ", ".join(texts)
 
 
 def _time(condition: Condition) -> SimulationTimeCondition | None:

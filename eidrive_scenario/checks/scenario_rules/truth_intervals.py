@@ -1,4 +1,4 @@
-"""When a condition can hold at all, as far as the file says: by time, by constants, by what a quantity can be."""
+"""Intervals in which a condition can hold by the file alone: from times, constants and ranges of quantities."""
 
 from __future__ import annotations
 
@@ -6,29 +6,32 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from eidrive_scenario.checks.scenario_rules.intervals import ALWAYS, NEVER, Intervals, compared
+from eidrive_scenario.checks.scenario_rules.intervals import ALWAYS, NEVER, Intervals, times_that_satisfy
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model import Element, Rule
 from eidrive_scenario.openscenario.validation.names import CRITERIA
 
-IMPOSSIBLE, STATE, WAITS = "impossible-condition", "impossible-state", "unreachable"
-"""The rules that speak of conditions which never hold."""
+IMPOSSIBLE_CONDITION = "impossible-condition"
+IMPOSSIBLE_STATE = "impossible-state"
+UNREACHABLE = "unreachable"
+UNOBSERVED_EDGE = "unobserved-edge"
+"""Names of the rules about conditions that are never true."""
 
 
 @dataclass(frozen=True)
 class TruthIntervals:
-    """When a condition can hold, its edge and delay left aside.
+    """Intervals in which a condition can hold, without its edge and delay.
 
-    spans    it holds at none but these instants [s]
-    certain  it holds at all of them
-    rule     by which rule it never holds; "" where it can
-    reason   why it never holds, or always does
-    steady   why it never changes, so that no edge of it is ever seen; "" where it can
-    risen    why it never becomes true while somebody looks, though it may become false; "" where it can
+    intervals  instants outside of which it never holds [s]
+    certain    whether it holds at all of these instants
+    rule       name of the rule by which it never holds; "" if it can
+    reason     why it never holds, or always does
+    steady     why it never changes, so that no edge is observed; "" if it can
+    risen      why it never becomes true during evaluations, although it may become false; "" if it can
     """
 
-    spans: Intervals = ALWAYS
+    intervals: Intervals = ALWAYS
     certain: bool = False
     rule: str = ""
     reason: str = ""
@@ -36,34 +39,34 @@ class TruthIntervals:
     risen: str = ""
 
 
-def never(reason: str, rule: str = IMPOSSIBLE) -> TruthIntervals:
-    """Of a condition that cannot hold."""
+def never(reason: str, rule: str = IMPOSSIBLE_CONDITION) -> TruthIntervals:
+    """Return the result for a condition that cannot hold."""
     return TruthIntervals(NEVER, True, rule, reason)
 
 
 OPEN = TruthIntervals()
-"""Of a condition of which the file alone does not say when it holds."""
+"""Result for a condition that may hold at any time, as far as the file determines it."""
 
 
 def truth_intervals(condition: model.Condition, outline: Outline) -> TruthIntervals:
-    """When a condition can hold that does not ask for the state of the storyboard."""
+    """Return the intervals in which a condition can hold that does not depend on storyboard states."""
     by_entity, by_value = condition.by_entity_condition, condition.by_value_condition
     if by_entity is not None:
         return _of_entities(by_entity, outline)
     leaf = next(iter(by_value.children()), None) if by_value is not None else None
-    find = _BY_VALUE.get(type(leaf))
-    if find is None or condition.name.startswith(CRITERIA):
+    evaluate = _BY_VALUE.get(type(leaf))
+    if evaluate is None or condition.name.startswith(CRITERIA):
         return OPEN
-    return find(leaf, outline)
+    return evaluate(leaf, outline)
 
 
 def _time(leaf: model.SimulationTimeCondition, _: Outline) -> TruthIntervals:
-    spans = compared(leaf.rule, leaf.value)
-    return TruthIntervals(spans, True) if spans else never("the simulation time is never negative")
+    intervals = times_that_satisfy(leaf.rule, leaf.value)
+    return TruthIntervals(intervals, True) if intervals else never("the simulation time is never negative")
 
 
 def _parameter(leaf: model.ParameterCondition, outline: Outline) -> TruthIntervals:
-    """A parameter keeps its value, unless an action sets or modifies it; which value that is, the user may say."""
+    """Return steady intervals unless an action sets the parameter; the user may choose its constant value."""
     name = leaf.parameter_ref
     if any(isinstance(one, model.ParameterAction) and one.parameter_ref == name for one in outline.elements):
         return OPEN
@@ -73,7 +76,7 @@ def _parameter(leaf: model.ParameterCondition, outline: Outline) -> TruthInterva
 def _time_of_day(_: model.TimeOfDayCondition, outline: Outline) -> TruthIntervals:
     if any(isinstance(one, model.TimeOfDay) for one in outline.elements):
         return OPEN
-    return never("no EnvironmentAction says what time of day it is")
+    return never("no EnvironmentAction sets the time of day")
 
 
 _BY_VALUE: Mapping[type[Element] | type[None], Callable[[Any, Outline], TruthIntervals]] = {
@@ -93,13 +96,13 @@ def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> TruthI
     leaf = next(iter(condition.entity_condition.children()), None)
     if leaf is None:
         return OPEN
-    other = partner(leaf)
+    other = compared_entity(leaf)
     if other is not None and _absent(other, outline):
         return never(f"{other!r} is never placed in the world")
     if other is not None and names and all(name == other for name in names) and isinstance(leaf, _PAIRS):
         return never(f"{other!r} is compared with itself")
     if isinstance(leaf, model.TraveledDistanceCondition) and leaf.value <= 0.0 and set(names) <= outline.at_start:
-        return TruthIntervals(steady="no distance at all is traveled at once")
+        return TruthIntervals(steady="a traveled distance of 0 is always reached")
     return _of_quantity(leaf)
 
 
@@ -107,8 +110,8 @@ def _absent(name: str, outline: Outline) -> bool:
     return name in outline.scenario.entities and name not in outline.placed
 
 
-def partner(leaf: Element) -> str | None:
-    """The other entity of a condition that compares two."""
+def compared_entity(leaf: Element) -> str | None:
+    """Return the other entity of a condition that compares two entities."""
     if isinstance(leaf, model.TimeToCollisionCondition):
         leaf = leaf.time_to_collision_condition_target
     other = getattr(leaf, "entity_ref", None)
@@ -124,24 +127,24 @@ _PAIRS = (
     model.TimeHeadwayCondition,
     model.TimeToCollisionCondition,
 )
-_AMOUNTS: Mapping[type[Element], str] = {
+_NONNEGATIVE: Mapping[type[Element], str] = {
     model.DistanceCondition: "a distance",
     model.RelativeDistanceCondition: "a distance",
     model.TimeHeadwayCondition: "a time headway",
     model.TimeToCollisionCondition: "a time to collision",
-    model.AccelerationCondition: "the amount of an acceleration",
+    model.AccelerationCondition: "the absolute value of an acceleration",
 }
 
 
 def _of_quantity(leaf: Element) -> TruthIntervals:
-    """Some quantities are never negative."""
+    """Return the intervals of a condition on a quantity that may be nonnegative by definition."""
     if isinstance(leaf, model.ReachPositionCondition) and leaf.tolerance < 0.0:
-        return never("a tolerance below zero is never kept")
-    what = _AMOUNTS.get(type(leaf))
-    if what is None or getattr(leaf, "direction", None) is not None:
+        return never("its tolerance is negative")
+    quantity = _NONNEGATIVE.get(type(leaf))
+    if quantity is None or getattr(leaf, "direction", None) is not None:
         return OPEN
     rule, value = getattr(leaf, "rule", None), getattr(leaf, "value", 0.0)
     below = rule is Rule.LESS_THAN and value <= 0.0
     if below or (rule in (Rule.LESS_OR_EQUAL, Rule.EQUAL_TO) and value < 0.0):
-        return never(f"{what} is never negative")
+        return never(f"{quantity} is never negative")
     return OPEN

@@ -1,4 +1,4 @@
-"""Parameter value distributions: a file that names a scenario and over which values of its parameters it is run."""
+"""Parameter value distributions: a scenario and the values of its parameters over which it is run."""
 
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, ListedValues
 from eidrive_scenario.openscenario.distributions.expansion import ConcreteRun, DistributionExpansion, load_distribution

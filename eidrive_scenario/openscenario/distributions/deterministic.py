@@ -1,6 +1,6 @@
-"""Deterministic distributions: each is a list of choices, and the runs are all combinations of their choices.
+"""Deterministic distributions: lists of choices, whose combinations are the runs.
 
-A list is never written out: a range of a million steps costs no more than one of two.
+Lists are not expanded: a range of a million steps costs no more than one of two.
 """
 
 from __future__ import annotations
@@ -28,38 +28,38 @@ Assignments = Mapping[str, Assignment]
 
 
 class ValueSource(Protocol):
-    """One distribution of a file: what it may assign."""
+    """Interface of one distribution of a file: the assignments from which a run takes one."""
 
     @property
     def count(self) -> int:
-        """How many choices there are."""
+        """Return the number of choices."""
 
     @property
     def names(self) -> Mapping[str, Diagnostic]:
-        """The parameters, and where the file gives them a value first."""
+        """Return the parameters with the locations of their first values."""
 
     def at(self, index: int) -> Assignments:
-        """The choice of that index, 0 to count - 1."""
+        """Return the choice of an index from 0 to count - 1."""
 
 
 @dataclass(frozen=True)
 class CartesianProduct:
-    """All combinations of choices, the last one changing from one to the next."""
+    """All combinations of choices; the last one varies fastest."""
 
     choices: tuple[ValueSource, ...]
 
     @property
     def count(self) -> int:
-        """How many there are; one, without any assignment, if there is no choice at all."""
+        """Return the number of combinations; without choices, one combination without assignments."""
         return math.prod(one.count for one in self.choices)
 
     @property
     def names(self) -> Mapping[str, Diagnostic]:
-        """The parameters, and where the file gives them a value first."""
+        """Return the parameters with the locations of their first values."""
         return {name: origin for one in reversed(self.choices) for name, origin in one.names.items()}
 
     def at(self, index: int) -> Assignments:
-        """The combination of that index."""
+        """Return the combination of an index."""
         parts: list[Assignments] = []
         for one in reversed(self.choices):
             index, own = divmod(index, one.count)
@@ -69,22 +69,23 @@ class CartesianProduct:
 
 @dataclass(frozen=True)
 class ListedValues:
-    """Choices that the file spells out."""
+    """Choices that the file lists."""
 
     choices: tuple[Assignments, ...]
 
     @property
     def names(self) -> Mapping[str, Diagnostic]:
-        """The parameters, and where the file gives them a value first."""
-        return {name: given.origin or _NOWHERE for choice in reversed(self.choices) for name, given in choice.items()}
+        """Return the parameters with the locations of their first values."""
+        assignments = [item for choice in reversed(self.choices) for item in choice.items()]
+        return {name: assignment.origin or _NO_LOCATION for name, assignment in assignments}
 
     @property
     def count(self) -> int:
-        """How many choices there are."""
+        """Return the number of choices."""
         return len(self.choices)
 
     def at(self, index: int) -> Assignments:
-        """The choice of that index."""
+        """Return the choice of an index."""
         return self.choices[index]
 
 
@@ -92,8 +93,7 @@ class ListedValues:
 class SteppedRange:
     """Values `lower`, `lower + step`, … of one parameter.
 
-    The numbers are taken as the decimals that they are written as: three steps of 0.1 from 0 on make 0.3, and the
-    upper limit of a range is met where it is meant to be.
+    The numbers are exact decimals: three steps of 0.1 from 0 are 0.3, and rounding does not miss the upper limit.
     """
 
     name: str
@@ -104,25 +104,25 @@ class SteppedRange:
 
     @property
     def names(self) -> Mapping[str, Diagnostic]:
-        """The parameter, and where its range stands."""
+        """Return the parameter and the location of its range."""
         return {self.name: self.origin}
 
     def at(self, index: int) -> Assignments:
-        """The choice of that index."""
+        """Return the choice of an index."""
         return {self.name: Assignment(written(float(self.lower + index * self.step)), self.origin)}
 
 
-_NOWHERE = Diagnostic("")
+_NO_LOCATION = Diagnostic("")
 
 
 def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
-    """The distributions in the order of the file; what is wrong with them becomes a finding."""
-    both: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
+    """Return the product of the distributions in the order of the file; report their errors."""
+    distributions: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
         *deterministic.deterministic_multi_parameter_distribution,
         *deterministic.deterministic_single_parameter_distribution,
     ]
     found: list[ValueSource] = []
-    for distribution in sorted(both, key=lambda one: one.line):
+    for distribution in sorted(distributions, key=lambda one: one.line):
         if isinstance(distribution, DeterministicMultiParameterDistribution):
             found.append(_value_sets(distribution, collector))
         else:
@@ -133,19 +133,19 @@ def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector
     magnitude = sum(math.log10(one.count) for one in found if one.count)
     if magnitude > math.log10(sys.maxsize):
         count = f"{10.0**magnitude:.1e}" if magnitude < 300.0 else f"1e{int(magnitude)}"
-        message = f"the distribution unfolds into {count} runs"
-        hint = "take wider steps in its ranges"
+        message = f"the distribution expands to {count} runs"
+        hint = "use larger steps in its ranges"
         collector.error(message, hint, source=deterministic.source, line=deterministic.line)
         return CartesianProduct(())
     return CartesianProduct(tuple(found))
 
 
 def varied_once(names: Iterable[tuple[str, Diagnostic]], collector: DiagnosticCollector) -> None:
-    """Reports every parameter that more than one distribution gives a value."""
+    """Report every parameter that more than one distribution assigns."""
     seen: dict[str, Diagnostic] = {}
     for name, origin in names:
         if name in seen:
-            message = f"the parameter {name!r} is varied by another distribution too"
+            message = f"parameter {name!r} is also varied by another distribution"
             collector.error(message, f"see line {seen[name].line}", source=origin.source, line=origin.line)
         seen.setdefault(name, origin)
 
@@ -157,7 +157,10 @@ def _value_sets(distribution: DeterministicMultiParameterDistribution, collector
         for one in value_set.parameter_assignment:
             if one.parameter_ref in choice:
                 collector.error(
-                    f"the set assigns {one.parameter_ref!r} twice", "remove one", source=one.source, line=one.line
+                    f"ParameterValueSet assigns {one.parameter_ref!r} twice",
+                    "remove one",
+                    source=one.source,
+                    line=one.line,
                 )
             choice[one.parameter_ref] = Assignment(one.value, place(one))
         choices.append(choice)
@@ -173,18 +176,18 @@ def _single(
         return ListedValues(tuple({name: Assignment(one.value, place(one))} for one in elements))
     if distribution.distribution_range is not None:
         return _steps(name, distribution.distribution_range, collector)
-    refuse_user_defined(distribution, name, "DistributionSet or DistributionRange", collector)
+    reject_user_defined(distribution, name, "DistributionSet or DistributionRange", collector)
     return None
 
 
 def _steps(name: str, given: DistributionRange, collector: DiagnosticCollector) -> SteppedRange | None:
-    """From the lower limit on, a step at a time, as long as the value is not above the upper limit."""
+    """Return the values from the lower limit in equal steps up to the upper limit."""
     if not valid_range(given.range, collector, finite=True):
         return None
     if not (math.isfinite(given.step_width) and given.step_width > 0):
         collector.error(
             f"stepWidth is {written(given.step_width)}",
-            "give a number above zero",
+            "specify a number above zero",
             source=given.source,
             line=given.line,
         )
@@ -200,23 +203,23 @@ def _exact(value: float) -> Fraction:
 
 
 def valid_range(given: Range, collector: DiagnosticCollector, *, finite: bool = False) -> bool:
-    """Whether the limits are numbers in order; if they are not, that is a finding."""
+    """Whether the limits are ordered numbers; report an error otherwise."""
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:
         message = f"the range from {written(lower)} to {written(upper)} is empty"
-        collector.error(message, "lowerLimit has to be at most upperLimit", source=given.source, line=given.line)
+        collector.error(message, "lowerLimit must be at most upperLimit", source=given.source, line=given.line)
         return False
     if math.inf in (lower, -upper) or (finite and math.inf in (-lower, upper)):
-        message = f"the range from {written(lower)} to {written(upper)} has no end"
-        collector.error(message, "give finite limits", source=given.source, line=given.line)
+        message = f"the range from {written(lower)} to {written(upper)} is infinite"
+        collector.error(message, "specify finite limits", source=given.source, line=given.line)
         return False
     return True
 
 
-def refuse_user_defined(element: Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
-    """What only another tool understands cannot be unfolded."""
+def reject_user_defined(element: Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
+    """Report a UserDefinedDistribution, which only another tool can expand."""
     collector.error(
-        f"the values of {name!r} come from a UserDefinedDistribution, whose meaning is left to a tool",
+        f"UserDefinedDistribution of {name!r} is specific to another tool",
         f"write {instead}",
         source=element.source,
         line=element.line,
@@ -224,5 +227,5 @@ def refuse_user_defined(element: Element, name: str, instead: str, collector: Di
 
 
 def place(element: Element) -> Diagnostic:
-    """Where a value was given."""
+    """Return the location of a value."""
     return Diagnostic("", "", element.source, element.line)

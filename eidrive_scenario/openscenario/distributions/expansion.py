@@ -1,4 +1,4 @@
-"""The concrete runs that a distribution file stands for, one by one."""
+"""Expansion of a parameter value distribution to concrete runs, on demand."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 @dataclass(frozen=True)
 class ConcreteRun:
-    """A scenario with a value for each parameter that its distribution varies.
+    """Scenario with a value for each parameter that its distribution varies.
 
-    number        of the run among those of the file, from 0 on
-    assignments   values by parameter, each with the line that gave it; `load_scenario` takes them as they are
+    number       number of the run in the distribution, from 0
+    assignments  values by parameter, each with its line in the file; an argument of `load_scenario`
     """
 
     scenario: Path
@@ -37,22 +37,22 @@ class ConcreteRun:
 
     @property
     def parameters(self) -> dict[str, str]:
-        """The values by parameter."""
+        """Return the values by parameter."""
         return {name: assignment.text for name, assignment in self.assignments.items()}
 
     def __str__(self) -> str:
-        """For human eyes, as `Speed=10,Model=car`; of a path only the last part."""
+        """Format the values as `Speed=10,Model=car`; of a path only the last part is shown."""
         return ",".join(f"{name}={PurePosixPath(text).name or text}" for name, text in self.parameters.items())
 
 
 class DistributionExpansion(Sequence[ConcreteRun]):
-    """All runs of a distribution file, counted and numbered, but made only when one is asked for.
+    """Sequence of all runs of a distribution file; a run is created on access.
 
-    source      what messages call the file
-    scenario    the file that is run
-    varied      deterministic distributions combined in the order of the file, the last one changing from run to run;
-                or stochastic ones, where a run is the same whichever runs were asked for before
-    warnings    what the file's version of the standard deprecates
+    source    name of the file in messages
+    scenario  path of the scenario file
+    varied    product of the deterministic distributions in the order of the file, the last one varying fastest; or
+              stochastic ones, for which a run does not depend on the runs that were accessed before
+    warnings  warnings of the reader, such as deprecated elements
     """
 
     def __init__(
@@ -75,36 +75,35 @@ class DistributionExpansion(Sequence[ConcreteRun]):
     @overload
     def __getitem__(self, index: slice) -> tuple[ConcreteRun, ...]: ...
     def __getitem__(self, index: int | slice) -> ConcreteRun | tuple[ConcreteRun, ...]:
-        """A run by its number, or several. Raises IndexError."""
+        """Return a run by its number, or several. Raise IndexError if the number is too large."""
         if isinstance(index, slice):
             return tuple(self[each] for each in range(*index.indices(len(self))))
         number = range(len(self))[index]
         return ConcreteRun(self.scenario, number, self.varied.at(number))
 
     def spread(self, count: int) -> Sequence[int]:
-        """Numbers of `count` runs, or of all if there are no more, ascending.
+        """Return the ascending numbers of at most `count` runs.
 
-        Combinations are picked all over: a part of them leaves out no value of a parameter that varies fast, and jumps
-        evenly through those that vary slowly. A greater count adds runs to those of a smaller one. Of draws, which are
-        alike, it is the first.
+        Combinations are selected evenly: a selection covers all values of parameters that vary fast, and evenly spaced
+        ones of those that vary slowly. A larger count adds runs to those of a smaller one. Of random draws, the first
+        ones are selected.
         """
         if count >= len(self) or isinstance(self.varied, StochasticSampler):
             return range(min(count, len(self)))
-        # Steps of the golden ratio are the most even ones for any count (Weyl); without a common divisor they meet
-        # every run before one comes again, and in the digits of a mixed radix every value.
+        # Steps of the golden ratio are the most even ones for any count (Weyl); a step without a common divisor reaches
+        # every run before it repeats one, and every value of each digit of the mixed radix.
         step = next(step for step in itertools.count(round(len(self) * _GOLDEN)) if math.gcd(step, len(self)) == 1)
         return sorted(index * step % len(self) for index in range(count))
 
 
 def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansion:
-    """Reads a parameter value distribution.
+    """Read a parameter value distribution.
 
-    seed    of the draws where a stochastic distribution names no randomSeed itself
+    seed  seed of the draws if a stochastic distribution has no randomSeed
 
-    The scenario's path counts from the folder of the distribution; where that is no file, as in Python, it need not
-    be there, which is a warning: its runs are those of any scenario. The scenario itself is not read: whether it has
-    the parameters, and whether their constraints allow the values, comes out when a run is loaded.
-    Raises ScenarioError with everything that is wrong with the file, each as file:line.
+    The path of the scenario is relative to the folder of the distribution. A missing scenario is an error for a
+    distribution from a file, and a warning otherwise, as in Python. The scenario itself is not read: its parameters
+    and their constraints are checked when a run is loaded. Raise ScenarioError with all errors of the file.
     """
     document = open_document(source)
     collector = DiagnosticCollector()
@@ -128,15 +127,15 @@ def _varied(
     return combinations_of(distribution.deterministic, collector)
 
 
-def _scenario_file(given: File, folder: Path, report: Callable[..., None]) -> Path:
-    path = place_of(given.filepath.strip().replace("\\", "/"), folder)
+def _scenario_file(file: File, folder: Path, report: Callable[..., None]) -> Path:
+    path = place_of(file.filepath.strip().replace("\\", "/"), folder)
     if not is_regular_file(path):
-        beside = path.parent.glob("*.xosc") if is_folder(path.parent) else ()
+        siblings = path.parent.glob("*.xosc") if is_folder(path.parent) else ()
         report(
-            f"no scenario {quoted(given.filepath)}",
-            suggestion(path.stem, {file.stem for file in beside}),
-            source=given.source,
-            line=given.line,
+            f"ScenarioFile: scenario {quoted(file.filepath)} does not exist",
+            suggestion(path.stem, {sibling.stem for sibling in siblings}),
+            source=file.source,
+            line=file.line,
         )
     return path
 
@@ -144,5 +143,5 @@ def _scenario_file(given: File, folder: Path, report: Callable[..., None]) -> Pa
 def _other_kind(root: OpenScenario | None, name: str) -> Diagnostic:
     kind = "catalog" if root is not None and root.catalog is not None else "scenario"
     return Diagnostic(
-        f"this is a {kind}, not a distribution of parameter values", "", name, root.line if root else None
+        f"the file is a {kind}, not a parameter value distribution", "", name, root.line if root else None
     )

@@ -1,8 +1,8 @@
-"""Stochastic distributions as quantile functions: a share of all outcomes, 0 to 1, gives a value.
+"""Stochastic distributions as quantile functions of a probability from 0 to 1.
 
-A run needs one uniform number for each parameter, whatever the distribution and however it is cut off, so that no draw
-depends on another. Weights count relative to their sum. What is cut off at a range keeps the distribution's shape in
-the range; both limits belong to it.
+A run needs one uniform number per parameter for every distribution, truncated or not, so that no draw depends on
+another one. Weights are relative to their sum. A distribution that is truncated at a range keeps its shape inside;
+both limits belong to the range.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import (
     Assignments,
     place,
-    refuse_user_defined,
+    reject_user_defined,
     valid_range,
     varied_once,
 )
@@ -46,17 +46,17 @@ from eidrive_scenario.randomness import generator
 
 Quantile = Callable[[float], "float | str"]
 _SMALLEST, _LARGEST = 2.0**-54, 1 - 2.0**-53
-_MOST_EVENTS = 2.0**53
-"""Whole numbers beyond have no neighbors among floating-point numbers."""
+_MAX_EVENTS = 2.0**53
+"""Maximum expected number of events; adjacent integers above are not distinct in floating point."""
 
 
 def quantile_of(distribution: StochasticDistribution, collector: DiagnosticCollector) -> Quantile | None:
-    """How the parameter's value follows from a share; None where the distribution is wrong, which is a finding."""
+    """Return the quantile function of a distribution; None if it is invalid, which is reported."""
     chosen = distribution.chosen()
     build = _BUILD.get(type(chosen))
     if build is None:
         instead = ", ".join(sorted(kind.__name__ for kind in _BUILD))
-        refuse_user_defined(chosen, distribution.parameter_name, f"one of {instead}", collector)
+        reject_user_defined(chosen, distribution.parameter_name, f"one of {instead}", collector)
         return None
     before = len(collector.errors)
     quantile: Quantile = build(chosen, collector)
@@ -65,17 +65,17 @@ def quantile_of(distribution: StochasticDistribution, collector: DiagnosticColle
     for share in (_SMALLEST, _LARGEST):
         value = quantile(share)
         if isinstance(value, float) and not math.isfinite(value):
-            _wrong(chosen, "reaches beyond what a number can hold", "cut it off at a Range", collector)
+            _report(chosen, "has values that are not finite", "truncate it by a Range", collector)
             return None
     return quantile
 
 
 @dataclass(frozen=True)
 class StochasticSampler:
-    """A value for each parameter in each run; it depends on seed, parameter and run, on nothing drawn before.
+    """Values of each parameter in each run, which depend only on seed, parameter and number of the run.
 
-    quantiles   by parameter
-    names       the parameters, and where the file says how they are drawn
+    quantiles  quantile functions by parameter
+    names      parameters, with the locations of their distributions
     """
 
     count: int
@@ -84,7 +84,7 @@ class StochasticSampler:
     names: Mapping[str, Diagnostic]
 
     def at(self, index: int) -> Assignments:
-        """The values in the run of that index."""
+        """Return the values in the run of an index."""
         return {name: Assignment(self._drawn(name, index), self.names[name]) for name in self.quantiles}
 
     def _drawn(self, name: str, run: int) -> str:
@@ -94,13 +94,13 @@ class StochasticSampler:
 
 
 def draws_of(stochastic: Stochastic, seed: float, collector: DiagnosticCollector) -> StochasticSampler:
-    """The distributions of the parameters; what is wrong with them becomes a finding.
+    """Return the sampler of all distributions; report their errors.
 
-    seed    for a file that names no randomSeed
+    seed  seed for a file without randomSeed
     """
     if stochastic.number_of_test_runs < 1:
-        message = "Stochastic asks for no test run"
-        collector.error(message, "give a number above zero", source=stochastic.source, line=stochastic.line)
+        message = f"Stochastic has numberOfTestRuns {stochastic.number_of_test_runs}"
+        collector.error(message, "specify a number above zero", source=stochastic.source, line=stochastic.line)
     distributions = stochastic.stochastic_distribution
     varied_once(((one.parameter_name, place(one)) for one in distributions), collector)
     found = {one.parameter_name: quantile_of(one, collector) for one in distributions}
@@ -128,21 +128,24 @@ def _normal(given: NormalDistribution, collector: DiagnosticCollector) -> Quanti
 
 
 def _log_normal(given: LogNormalDistribution, collector: DiagnosticCollector) -> Quantile:
-    """Expected value and variance are those of the logarithm: the standard lets the former be negative."""
+    """Build the log-normal quantile; expected value and variance are those of the logarithm, as in the standard."""
     lower, upper = _limits(given.range, collector)
     _check_normal(given, collector)
     if given.range is not None and lower <= 0:
-        _wrong(
-            given.range, f"has the lower limit {written(lower)}", "that of LogNormalDistribution is above 0", collector
+        _report(
+            given.range,
+            f"has the lower limit {written(lower)}",
+            "specify a limit above 0 for LogNormalDistribution",
+            collector,
         )
     return partial(_from_log_normal, given.expected_value, math.sqrt(max(given.variance, 0)), max(lower, 0), upper)
 
 
 def _check_normal(given: NormalDistribution | LogNormalDistribution, collector: DiagnosticCollector) -> None:
     if not math.isfinite(given.expected_value):
-        _wrong(given, f"has the expected value {written(given.expected_value)}", "give a finite number", collector)
+        _report(given, f"has the expected value {written(given.expected_value)}", "specify a finite number", collector)
     if not 0 < given.variance < math.inf:
-        _wrong(given, f"has the variance {written(given.variance)}", "give a number above zero", collector)
+        _report(given, f"has the variance {written(given.variance)}", "specify a number above zero", collector)
 
 
 def _from_normal(mean: float, deviation: float, lower: float, upper: float, share: float) -> float:
@@ -158,9 +161,9 @@ def _from_log_normal(mean: float, deviation: float, lower: float, upper: float, 
 
 
 def _standard_normal(low: float, high: float, share: float) -> float:
-    """The quantile of the standard normal distribution between two limits, exact in its tails too.
+    """Return the quantile of the truncated standard normal distribution, also exact in its tails.
 
-    Probabilities are kept as logarithms below the middle, where they have their full precision.
+    Probabilities are logarithms in the lower half, where they have full precision.
     """
     if low > 0:
         return -_standard_normal(-high, -low, 1 - share)
@@ -176,28 +179,28 @@ def _poisson(given: PoissonDistribution, collector: DiagnosticCollector) -> Quan
     lower, upper = _limits(given.range, collector)
     low = max(0, math.ceil(lower)) if math.isfinite(lower) else 0
     high = math.floor(upper) if math.isfinite(upper) else None
-    if not 0 < mean < _MOST_EVENTS:
-        _wrong(
-            given, f"has the expected value {written(mean)}", f"give one between 0 and {_MOST_EVENTS:.0f}", collector
+    if not 0 < mean < _MAX_EVENTS:
+        _report(
+            given, f"has the expected value {written(mean)}", f"specify one between 0 and {_MAX_EVENTS:.0f}", collector
         )
     elif high is not None and high < low:
-        _wrong(given, "has a range without a whole number from 0 on", "it counts events", collector)
+        _report(given, "has a range without a whole number from 0 on", "specify a range of event counts", collector)
     elif _less(mean, low, high, None) == _less(mean, low, high, low):
-        _wrong(given, "has no probability left in its range", "bring range and expected value together", collector)
+        _report(given, "has a probability of 0 in its range", "adapt the range or the expected value", collector)
     return partial(_from_poisson, mean, low, high)
 
 
 def _from_poisson(mean: float, low: int, high: int | None, share: float) -> float:
     start, end = (_less(mean, low, high, count) for count in (low, None))
-    wanted = start + share * (end - start)
+    target = start + share * (end - start)
     least, most = low - 1, high
     if most is None:
         most = max(low, int(mean)) + 1
-        while _less(mean, low, high, most + 1) < wanted:
+        while _less(mean, low, high, most + 1) < target:
             least, most = most, 2 * most
     while most - least > 1:
         middle = (least + most) // 2
-        if _less(mean, low, high, middle + 1) < wanted:
+        if _less(mean, low, high, middle + 1) < target:
             least = middle
         else:
             most = middle
@@ -205,9 +208,9 @@ def _from_poisson(mean: float, low: int, high: int | None, share: float) -> floa
 
 
 def _less(mean: float, low: int, high: int | None, count: int | None) -> float:
-    """The probability of fewer events than `count`, where None is one more than `high`.
+    """Return the probability of fewer events than `count`; None is one more than `high`.
 
-    In the upper tail it is less by 1, a difference that cancels out, and keeps its precision.
+    In the upper tail the result is lower by 1. This offset cancels out, and the precision is preserved.
     """
     if count is None:
         count = None if high is None else high + 1
@@ -227,11 +230,11 @@ def _check_overlap(bins: tuple[HistogramBin, ...], collector: DiagnosticCollecto
     for before, after in pairwise(sorted(bins, key=lambda one: (one.range.lower_limit, one.range.upper_limit))):
         if after.range.lower_limit < before.range.upper_limit:
             later = max(before, after, key=lambda one: one.line)
-            _wrong(later, "overlaps another", "the ranges of a histogram may only touch", collector)
+            _report(later, "overlaps another bin", "specify disjoint ranges", collector)
 
 
 def _from_histogram(limits: tuple[tuple[float, float], ...], accumulated: tuple[float, ...], share: float) -> float:
-    index, within = _weighed(accumulated, share)
+    index, within = _select_part(accumulated, share)
     return _from_range(*limits[index], within)
 
 
@@ -241,7 +244,7 @@ def _value_set(given: ProbabilityDistributionSet, collector: DiagnosticCollector
 
 
 def _from_values(values: tuple[str, ...], accumulated: tuple[float, ...], share: float) -> str:
-    return values[_weighed(accumulated, share)[0]]
+    return values[_select_part(accumulated, share)[0]]
 
 
 def _accumulated(
@@ -249,18 +252,18 @@ def _accumulated(
     parts: tuple[HistogramBin, ...] | tuple[ProbabilityDistributionSetElement, ...],
     collector: DiagnosticCollector,
 ) -> tuple[float, ...]:
-    """The weights added up from the first part on."""
+    """Return the cumulative weights; report invalid ones."""
     for one in parts:
         if not 0 <= one.weight < math.inf:
-            _wrong(one, f"has the weight {written(one.weight)}", "give a number from zero on", collector)
+            _report(one, f"has the weight {written(one.weight)}", "specify a number of at least zero", collector)
     sums = tuple(accumulate(one.weight for one in parts))
     if not 0 < sums[-1] < math.inf and all(0 <= one.weight < math.inf for one in parts):
-        _wrong(given, f"has weights that add up to {written(sums[-1])}", "give weights above zero", collector)
+        _report(given, f"has weights with the sum {written(sums[-1])}", "specify weights above zero", collector)
     return sums
 
 
-def _weighed(accumulated: tuple[float, ...], share: float) -> tuple[int, float]:
-    """The part in which a share of all weights falls, and the share of that part's own weight."""
+def _select_part(accumulated: tuple[float, ...], share: float) -> tuple[int, float]:
+    """Return the part that contains a share of the total weight, and the relative position inside."""
     reached = min(share * accumulated[-1], math.nextafter(accumulated[-1], 0))
     index = bisect_right(accumulated, reached)
     start = accumulated[index - 1] if index else 0.0
@@ -274,7 +277,7 @@ def _limits(given: Range | None, collector: DiagnosticCollector) -> tuple[float,
     return given.lower_limit, given.upper_limit
 
 
-def _wrong(element: Element, what: str, hint: str, collector: DiagnosticCollector) -> None:
+def _report(element: Element, what: str, hint: str, collector: DiagnosticCollector) -> None:
     kind = type(element).__name__
     collector.error(f"{kind} {what}", hint, source=element.source, line=element.line)
 

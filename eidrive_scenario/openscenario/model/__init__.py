@@ -1,6 +1,6 @@
-"""The types of OpenSCENARIO XML 1.0 to 1.3 as frozen dataclasses, under the names of the standard.
+"""Types of OpenSCENARIO XML 1.0 to 1.3 as frozen dataclasses with the names of the standard.
 
-An element's attributes and children are its fields, in snake_case; see `element` for what a field says.
+Attributes and children of an element are fields in snake_case; `element` describes the field definitions.
 """
 
 from eidrive_scenario.openscenario.model.appearance import *

@@ -19,7 +19,7 @@ from eidrive_scenario.openscenario.model.properties import File
 
 @dataclass(frozen=True, kw_only=True)
 class ColorRgb(Element):
-    """Red, green, blue in [0, 1]."""
+    """RGB color, components in [0, 1]."""
 
     red: float
     green: float
@@ -28,7 +28,7 @@ class ColorRgb(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ColorCmyk(Element):
-    """Cyan, magenta, yellow, key in [0, 1]."""
+    """CMYK color, components in [0, 1]."""
 
     cyan: float
     magenta: float
@@ -38,7 +38,7 @@ class ColorCmyk(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Color(Element, content=CHOICE):
-    """A color by name and, if need be, by numbers in [0, 1]."""
+    """Color by name, optionally by components in [0, 1]."""
 
     name: str | None = attribute(until="1.2", required=True)
     red: float | None = attribute(until="1.2")
@@ -51,21 +51,21 @@ class Color(Element, content=CHOICE):
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleLight(Element):
-    """A light that the standard knows."""
+    """Light that the standard defines."""
 
     vehicle_light_type: VehicleLightType
 
 
 @dataclass(frozen=True, kw_only=True)
 class UserDefinedLight(Element):
-    """A light that a tool knows."""
+    """Light that is specific to a tool."""
 
     user_defined_light_type: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class LightType(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
-    """Which light."""
+    """Choice of a light."""
 
     vehicle_light: VehicleLight | None = child(required_until="1.2")
     user_defined_light: UserDefinedLight | None = child(required_until="1.2")
@@ -73,7 +73,7 @@ class LightType(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
 
 @dataclass(frozen=True, kw_only=True)
 class LightState(Element):
-    """On, off or flashing; intensity [cd], durations [s]."""
+    """State of a light; intensity [cd], durations [s]."""
 
     state: LightMode | None = attribute(until="1.2", required=True)
     intensity: float | None = attribute(until="1.2")
@@ -86,7 +86,7 @@ class LightState(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class LightStateAction(Element):
-    """Switches a light; transition time [s]."""
+    """Action that switches a light; transition time [s]."""
 
     name: str | None = attribute(until="1.2", required=True)
     transition_time: float | None = None
@@ -96,21 +96,21 @@ class LightStateAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleComponent(Element):
-    """A part of a vehicle that moves."""
+    """Moving part of a vehicle."""
 
     vehicle_component_type: VehicleComponentType
 
 
 @dataclass(frozen=True, kw_only=True)
 class UserDefinedComponent(Element):
-    """A moving part that a tool knows."""
+    """Moving part that is specific to a tool."""
 
     user_defined_component_type: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComponentAnimation(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
-    """Which part moves."""
+    """Choice of a moving part."""
 
     vehicle_component: VehicleComponent | None = child(required_until="1.2")
     user_defined_component: UserDefinedComponent | None = child(required_until="1.2")
@@ -118,14 +118,14 @@ class ComponentAnimation(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
 
 @dataclass(frozen=True, kw_only=True)
 class PedestrianGesture(Element):
-    """What a pedestrian does with its hands."""
+    """Gesture of a pedestrian."""
 
     gesture: PedestrianGestureType
 
 
 @dataclass(frozen=True, kw_only=True)
 class PedestrianAnimation(Element):
-    """How a pedestrian moves."""
+    """Motion and gestures of a pedestrian."""
 
     motion: PedestrianMotionType | None = None
     user_defined_pedestrian_animation: str | None = None
@@ -134,7 +134,7 @@ class PedestrianAnimation(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class AnimationFile(Element):
-    """An animation from a file; time offset [s]."""
+    """Animation from a file; time offset [s]."""
 
     time_offset: float | None = None
     file: File
@@ -142,14 +142,14 @@ class AnimationFile(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class UserDefinedAnimation(Element):
-    """An animation that a tool knows."""
+    """Animation that is specific to a tool."""
 
     user_defined_animation_type: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class AnimationType(Element, content=CHOICE):
-    """Which animation."""
+    """Choice of an animation."""
 
     component_animation: ComponentAnimation | None = None
     pedestrian_animation: PedestrianAnimation | None = None
@@ -159,14 +159,14 @@ class AnimationType(Element, content=CHOICE):
 
 @dataclass(frozen=True, kw_only=True)
 class AnimationState(Element):
-    """How far the animation has to go, in [0, 1]."""
+    """Target state of an animation in [0, 1]."""
 
     state: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class AnimationAction(Element):
-    """Plays an animation; duration [s]."""
+    """Action that plays an animation; duration [s]."""
 
     name: str | None = attribute(until="1.2", required=True)
     loop: bool | None = None
@@ -177,7 +177,7 @@ class AnimationAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class AppearanceAction(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
-    """Changes how an entity looks."""
+    """Action that changes the appearance of an entity."""
 
     light_state_action: LightStateAction | None = child(required_until="1.2")
     animation_state_action: AnimationAction | None = child(until="1.2", required=True)

@@ -1,4 +1,4 @@
-"""The box around an object."""
+"""Bounding box of an object."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario.model.element import Element
 
 @dataclass(frozen=True, kw_only=True)
 class Center(Element):
-    """Position of the middle of the box in the frame of the object [m]."""
+    """Center of the box in the frame of the object [m]."""
 
     x: float
     y: float
@@ -19,7 +19,7 @@ class Center(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Dimensions(Element):
-    """Extents of the box [m]."""
+    """Dimensions of the box [m]."""
 
     height: float
     length: float
@@ -28,7 +28,7 @@ class Dimensions(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class BoundingBox(Element, content=ALL):
-    """The box around an object, axes along its frame."""
+    """Bounding box, parallel to the axes of the object frame."""
 
     center: Center
     dimensions: Dimensions

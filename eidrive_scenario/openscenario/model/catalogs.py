@@ -1,4 +1,4 @@
-"""Catalogs, where they lie, and how an entry of one is named."""
+"""Catalogs, their locations, and references to their entries."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogReference(Element):
-    """An entry of a catalog, with values for its parameters."""
+    """Reference to a catalog entry, with values of its parameters."""
 
     catalog_name: str
     entry_name: str
@@ -31,70 +31,70 @@ class CatalogReference(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleCatalogLocation(Element, content=ALL):
-    """Where vehicle catalogs lie."""
+    """Location of vehicle catalogs."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerCatalogLocation(Element, content=ALL):
-    """Where controller catalogs lie."""
+    """Location of controller catalogs."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class PedestrianCatalogLocation(Element, content=ALL):
-    """Where pedestrian catalogs lie."""
+    """Location of pedestrian catalogs."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class MiscObjectCatalogLocation(Element, content=ALL):
-    """Where catalogs of miscellaneous objects lie."""
+    """Location of catalogs of miscellaneous objects."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class EnvironmentCatalogLocation(Element, content=ALL):
-    """Where environment catalogs lie."""
+    """Location of environment catalogs."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class ManeuverCatalogLocation(Element, content=ALL):
-    """Where maneuver catalogs lie."""
+    """Location of maneuver catalogs."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrajectoryCatalogLocation(Element, content=ALL):
-    """Where trajectory catalogs lie."""
+    """Location of trajectory catalogs."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class RouteCatalogLocation(Element, content=ALL):
-    """Where route catalogs lie."""
+    """Location of route catalogs."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorCatalogLocation(Element, content=ALL):
-    """Where sensor catalogs lie (1.2)."""
+    """Location of sensor catalogs (1.2)."""
 
     directory: Directory
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogLocations(Element, content=ALL):
-    """Where the catalogs of a scenario lie, by kind."""
+    """Locations of the catalogs of a scenario, by kind."""
 
     vehicle_catalog: VehicleCatalogLocation | None = None
     controller_catalog: ControllerCatalogLocation | None = None

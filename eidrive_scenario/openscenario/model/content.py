@@ -1,6 +1,6 @@
-"""In which order and how often the children of an element may stand: the schema's content models.
+"""Content models of the schema: order and number of the children of an element.
 
-Without arguments a model speaks of all child fields of its class. Otherwise it names fields, or nests further models.
+A model without arguments applies to all child fields of its class. Otherwise it lists fields or nested models.
 Versions are written as in the file header: "1.2" is revMajor 1, revMinor 2.
 """
 
@@ -14,17 +14,17 @@ Part: TypeAlias = "str | Sequence | Choice"
 
 @dataclass(frozen=True)
 class Sequence:
-    """One after the other, in the order of the parts."""
+    """Sequence of the parts in their order."""
 
     parts: tuple[Part, ...] = ()
 
 
 @dataclass(frozen=True)
 class Choice:
-    """One of the parts.
+    """Choice of one of the parts.
 
-    minimum, maximum  how often one may be chosen; None is without limit
-    empty_until       up to this version the schema let the choice be empty
+    minimum, maximum  number of repetitions; None for no limit
+    empty_until       last version in which the schema allows an empty choice
     """
 
     parts: tuple[Part, ...] = ()
@@ -35,12 +35,12 @@ class Choice:
 
 @dataclass(frozen=True)
 class All:
-    """Every child at most once, in any order."""
+    """All children in any order, each at most once."""
 
 
 @dataclass(frozen=True)
 class Changed:
-    """Another model since a version."""
+    """Content model that changes in a version."""
 
     before: Sequence | All
     since: str
@@ -55,10 +55,10 @@ CHOICE = Choice()
 
 
 def sequence(*parts: Part) -> Sequence:
-    """The given parts, one after the other."""
+    """Return a sequence of parts."""
     return Sequence(parts)
 
 
 def choice(*parts: Part, empty_until: str = "") -> Choice:
-    """One of the given parts."""
+    """Return a choice of parts."""
     return Choice(parts, empty_until=empty_until)

@@ -1,4 +1,4 @@
-"""Controllers and the actions upon them."""
+"""Controllers and controller actions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from eidrive_scenario.openscenario.model.scalars import ControllerName
 
 @dataclass(frozen=True, kw_only=True)
 class Controller(Element, content=ALL):
-    """Who moves an entity; its properties are for the tool that provides it."""
+    """Controller of an entity; its properties are specific to the tool that provides it."""
 
     name: str
     controller_type: ControllerType | None = attribute(since="1.2")
@@ -25,7 +25,7 @@ class Controller(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectController(Element, content=Choice(empty_until="1.2")):
-    """The controller of an entity, in place or from a catalog."""
+    """Controller of an entity, defined in place or in a catalog."""
 
     name: str | None = attribute(since="1.3")
     catalog_reference: CatalogReference | None = None
@@ -34,7 +34,7 @@ class ObjectController(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerDistributionEntry(Element, content=Choice(empty_until="1.2")):
-    """A controller and its share."""
+    """Controller and its share."""
 
     weight: float
     controller: Controller | None = None
@@ -43,14 +43,14 @@ class ControllerDistributionEntry(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerDistribution(Element):
-    """Which controllers background traffic gets, by shares."""
+    """Controllers of background traffic, by shares."""
 
     controller_distribution_entry: tuple[ControllerDistributionEntry, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class AssignControllerAction(Element, content=Choice(minimum=0)):
-    """Gives an entity a controller, and says which domains it takes at once."""
+    """Action that assigns a controller to an entity, and optionally activates its domains."""
 
     activate_lateral: bool | None = attribute(since="1.1")
     activate_longitudinal: bool | None = attribute(since="1.1")
@@ -63,7 +63,7 @@ class AssignControllerAction(Element, content=Choice(minimum=0)):
 
 @dataclass(frozen=True, kw_only=True)
 class ActivateControllerAction(Element):
-    """Turns a controller on or off, domain by domain; a domain left out stays as it is."""
+    """Action that activates or deactivates a controller per domain; an omitted domain does not change."""
 
     lateral: bool | None = None
     longitudinal: bool | None = None
@@ -75,7 +75,7 @@ class ActivateControllerAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Brake(Element):
-    """A brake's position: a share in [0, 1] or a force [N]; largest rate per second."""
+    """Brake input: share in [0, 1] or force [N]; maximum rate [1/s, N/s]."""
 
     value: float
     max_rate: float | None = None
@@ -83,21 +83,21 @@ class Brake(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ManualGear(Element):
-    """A gear by number; negative is reverse, 0 is neutral."""
+    """Gear by number; negative for reverse, 0 for neutral."""
 
     number: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class AutomaticGear(Element):
-    """The position of an automatic transmission's lever."""
+    """Lever position of an automatic transmission."""
 
     gear: AutomaticGearType
 
 
 @dataclass(frozen=True, kw_only=True)
 class OverrideThrottleAction(Element):
-    """Holds the throttle at a value in [0, 1]."""
+    """Override of the throttle by a value in [0, 1]."""
 
     active: bool
     value: float
@@ -106,7 +106,7 @@ class OverrideThrottleAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class OverrideBrakeAction(Element, content=Choice(minimum=0)):
-    """Holds the brake."""
+    """Override of the brake."""
 
     active: bool
     value: float | None = attribute(deprecated="1.2", required_until="1.1")
@@ -116,7 +116,7 @@ class OverrideBrakeAction(Element, content=Choice(minimum=0)):
 
 @dataclass(frozen=True, kw_only=True)
 class OverrideClutchAction(Element):
-    """Holds the clutch at a value in [0, 1]."""
+    """Override of the clutch by a value in [0, 1]."""
 
     active: bool
     value: float
@@ -125,7 +125,7 @@ class OverrideClutchAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class OverrideParkingBrakeAction(Element, content=Choice(minimum=0)):
-    """Holds the parking brake."""
+    """Override of the parking brake."""
 
     active: bool
     value: float | None = attribute(deprecated="1.2", required_until="1.1")
@@ -135,7 +135,7 @@ class OverrideParkingBrakeAction(Element, content=Choice(minimum=0)):
 
 @dataclass(frozen=True, kw_only=True)
 class OverrideSteeringWheelAction(Element):
-    """Holds the steering wheel [rad]; rate [rad/s], torque [Nm]."""
+    """Override of the steering wheel angle [rad]; maximum rate [rad/s], torque [Nm]."""
 
     active: bool
     value: float
@@ -145,7 +145,7 @@ class OverrideSteeringWheelAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class OverrideGearAction(Element, content=Choice(minimum=0)):
-    """Holds the gear."""
+    """Override of the gear."""
 
     active: bool
     number: float | None = attribute(deprecated="1.2", required_until="1.1")
@@ -155,7 +155,7 @@ class OverrideGearAction(Element, content=Choice(minimum=0)):
 
 @dataclass(frozen=True, kw_only=True)
 class OverrideControllerValueAction(Element, content=ALL):
-    """Holds pedals, wheel or gear against the controller's will."""
+    """Action that overrides pedals, steering wheel or gear of the controller."""
 
     throttle: OverrideThrottleAction | None = child(required_until="1.0")
     brake: OverrideBrakeAction | None = child(required_until="1.0")
@@ -167,7 +167,7 @@ class OverrideControllerValueAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerAction(Element, content=Changed(ALL, "1.3", CHOICE)):
-    """Assigns, overrides or activates controllers. Before 1.3 several at once are possible."""
+    """Action that assigns, overrides or activates controllers; before 1.3 a combination is allowed."""
 
     assign_controller_action: AssignControllerAction | None = child(required_until="1.0")
     override_controller_value_action: OverrideControllerValueAction | None = child(required_until="1.0")

@@ -1,4 +1,4 @@
-"""Parameters, variables and monitors: declared, assigned, constrained."""
+"""Declarations, assignments and constraints of parameters, variables and monitors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eidrive_scenario.openscenario.model.scalars import ParameterName
 
 @dataclass(frozen=True, kw_only=True)
 class ValueConstraint(Element):
-    """A comparison that a parameter's value has to pass."""
+    """Comparison that the value of a parameter must satisfy."""
 
     rule: Rule
     value: str
@@ -19,14 +19,14 @@ class ValueConstraint(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ValueConstraintGroup(Element):
-    """Constraints that hold together; several groups of one parameter are alternatives."""
+    """Constraints that are combined by AND; several groups of one parameter are alternatives."""
 
     value_constraint: tuple[ValueConstraint, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterDeclaration(Element):
-    """A parameter with its type and its default."""
+    """Parameter with its type and default."""
 
     name: ParameterName
     parameter_type: ParameterType
@@ -36,14 +36,14 @@ class ParameterDeclaration(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterDeclarations(Element):
-    """The parameters of a scope."""
+    """Parameters of a scope."""
 
     parameter_declaration: tuple[ParameterDeclaration, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterAssignment(Element):
-    """The value that a referenced entry gets for one of its parameters."""
+    """Value of one parameter of a referenced catalog entry."""
 
     parameter_ref: ParameterName
     value: str
@@ -51,14 +51,14 @@ class ParameterAssignment(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterAssignments(Element):
-    """The values that a referenced entry gets for its parameters."""
+    """Values of the parameters of a referenced catalog entry."""
 
     parameter_assignment: tuple[ParameterAssignment, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class VariableDeclaration(Element):
-    """A variable: it may change during the run."""
+    """Variable, whose value may change during the run."""
 
     name: str
     variable_type: ParameterType
@@ -67,14 +67,14 @@ class VariableDeclaration(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableDeclarations(Element):
-    """The variables of a scenario."""
+    """Variables of a scenario."""
 
     variable_declaration: tuple[VariableDeclaration, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class MonitorDeclaration(Element):
-    """A boolean that tells an outside observer about the run."""
+    """Boolean value for external observers of the run."""
 
     name: str
     value: bool
@@ -82,6 +82,6 @@ class MonitorDeclaration(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class MonitorDeclarations(Element):
-    """The monitors of a scenario."""
+    """Monitors of a scenario."""
 
     monitor_declaration: tuple[MonitorDeclaration, ...] = ()

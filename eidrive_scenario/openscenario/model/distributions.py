@@ -13,7 +13,7 @@ from eidrive_scenario.openscenario.model.scalars import UnsignedInt
 
 @dataclass(frozen=True, kw_only=True)
 class Range(Element):
-    """From a lower to an upper limit."""
+    """Range from a lower to an upper limit."""
 
     lower_limit: float
     upper_limit: float
@@ -21,21 +21,21 @@ class Range(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class DistributionSetElement(Element):
-    """A value."""
+    """Value of a distribution."""
 
     value: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class DistributionSet(Element):
-    """Values, one run each."""
+    """Listed values, with one run each."""
 
     element: tuple[DistributionSetElement, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class DistributionRange(Element, content=ALL):
-    """Values from a range, at a step."""
+    """Values from a range in equal steps."""
 
     step_width: float
     range: Range
@@ -43,7 +43,7 @@ class DistributionRange(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class UserDefinedDistribution(Element):
-    """A distribution that a tool knows."""
+    """Distribution that is specific to a tool."""
 
     type: str
     content: str = text()
@@ -51,7 +51,7 @@ class UserDefinedDistribution(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class DeterministicSingleParameterDistribution(Element, content=CHOICE):
-    """Values of one parameter."""
+    """Deterministic values of one parameter."""
 
     parameter_name: str
     distribution_set: DistributionSet | None = None
@@ -68,21 +68,21 @@ class ParameterValueSet(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ValueSetDistribution(Element):
-    """Sets of values, one run each."""
+    """Sets of values, with one run each."""
 
     parameter_value_set: tuple[ParameterValueSet, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class DeterministicMultiParameterDistribution(Element):
-    """Values of several parameters at once."""
+    """Deterministic values of several parameters together."""
 
     value_set_distribution: ValueSetDistribution
 
 
 @dataclass(frozen=True, kw_only=True)
 class Deterministic(Element, content=Choice(minimum=0, maximum=None)):
-    """All combinations of the given values."""
+    """Deterministic distributions, whose combinations are the runs."""
 
     deterministic_multi_parameter_distribution: tuple[DeterministicMultiParameterDistribution, ...] = ()
     deterministic_single_parameter_distribution: tuple[DeterministicSingleParameterDistribution, ...] = ()
@@ -90,7 +90,7 @@ class Deterministic(Element, content=Choice(minimum=0, maximum=None)):
 
 @dataclass(frozen=True, kw_only=True)
 class ProbabilityDistributionSetElement(Element):
-    """A value and its weight."""
+    """Value and its weight."""
 
     value: str
     weight: float
@@ -98,14 +98,14 @@ class ProbabilityDistributionSetElement(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ProbabilityDistributionSet(Element):
-    """Values by their weights."""
+    """Values, drawn by their weights."""
 
     element: tuple[ProbabilityDistributionSetElement, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class NormalDistribution(Element):
-    """Gauss's distribution, cut off at a range."""
+    """Normal distribution, truncated at a range."""
 
     expected_value: float
     variance: float
@@ -114,7 +114,7 @@ class NormalDistribution(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class LogNormalDistribution(Element):
-    """A value whose logarithm is normally distributed, cut off at a range."""
+    """Log-normal distribution, truncated at a range."""
 
     expected_value: float
     variance: float
@@ -123,14 +123,14 @@ class LogNormalDistribution(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class UniformDistribution(Element):
-    """All values of a range alike."""
+    """Uniform distribution over a range."""
 
     range: Range
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoissonDistribution(Element):
-    """Numbers of events, cut off at a range."""
+    """Poisson distribution, truncated at a range."""
 
     expected_value: float
     range: Range | None = None
@@ -138,7 +138,7 @@ class PoissonDistribution(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class HistogramBin(Element):
-    """A range and its weight."""
+    """Range and its weight."""
 
     weight: float
     range: Range
@@ -146,14 +146,14 @@ class HistogramBin(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Histogram(Element):
-    """Ranges by their weights."""
+    """Ranges, drawn by their weights."""
 
     bin: tuple[HistogramBin, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class StochasticDistribution(Element, content=CHOICE):
-    """How one parameter is drawn."""
+    """Stochastic distribution of one parameter."""
 
     parameter_name: str
     probability_distribution_set: ProbabilityDistributionSet | None = None
@@ -167,7 +167,7 @@ class StochasticDistribution(Element, content=CHOICE):
 
 @dataclass(frozen=True, kw_only=True)
 class Stochastic(Element):
-    """Values drawn at random, for a number of runs."""
+    """Stochastic distributions, drawn for a number of runs."""
 
     number_of_test_runs: UnsignedInt
     random_seed: float | None = None
@@ -176,7 +176,7 @@ class Stochastic(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterValueDistribution(Element, content=sequence("scenario_file", choice("deterministic", "stochastic"))):
-    """Over which values of its parameters a scenario is run."""
+    """Values of the parameters over which a scenario is run."""
 
     scenario_file: File
     deterministic: Deterministic | None = None

@@ -1,4 +1,4 @@
-"""The file: its header, and which of the three kinds of document it holds."""
+"""Root of a file: its header and one of the three kinds of documents."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from eidrive_scenario.openscenario.model.storyboard import Storyboard
 
 @dataclass(frozen=True, kw_only=True)
 class License(Element):
-    """Under which license the file stands; its text, if it is here."""
+    """License of the file, optionally with its text."""
 
     name: str
     resource: str | None = None
@@ -34,7 +34,7 @@ class License(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class FileHeader(Element):
-    """Who wrote the file, when, and for which revision of the standard."""
+    """Author, date and revision of the standard of the file."""
 
     author: str
     date: datetime
@@ -47,14 +47,14 @@ class FileHeader(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class UsedArea(Element):
-    """The part of the world that the scenario needs."""
+    """Area of the world that the scenario uses."""
 
     position: tuple[Position, ...] = children(minimum=2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoadNetwork(Element):
-    """The road file, the scene's model and the traffic signals."""
+    """Road file, scene graph file and traffic signals."""
 
     logic_file: File | None = None
     scene_graph_file: File | None = None
@@ -82,7 +82,7 @@ class OpenScenario(
         ),
     ),
 ):
-    """A scenario, a catalog, or a distribution of parameter values."""
+    """Scenario, catalog, or parameter value distribution."""
 
     file_header: FileHeader
     parameter_declarations: ParameterDeclarations | None = None

@@ -1,8 +1,8 @@
-"""What every class of the model is, and how a field says what its type cannot.
+"""Base class of the model, and field definitions with the versions of the standard.
 
-A field's type tells what it is in the file: numbers, words and enumerations are attributes, other elements are
-children, tuples are children that repeat. A field without a default is required; one that begins with None or ()
-is optional. Where that differs between versions of the standard, `attribute`, `child` and `children` say so.
+The type of a field determines its XML form: numbers, texts and enumerations are attributes, other elements are
+children, tuples are repeated children. A field without a default is required; one with the default None or () is
+optional. `attribute`, `child` and `children` define differences between versions of the standard.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choic
 USAGE = "usage"
 
 ABOUT = frozenset({"line", "source", "scope"})
-"""Fields that say where an element stands instead of what it holds."""
+"""Fields with the location of an element, not with its content."""
 
 
 @dataclass(frozen=True)
 class Usage:
-    """In which versions a field or a word is there, is required, is deprecated; bounds are inclusive, "" is open."""
+    """Versions in which a field or literal exists, is required or deprecated; bounds are inclusive, "" is open."""
 
     since: str = ""
     until: str = ""
@@ -32,7 +32,7 @@ class Usage:
     single_until: str = ""
     minimum: int = 1
     name: str = ""
-    """The spelling in the file, where it does not follow from the field's name."""
+    """Name in the file if it does not follow from the name of the field."""
     text: bool = False
 
 
@@ -46,7 +46,7 @@ def attribute(
     required_until: str = "",
     name: str = "",
 ) -> Any:
-    """A field that some versions know, require or deprecate; None where the file does not have it."""
+    """Define a field that exists, is required or is deprecated in some versions only; None if the file omits it."""
     usage = Usage(
         since=since,
         until=until,
@@ -71,7 +71,7 @@ def children(
     single_until: str = "",
     name: str = "",
 ) -> Any:
-    """A field that holds any number of children, but at least `minimum`; () where the file has none."""
+    """Define a field for at least `minimum` children; () if the file has none."""
     usage = Usage(
         since=since,
         until=until,
@@ -85,21 +85,21 @@ def children(
 
 
 def text() -> Any:
-    """A field that holds the text between an element's tags."""
+    """Define a field for the text content of an element."""
     return field(default="", metadata={USAGE: Usage(text=True)})
 
 
 def visible_parameters() -> Any:
-    """A field for the parameters (a Scope) that are visible to the references inside a text of the element.
+    """Define a field for the parameters (a Scope) that are visible to references inside a text of the element.
 
-    None where a property has no reference, or is one as a whole, which is resolved when the file is read.
+    It is None for a property without a reference, or with a single reference, which the reader resolves.
     """
     return field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """An element of a file. `line` and `source` say where it stands; they do not count when elements are compared."""
+    """Element of a file. Comparisons ignore its location `line` and `source`."""
 
     line: int = field(default=0, compare=False, repr=False)
     source: str = field(default="", compare=False, repr=False)
@@ -110,7 +110,7 @@ class Element:
         cls.content_model = content
 
     def children(self) -> Iterator[Element]:
-        """The elements directly below, in the order of the class's fields."""
+        """Yield the child elements in the order of the fields."""
         for name in field_names(type(self)):
             value = getattr(self, name)
             if isinstance(value, Element):
@@ -119,29 +119,29 @@ class Element:
                 yield from value
 
     def walk(self) -> Iterator[Element]:
-        """This element and all below."""
+        """Yield this element and its descendants."""
         yield self
         for below in self.children():
             yield from below.walk()
 
     def chosen(self) -> Element:
-        """The one alternative that is set, where the standard lets the file choose.
+        """Return the alternative that is set in an element with a choice.
 
-        Raises ValueError if none is or several are. That happens only where some version lets an element be empty
-        or full: a ControllerAction before 1.3, an AssignControllerAction that assigns nothing, the steady state of
-        a final speed, an override that says how a brake or a gear is meant. Ask those for their fields.
+        Raise ValueError if none or several are set. Some versions allow this: a ControllerAction before 1.3, an empty
+        AssignControllerAction, the steady state of a final speed, and overrides of brake and gear. Use the fields of
+        these elements instead.
         """
         values = (getattr(self, name) for name in alternatives(type(self)))
         found = [value for value in values if isinstance(value, Element) or (isinstance(value, tuple) and value)]
         if len(found) != 1:
-            what = "one alternative is expected" if not found else "only one alternative is expected"
-            raise ValueError(f"{self.source}:{self.line}: {type(self).__name__}: {what}, found {len(found)}")
+            location = f"{self.source}:{self.line}: {type(self).__name__}"
+            raise ValueError(f"{location}: invalid number of alternatives (got {len(found)}; expected 1)")
         first = found[0]
         return first[0] if isinstance(first, tuple) else first
 
 
 def field_names(cls: type[Element]) -> tuple[str, ...]:
-    """The fields of a class that stand in a file: all but those of `ABOUT`."""
+    """Return the fields of a class with XML content: all except `ABOUT`."""
     known = _FIELD_NAMES.get(cls)
     if known is None:
         known = tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
@@ -150,7 +150,7 @@ def field_names(cls: type[Element]) -> tuple[str, ...]:
 
 
 def alternatives(cls: type[Element]) -> tuple[str, ...]:
-    """The fields among which an element of this class chooses."""
+    """Return the alternatives in the choice of a class."""
     model = cls.content_model
     if isinstance(model, Changed):
         model = model.after

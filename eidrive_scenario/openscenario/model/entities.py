@@ -1,4 +1,4 @@
-"""Who takes part in a scenario."""
+"""Entities of a scenario."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class EntityRef(Element):
-    """An entity, by its name."""
+    """Reference to an entity by its name."""
 
     entity_ref: EntityName
 
 
 @dataclass(frozen=True, kw_only=True)
 class ByType(Element):
-    """All entities of a type."""
+    """Selection of all entities of a type."""
 
     object_type: ObjectType
 
 
 @dataclass(frozen=True, kw_only=True)
 class ByObjectType(Element):
-    """Any entity of a type."""
+    """Reference to any entity of a type."""
 
     type: ObjectType
 
 
 @dataclass(frozen=True, kw_only=True)
 class SelectedEntities(Element, content=Choice(empty_until="1.2")):
-    """Entities by name or by type."""
+    """Members of a selection, by name or by type."""
 
     entity_ref: tuple[EntityRef, ...] = ()
     by_type: tuple[ByType, ...] = ()
@@ -51,7 +51,7 @@ class SelectedEntities(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class EntitySelection(Element):
-    """A named group of entities."""
+    """Named group of entities."""
 
     name: str
     members: SelectedEntities
@@ -59,14 +59,14 @@ class EntitySelection(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ExternalObjectReference(Element):
-    """An object that the road network or another tool defines."""
+    """Object that the road network or another tool defines."""
 
     name: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pedestrian(Element, content=ALL):
-    """A pedestrian, an animal or a wheelchair. Mass [kg]."""
+    """Pedestrian, animal or wheelchair. Mass [kg]."""
 
     mass: float
     name: str
@@ -81,7 +81,7 @@ class Pedestrian(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class MiscObject(Element, content=ALL):
-    """Anything else that stands or lies about. Mass [kg]."""
+    """Miscellaneous object. Mass [kg]."""
 
     mass: float
     misc_object_category: MiscObjectCategory
@@ -108,7 +108,7 @@ class ScenarioObject(
         "object_controller",
     ),
 ):
-    """A named participant and who controls it."""
+    """Named entity and its controllers."""
 
     name: str
     catalog_reference: CatalogReference | None = None
@@ -128,7 +128,7 @@ class ScenarioObjectTemplate(
         "object_controller",
     ),
 ):
-    """A participant without a name, from which traffic is made."""
+    """Unnamed entity template of background traffic."""
 
     catalog_reference: CatalogReference | None = None
     vehicle: Vehicle | None = None
@@ -140,7 +140,7 @@ class ScenarioObjectTemplate(
 
 @dataclass(frozen=True, kw_only=True)
 class Entities(Element):
-    """All participants."""
+    """All entities and selections."""
 
     scenario_object: tuple[ScenarioObject, ...] = ()
     entity_selection: tuple[EntitySelection, ...] = ()

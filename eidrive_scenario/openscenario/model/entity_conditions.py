@@ -22,7 +22,7 @@ from eidrive_scenario.openscenario.model.scalars import EntityName
 
 @dataclass(frozen=True, kw_only=True)
 class TriggeringEntities(Element):
-    """Whose state is looked at, and whether any or all of them have to fulfill the condition."""
+    """Triggering entities, and whether any or all of them must satisfy the condition."""
 
     triggering_entities_rule: TriggeringEntitiesRule
     entity_ref: tuple[EntityRef, ...]
@@ -30,14 +30,14 @@ class TriggeringEntities(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class EndOfRoadCondition(Element):
-    """Has been at the end of its road for a time [s]."""
+    """Condition: at the end of the road for a duration [s]."""
 
     duration: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class CollisionCondition(Element, content=Choice(empty_until="1.2")):
-    """Touches an entity, or any entity of a type."""
+    """Condition: collision with an entity, or with any entity of a type."""
 
     entity_ref: EntityRef | None = None
     by_type: ByObjectType | None = None
@@ -45,14 +45,14 @@ class CollisionCondition(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class OffroadCondition(Element):
-    """Has been off the road for a time [s]."""
+    """Condition: off the road for a duration [s]."""
 
     duration: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class TimeHeadwayCondition(Element):
-    """Time until it is where the other is now [s]."""
+    """Condition on the time headway to another entity [s]."""
 
     entity_ref: EntityName
     freespace: bool
@@ -66,7 +66,7 @@ class TimeHeadwayCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2")):
-    """What it would collide with."""
+    """Target of a time to collision."""
 
     position: Position | None = None
     entity_ref: EntityRef | None = None
@@ -74,7 +74,7 @@ class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2"))
 
 @dataclass(frozen=True, kw_only=True)
 class TimeToCollisionCondition(Element, content=ALL):
-    """Time until a collision at the present speeds [s]."""
+    """Condition on the time to collision at constant speeds [s]."""
 
     freespace: bool
     rule: Rule
@@ -88,7 +88,7 @@ class TimeToCollisionCondition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class AccelerationCondition(Element):
-    """Acceleration [m/s²]."""
+    """Condition on the acceleration [m/s²]."""
 
     rule: Rule
     value: float
@@ -97,14 +97,14 @@ class AccelerationCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class StandStillCondition(Element):
-    """Has stood still for a time [s]."""
+    """Condition: at standstill for a duration [s]."""
 
     duration: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedCondition(Element):
-    """Speed [m/s]."""
+    """Condition on the speed [m/s]."""
 
     rule: Rule
     value: float
@@ -113,7 +113,7 @@ class SpeedCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeSpeedCondition(Element):
-    """Speed relative to another's [m/s]."""
+    """Condition on the speed relative to another entity [m/s]."""
 
     entity_ref: EntityName
     rule: Rule
@@ -123,14 +123,14 @@ class RelativeSpeedCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TraveledDistanceCondition(Element):
-    """Distance traveled since the start of the run [m]."""
+    """Condition on the distance traveled since the start of the run [m]."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReachPositionCondition(Element, content=ALL):
-    """Within a tolerance [m] of a position."""
+    """Condition: position reached within a tolerance [m]."""
 
     tolerance: float
     position: Position
@@ -138,7 +138,7 @@ class ReachPositionCondition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class DistanceCondition(Element, content=ALL):
-    """Distance to a position [m]."""
+    """Condition on the distance to a position [m]."""
 
     freespace: bool
     rule: Rule
@@ -152,7 +152,7 @@ class DistanceCondition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeDistanceCondition(Element):
-    """Distance to another entity [m]."""
+    """Condition on the distance to another entity [m]."""
 
     entity_ref: EntityName
     freespace: bool
@@ -165,7 +165,7 @@ class RelativeDistanceCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeLaneRange(Element):
-    """Lanes counted from the entity's own; open where a limit is left out."""
+    """Range of lanes relative to the lane of the entity; an omitted limit is open."""
 
     from_: int | None = None
     to: int | None = None
@@ -173,7 +173,7 @@ class RelativeLaneRange(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeClearanceCondition(Element):
-    """Nobody is in the lanes and the stretch around [m]."""
+    """Condition: no entity in the lanes within the distances ahead and behind [m]."""
 
     opposite_lanes: bool
     free_space: bool
@@ -185,7 +185,7 @@ class RelativeClearanceCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class AngleCondition(Element):
-    """An angle, within a tolerance [rad]."""
+    """Condition on an angle, within a tolerance [rad]."""
 
     angle_type: AngleType
     angle: float
@@ -195,7 +195,7 @@ class AngleCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeAngleCondition(Element):
-    """An angle relative to another entity's, within a tolerance [rad]."""
+    """Condition on an angle relative to another entity, within a tolerance [rad]."""
 
     entity_ref: EntityName
     angle_type: AngleType
@@ -206,7 +206,7 @@ class RelativeAngleCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class EntityCondition(Element, content=Choice(empty_until="1.2")):
-    """One condition on an entity."""
+    """Choice of one condition on an entity."""
 
     end_of_road_condition: EndOfRoadCondition | None = None
     collision_condition: CollisionCondition | None = None
@@ -228,7 +228,7 @@ class EntityCondition(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class ByEntityCondition(Element, content=ALL):
-    """A condition on the state of entities."""
+    """Condition on the state of entities."""
 
     triggering_entities: TriggeringEntities
     entity_condition: EntityCondition

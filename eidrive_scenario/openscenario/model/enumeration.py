@@ -1,4 +1,4 @@
-"""The base of the standard's enumerations: members know in which versions they are there."""
+"""Base class of the enumerations of the standard, whose members have versions."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from eidrive_scenario.openscenario.model.element import Usage
 
 
 class Enumeration(Enum):
-    """An enumeration of the standard: the value is the word in the file."""
+    """Enumeration of the standard; the value is the literal in the file."""
 
     _value_: str
     usage: Usage
 
-    def __new__(cls, word: str, usage: Usage = Usage()) -> Enumeration:  # noqa: B008
+    def __new__(cls, literal: str, usage: Usage = Usage()) -> Enumeration:  # noqa: B008
         member = object.__new__(cls)
-        member._value_ = word
+        member._value_ = literal
         member.usage = usage
         return member
 
@@ -24,15 +24,15 @@ class Enumeration(Enum):
 
 
 def since(version: str) -> Usage:
-    """The word is there since this version."""
+    """Return the usage of a literal that exists since a version."""
     return Usage(since=version)
 
 
 def only(version: str) -> Usage:
-    """The word is there in this version only."""
+    """Return the usage of a literal that exists in one version only."""
     return Usage(since=version, until=version)
 
 
 def deprecated(version: str) -> Usage:
-    """The word is deprecated since this version."""
+    """Return the usage of a literal that is deprecated since a version."""
     return Usage(deprecated=version)

@@ -1,4 +1,4 @@
-"""The words of the standard, in every place where it lists them."""
+"""Enumerations of the standard."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from eidrive_scenario.openscenario.model.enumeration import Enumeration, depreca
 
 
 class AngleType(Enumeration):
-    """Which of the three angles."""
+    """Kind of angle: heading, pitch or roll."""
 
     HEADING = "heading"
     PITCH = "pitch"
@@ -14,7 +14,7 @@ class AngleType(Enumeration):
 
 
 class AutomaticGearType(Enumeration):
-    """Neutral, park, reverse, drive."""
+    """Lever position: neutral, park, reverse or drive."""
 
     N = "n"
     P = "p"
@@ -23,7 +23,7 @@ class AutomaticGearType(Enumeration):
 
 
 class CloudState(Enumeration):
-    """How cloudy the sky is (deprecated since 1.2)."""
+    """Cloud state (deprecated since 1.2)."""
 
     CLOUDY = "cloudy"
     FREE = "free"
@@ -33,7 +33,7 @@ class CloudState(Enumeration):
 
 
 class ColorType(Enumeration):
-    """A color by name."""
+    """Color by name."""
 
     OTHER = "other"
     RED = "red"
@@ -49,7 +49,7 @@ class ColorType(Enumeration):
 
 
 class ConditionEdge(Enumeration):
-    """Which change of a condition counts."""
+    """Edge of a condition that fulfills it."""
 
     FALLING = "falling"
     NONE = "none"
@@ -58,7 +58,7 @@ class ConditionEdge(Enumeration):
 
 
 class ControllerType(Enumeration):
-    """Which domains a controller is made for."""
+    """Domains that a controller supports."""
 
     LATERAL = "lateral"
     LONGITUDINAL = "longitudinal"
@@ -70,7 +70,7 @@ class ControllerType(Enumeration):
 
 
 class CoordinateSystem(Enumeration):
-    """In which frame a distance is measured."""
+    """Coordinate system in which a distance is measured."""
 
     ENTITY = "entity"
     LANE = "lane"
@@ -80,7 +80,7 @@ class CoordinateSystem(Enumeration):
 
 
 class DirectionalDimension(Enumeration):
-    """Along which axis of the entity."""
+    """Axis of the entity along which a quantity is measured."""
 
     LONGITUDINAL = "longitudinal"
     LATERAL = "lateral"
@@ -88,7 +88,7 @@ class DirectionalDimension(Enumeration):
 
 
 class DynamicsDimension(Enumeration):
-    """What the value of a transition means: distance [m], time [s] or rate."""
+    """Dimension of the value of a transition: distance [m], time [s] or rate."""
 
     DISTANCE = "distance"
     RATE = "rate"
@@ -96,7 +96,7 @@ class DynamicsDimension(Enumeration):
 
 
 class DynamicsShape(Enumeration):
-    """How a value goes over to its target."""
+    """Shape of the transition of a value to its target."""
 
     CUBIC = "cubic"
     LINEAR = "linear"
@@ -105,14 +105,14 @@ class DynamicsShape(Enumeration):
 
 
 class FollowingMode(Enumeration):
-    """Exactly, or as well as the vehicle can."""
+    """Mode of following: exactly, or within the limits of the vehicle."""
 
     FOLLOW = "follow"
     POSITION = "position"
 
 
 class FractionalCloudCover(Enumeration):
-    """How much of the sky is covered, in eighths."""
+    """Cloud cover in oktas (eighths of the sky)."""
 
     ZERO_OKTAS = "zeroOktas"
     ONE_OKTAS = "oneOktas"
@@ -127,7 +127,7 @@ class FractionalCloudCover(Enumeration):
 
 
 class LateralDisplacement(Enumeration):
-    """On which side of the other."""
+    """Lateral displacement relative to the reference entity."""
 
     ANY = "any"
     LEFT_TO_REFERENCED_ENTITY = "leftToReferencedEntity"
@@ -135,7 +135,7 @@ class LateralDisplacement(Enumeration):
 
 
 class LightMode(Enumeration):
-    """What a light does."""
+    """Mode of a light."""
 
     ON = "on"
     OFF = "off"
@@ -143,7 +143,7 @@ class LightMode(Enumeration):
 
 
 class LongitudinalDisplacement(Enumeration):
-    """In front of the other or behind it."""
+    """Longitudinal displacement relative to the reference entity."""
 
     ANY = "any"
     TRAILING_REFERENCED_ENTITY = "trailingReferencedEntity"
@@ -151,7 +151,7 @@ class LongitudinalDisplacement(Enumeration):
 
 
 class MiscObjectCategory(Enumeration):
-    """What kind of thing."""
+    """Category of a miscellaneous object."""
 
     BARRIER = "barrier"
     BUILDING = "building"
@@ -173,7 +173,7 @@ class MiscObjectCategory(Enumeration):
 
 
 class ObjectType(Enumeration):
-    """What kind of entity."""
+    """Type of an entity."""
 
     MISCELLANEOUS = "miscellaneous"
     PEDESTRIAN = "pedestrian"
@@ -196,7 +196,7 @@ class ParameterType(Enumeration):
 
 
 class PedestrianCategory(Enumeration):
-    """What kind of pedestrian."""
+    """Category of a pedestrian."""
 
     ANIMAL = "animal"
     PEDESTRIAN = "pedestrian"
@@ -204,7 +204,7 @@ class PedestrianCategory(Enumeration):
 
 
 class PedestrianGestureType(Enumeration):
-    """What a pedestrian does with its hands."""
+    """Gesture of a pedestrian."""
 
     PHONE_CALL_RIGHT_HAND = "phoneCallRightHand"
     PHONE_CALL_LEFT_HAND = "phoneCallLeftHand"
@@ -222,7 +222,7 @@ class PedestrianGestureType(Enumeration):
 
 
 class PedestrianMotionType(Enumeration):
-    """How a pedestrian moves."""
+    """Motion of a pedestrian."""
 
     STANDING = "standing"
     SITTING = "sitting"
@@ -239,7 +239,7 @@ class PedestrianMotionType(Enumeration):
 
 
 class PrecipitationType(Enumeration):
-    """What falls."""
+    """Type of precipitation."""
 
     DRY = "dry"
     RAIN = "rain"
@@ -247,7 +247,7 @@ class PrecipitationType(Enumeration):
 
 
 class Priority(Enumeration):
-    """What an event does to the other running events of its maneuver."""
+    """Effect of an event on the other running events of its maneuver."""
 
     OVERWRITE = "overwrite", deprecated("1.2")
     OVERRIDE = "override", since("1.2")
@@ -256,14 +256,14 @@ class Priority(Enumeration):
 
 
 class ReferenceContext(Enumeration):
-    """Absolute or relative."""
+    """Reference of a value: absolute or relative."""
 
     ABSOLUTE = "absolute"
     RELATIVE = "relative"
 
 
 class RelativeDistanceType(Enumeration):
-    """Along which direction a distance is measured."""
+    """Direction along which a distance is measured."""
 
     LATERAL = "lateral"
     LONGITUDINAL = "longitudinal"
@@ -272,7 +272,7 @@ class RelativeDistanceType(Enumeration):
 
 
 class Role(Enumeration):
-    """What a vehicle or a pedestrian is for."""
+    """Role of a vehicle or a pedestrian."""
 
     NONE = "none"
     AMBULANCE = "ambulance"
@@ -285,7 +285,7 @@ class Role(Enumeration):
 
 
 class RouteStrategy(Enumeration):
-    """How the way to a waypoint is chosen."""
+    """Strategy of the routing to a waypoint."""
 
     FASTEST = "fastest"
     LEAST_INTERSECTIONS = "leastIntersections"
@@ -294,7 +294,7 @@ class RouteStrategy(Enumeration):
 
 
 class RoutingAlgorithm(Enumeration):
-    """How the way is chosen along which a distance is measured."""
+    """Strategy of the routing along which a distance is measured."""
 
     ASSIGNED_ROUTE = "assignedRoute"
     FASTEST = "fastest"
@@ -304,7 +304,7 @@ class RoutingAlgorithm(Enumeration):
 
 
 class Rule(Enumeration):
-    """How two values are compared."""
+    """Comparison of two values."""
 
     EQUAL_TO = "equalTo"
     GREATER_THAN = "greaterThan"
@@ -315,7 +315,7 @@ class Rule(Enumeration):
 
 
 class SensorCategory(Enumeration):
-    """What kind of sensor (1.2)."""
+    """Type of a sensor (1.2)."""
 
     CAMERA = "camera"
     LIDAR = "lidar"
@@ -331,7 +331,7 @@ class SpeedTargetValueType(Enumeration):
 
 
 class StoryboardElementState(Enumeration):
-    """A state of a storyboard element, or a transition."""
+    """State or transition of a storyboard element."""
 
     COMPLETE_STATE = "completeState"
     END_TRANSITION = "endTransition"
@@ -343,7 +343,7 @@ class StoryboardElementState(Enumeration):
 
 
 class StoryboardElementType(Enumeration):
-    """A level of the storyboard."""
+    """Level of the storyboard."""
 
     ACT = "act"
     ACTION = "action"
@@ -354,14 +354,14 @@ class StoryboardElementType(Enumeration):
 
 
 class TriggeringEntitiesRule(Enumeration):
-    """Whether all or any of the entities have to fulfill a condition."""
+    """Quantifier of triggering entities: all or any must satisfy the condition."""
 
     ALL = "all"
     ANY = "any"
 
 
 class VehicleCategory(Enumeration):
-    """What kind of vehicle."""
+    """Category of a vehicle."""
 
     BICYCLE = "bicycle"
     BUS = "bus"
@@ -376,7 +376,7 @@ class VehicleCategory(Enumeration):
 
 
 class VehicleComponentType(Enumeration):
-    """A part of a vehicle that moves."""
+    """Moving part of a vehicle."""
 
     HOOD = "hood"
     TRUNK = "trunk"
@@ -394,7 +394,7 @@ class VehicleComponentType(Enumeration):
 
 
 class VehicleLightType(Enumeration):
-    """Which light of a vehicle."""
+    """Light of a vehicle."""
 
     DAYTIME_RUNNING_LIGHTS = "daytimeRunningLights"
     LOW_BEAM = "lowBeam"
@@ -412,7 +412,7 @@ class VehicleLightType(Enumeration):
 
 
 class Wetness(Enumeration):
-    """How wet the road is."""
+    """Wetness of the road."""
 
     DRY = "dry"
     MOIST = "moist"

@@ -1,4 +1,4 @@
-"""Weather, time of day and the road's state."""
+"""Weather, time of day and road condition."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from eidrive_scenario.openscenario.model.properties import File, Properties
 
 @dataclass(frozen=True, kw_only=True)
 class TimeOfDay(Element):
-    """Date and time, and whether it runs on."""
+    """Date and time, and whether the time advances."""
 
     animation: bool
     date_time: datetime
@@ -29,7 +29,7 @@ class TimeOfDay(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Sun(Element):
-    """Azimuth and elevation [rad], illuminance [lx]."""
+    """Sun with azimuth and elevation [rad] and illuminance [lx]."""
 
     azimuth: float
     elevation: float
@@ -39,7 +39,7 @@ class Sun(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Fog(Element, content=ALL):
-    """How far one sees [m], and where."""
+    """Fog with visual range [m], optionally in a bounding box."""
 
     visual_range: float
     bounding_box: BoundingBox | None = None
@@ -47,7 +47,7 @@ class Fog(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class Precipitation(Element):
-    """Rain or snow [mm/h]."""
+    """Precipitation intensity [mm/h]."""
 
     precipitation_type: PrecipitationType
     intensity: float | None = attribute(deprecated="1.1", required_until="1.0")
@@ -56,7 +56,7 @@ class Precipitation(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Wind(Element):
-    """Where the wind blows to [rad], and its speed [m/s]."""
+    """Wind with direction of flow [rad] and speed [m/s]."""
 
     direction: float
     speed: float
@@ -64,7 +64,7 @@ class Wind(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class DomeImage(Element):
-    """A picture of the sky; azimuth offset [rad]."""
+    """Image of the sky; azimuth offset [rad]."""
 
     azimuth_offset: float | None = None
     dome_file: File
@@ -72,7 +72,7 @@ class DomeImage(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Weather(Element, content=ALL):
-    """Clouds, sun, fog, precipitation, wind; pressure [Pa], temperature [K]."""
+    """Weather; pressure [Pa], temperature [K]."""
 
     cloud_state: CloudState | None = attribute(deprecated="1.2", required_until="1.0")
     atmospheric_pressure: float | None = attribute(since="1.1")
@@ -87,7 +87,7 @@ class Weather(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class RoadCondition(Element):
-    """How slippery the road is, relative to the reference friction."""
+    """Friction of the road relative to the reference friction."""
 
     friction_scale_factor: float
     wetness: Wetness | None = attribute(since="1.2")
@@ -96,7 +96,7 @@ class RoadCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Environment(Element, content=ALL):
-    """Time of day, weather and road."""
+    """Time of day, weather and road condition."""
 
     name: str
     parameter_declarations: ParameterDeclarations | None = None
@@ -107,7 +107,7 @@ class Environment(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class EnvironmentAction(Element, content=Choice(empty_until="1.2")):
-    """Sets the environment."""
+    """Action that sets the environment."""
 
     environment: Environment | None = None
     catalog_reference: CatalogReference | None = None

@@ -1,4 +1,4 @@
-"""Actions of the scenario as a whole."""
+"""Global and user-defined actions."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from eidrive_scenario.openscenario.model.traffic import TrafficAction
 
 @dataclass(frozen=True, kw_only=True)
 class AddEntityAction(Element, content=ALL):
-    """Brings an entity in at a position."""
+    """Addition of an entity at a position."""
 
     position: Position
 
 
 @dataclass(frozen=True, kw_only=True)
 class DeleteEntityAction(Element):
-    """Takes an entity away."""
+    """Removal of an entity."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EntityAction(Element, content=Choice(empty_until="1.2")):
-    """Brings an entity in or takes it away."""
+    """Action that adds or removes an entity."""
 
     entity_ref: EntityName
     add_entity_action: AddEntityAction | None = None
@@ -37,28 +37,28 @@ class EntityAction(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterSetAction(Element):
-    """Sets a parameter (deprecated since 1.2: use a variable)."""
+    """Assignment to a parameter (deprecated since 1.2: use a variable)."""
 
     value: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterAddValueRule(Element):
-    """Adds to a parameter."""
+    """Addition to a parameter."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterMultiplyByValueRule(Element):
-    """Multiplies a parameter."""
+    """Multiplication of a parameter."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModifyRule(Element, content=Choice(empty_until="1.2")):
-    """How a parameter is modified."""
+    """Rule for the modification of a parameter."""
 
     add_value: ParameterAddValueRule | None = None
     multiply_by_value: ParameterMultiplyByValueRule | None = None
@@ -66,14 +66,14 @@ class ModifyRule(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterModifyAction(Element, content=ALL):
-    """Modifies a parameter (deprecated since 1.2: use a variable)."""
+    """Modification of a parameter (deprecated since 1.2: use a variable)."""
 
     rule: ModifyRule
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterAction(Element, content=Choice(empty_until="1.2")):
-    """Sets or modifies a parameter (deprecated since 1.2: use a variable)."""
+    """Action that sets or modifies a parameter (deprecated since 1.2: use a variable)."""
 
     parameter_ref: ParameterName
     set_action: ParameterSetAction | None = child(deprecated="1.2")
@@ -82,28 +82,28 @@ class ParameterAction(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableSetAction(Element):
-    """Sets a variable."""
+    """Assignment to a variable."""
 
     value: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class VariableAddValueRule(Element):
-    """Adds to a variable."""
+    """Addition to a variable."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class VariableMultiplyByValueRule(Element):
-    """Multiplies a variable."""
+    """Multiplication of a variable."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class VariableModifyRule(Element, content=Choice(empty_until="1.2")):
-    """How a variable is modified."""
+    """Rule for the modification of a variable."""
 
     add_value: VariableAddValueRule | None = None
     multiply_by_value: VariableMultiplyByValueRule | None = None
@@ -111,14 +111,14 @@ class VariableModifyRule(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableModifyAction(Element, content=ALL):
-    """Modifies a variable."""
+    """Modification of a variable."""
 
     rule: VariableModifyRule
 
 
 @dataclass(frozen=True, kw_only=True)
 class VariableAction(Element, content=Choice(empty_until="1.2")):
-    """Sets or modifies a variable."""
+    """Action that sets or modifies a variable."""
 
     variable_ref: VariableName
     set_action: VariableSetAction | None = None
@@ -127,7 +127,7 @@ class VariableAction(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class SetMonitorAction(Element):
-    """Sets a monitor."""
+    """Action that sets a monitor."""
 
     monitor_ref: MonitorName
     value: bool
@@ -135,7 +135,7 @@ class SetMonitorAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class GlobalAction(Element, content=Choice(empty_until="1.2")):
-    """What concerns no single entity."""
+    """Action that does not apply to a single entity."""
 
     environment_action: EnvironmentAction | None = None
     entity_action: EntityAction | None = None
@@ -148,7 +148,7 @@ class GlobalAction(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class CustomCommandAction(Element):
-    """A command to the engine; its type says in which language."""
+    """Command to the engine; its type specifies the language."""
 
     type: str
     content: str = text()
@@ -157,6 +157,6 @@ class CustomCommandAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class UserDefinedAction(Element):
-    """What the standard has no word for."""
+    """Action that the standard does not define."""
 
     custom_command_action: CustomCommandAction

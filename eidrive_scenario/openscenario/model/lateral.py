@@ -1,4 +1,4 @@
-"""Lateral actions: lanes, offsets and distance across the way."""
+"""Lateral actions: lanes, lane offsets and lateral distance."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from eidrive_scenario.openscenario.model.scalars import EntityName
 
 @dataclass(frozen=True, kw_only=True)
 class AbsoluteTargetLane(Element):
-    """A lane by its id."""
+    """Target lane by its id."""
 
     value: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeTargetLane(Element):
-    """A lane counted from an entity's lane."""
+    """Target lane relative to the lane of an entity."""
 
     entity_ref: EntityName
     value: int
@@ -28,7 +28,7 @@ class RelativeTargetLane(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class LaneChangeTarget(Element, content=Choice(empty_until="1.2")):
-    """The lane that is aimed at."""
+    """Target of a lane change."""
 
     relative_target_lane: RelativeTargetLane | None = None
     absolute_target_lane: AbsoluteTargetLane | None = None
@@ -36,7 +36,7 @@ class LaneChangeTarget(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class LaneChangeAction(Element, content=ALL):
-    """Moves an entity to another lane; offset from its center [m]."""
+    """Action that changes the lane; offset from the lane center [m]."""
 
     target_lane_offset: float | None = None
     lane_change_action_dynamics: TransitionDynamics
@@ -45,14 +45,14 @@ class LaneChangeAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class AbsoluteTargetLaneOffset(Element):
-    """An offset from the lane's center [m]."""
+    """Target offset from the lane center [m]."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeTargetLaneOffset(Element):
-    """An offset relative to an entity's [m]."""
+    """Target offset relative to an entity [m]."""
 
     entity_ref: EntityName
     value: float
@@ -60,7 +60,7 @@ class RelativeTargetLaneOffset(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class LaneOffsetTarget(Element, content=Choice(empty_until="1.2")):
-    """The offset that is aimed at."""
+    """Target of a lane offset."""
 
     relative_target_lane_offset: RelativeTargetLaneOffset | None = None
     absolute_target_lane_offset: AbsoluteTargetLaneOffset | None = None
@@ -68,7 +68,7 @@ class LaneOffsetTarget(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class LaneOffsetActionDynamics(Element):
-    """How the offset goes over; largest lateral acceleration [m/s²]."""
+    """Dynamics of a lane offset; maximum lateral acceleration [m/s²]."""
 
     dynamics_shape: DynamicsShape
     max_lateral_acc: float | None = None
@@ -76,7 +76,7 @@ class LaneOffsetActionDynamics(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class LaneOffsetAction(Element, content=ALL):
-    """Moves an entity sideways in its lane."""
+    """Action that changes the lateral offset in the lane."""
 
     continuous: bool
     lane_offset_action_dynamics: LaneOffsetActionDynamics
@@ -85,7 +85,7 @@ class LaneOffsetAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class LateralDistanceAction(Element, content=ALL):
-    """Keeps a lateral distance [m] to an entity."""
+    """Action that keeps a lateral distance to an entity [m]."""
 
     entity_ref: EntityName
     continuous: bool
@@ -98,7 +98,7 @@ class LateralDistanceAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class LateralAction(Element, content=Choice(empty_until="1.2")):
-    """What an entity does across its way."""
+    """Lateral action of an entity."""
 
     lane_change_action: LaneChangeAction | None = None
     lane_offset_action: LaneOffsetAction | None = None

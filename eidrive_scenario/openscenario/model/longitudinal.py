@@ -1,4 +1,4 @@
-"""Longitudinal actions: speed and distance along the way."""
+"""Longitudinal actions: speed and longitudinal distance."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from eidrive_scenario.openscenario.model.scalars import EntityName
 
 @dataclass(frozen=True, kw_only=True)
 class DynamicConstraints(Element):
-    """Limits: speed [m/s], acceleration and deceleration [m/s²], their rates [m/s³]."""
+    """Limits of speed [m/s], acceleration and deceleration [m/s²] and their rates [m/s³]."""
 
     max_acceleration: float | None = None
     max_deceleration: float | None = None
@@ -31,7 +31,7 @@ class DynamicConstraints(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TransitionDynamics(Element):
-    """How a value goes over to its target: shape, and in time [s], distance [m] or at a rate."""
+    """Dynamics of a transition: shape, and time [s], distance [m] or rate."""
 
     dynamics_dimension: DynamicsDimension
     dynamics_shape: DynamicsShape
@@ -41,14 +41,14 @@ class TransitionDynamics(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class AbsoluteTargetSpeed(Element):
-    """A speed [m/s]."""
+    """Target speed [m/s]."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeTargetSpeed(Element):
-    """A speed relative to an entity: a difference [m/s] or a factor."""
+    """Target speed relative to an entity: difference [m/s] or factor."""
 
     entity_ref: EntityName
     continuous: bool
@@ -58,7 +58,7 @@ class RelativeTargetSpeed(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedActionTarget(Element, content=Choice(empty_until="1.2")):
-    """The speed that is aimed at."""
+    """Target of a speed action."""
 
     relative_target_speed: RelativeTargetSpeed | None = None
     absolute_target_speed: AbsoluteTargetSpeed | None = None
@@ -66,7 +66,7 @@ class SpeedActionTarget(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedAction(Element, content=ALL):
-    """Brings an entity to a speed."""
+    """Action that changes the speed of an entity."""
 
     speed_action_dynamics: TransitionDynamics
     speed_action_target: SpeedActionTarget
@@ -74,7 +74,7 @@ class SpeedAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedProfileEntry(Element):
-    """A speed [m/s] and the time that the way to it takes [s]."""
+    """Speed [m/s] and duration of the transition to it [s]."""
 
     speed: float
     time: float | None = None
@@ -82,7 +82,7 @@ class SpeedProfileEntry(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedProfileAction(Element):
-    """A series of speeds."""
+    """Action with a series of speeds."""
 
     following_mode: FollowingMode
     entity_ref: EntityName | None = attribute(since="1.3")
@@ -93,7 +93,7 @@ class SpeedProfileAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class LongitudinalDistanceAction(Element, content=ALL):
-    """Keeps a distance [m] or a time gap [s] to an entity."""
+    """Action that keeps a distance [m] or a time gap [s] to an entity."""
 
     entity_ref: EntityName
     continuous: bool
@@ -107,7 +107,7 @@ class LongitudinalDistanceAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class LongitudinalAction(Element, content=Choice(empty_until="1.2")):
-    """What an entity does along its way."""
+    """Longitudinal action of an entity."""
 
     speed_action: SpeedAction | None = None
     longitudinal_distance_action: LongitudinalDistanceAction | None = None

@@ -1,4 +1,4 @@
-"""Positions in all the frames of the standard."""
+"""Positions in all coordinate systems of the standard."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Orientation(Element):
-    """Heading, pitch and roll [rad], absolute or relative to what the position refers to."""
+    """Heading, pitch and roll [rad], absolute or relative to the reference of the position."""
 
     h: float | None = None
     p: float | None = None
@@ -27,7 +27,7 @@ class Orientation(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class WorldPosition(Element):
-    """A point [m] and an orientation [rad] in the world's frame."""
+    """Point [m] and orientation [rad] in the world frame."""
 
     x: float
     y: float
@@ -39,7 +39,7 @@ class WorldPosition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeWorldPosition(Element, content=ALL):
-    """A point offset from an entity along the world's axes [m]."""
+    """Point with an offset from an entity along the world axes [m]."""
 
     entity_ref: EntityName
     dx: float
@@ -50,7 +50,7 @@ class RelativeWorldPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeObjectPosition(Element, content=ALL):
-    """A point offset from an entity along the entity's axes [m]."""
+    """Point with an offset from an entity along its axes [m]."""
 
     entity_ref: EntityName
     dx: float
@@ -61,7 +61,7 @@ class RelativeObjectPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class RoadPosition(Element, content=ALL):
-    """A point in road coordinates [m]."""
+    """Point in road coordinates [m]."""
 
     road_id: str
     s: float
@@ -71,7 +71,7 @@ class RoadPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeRoadPosition(Element, content=ALL):
-    """A point offset from an entity in road coordinates [m]."""
+    """Point with an offset from an entity in road coordinates [m]."""
 
     entity_ref: EntityName
     ds: float
@@ -81,7 +81,7 @@ class RelativeRoadPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class LanePosition(Element, content=ALL):
-    """A point in a lane: s along the road, offset from the lane's center [m]."""
+    """Point in a lane: s along the road, offset from the lane center [m]."""
 
     lane_id: str
     road_id: str
@@ -92,7 +92,7 @@ class LanePosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeLanePosition(Element, content=ALL):
-    """A point some lanes off an entity; ds along the road, dsLane along the lane's center [m]."""
+    """Point relative to the lane of an entity; ds along the road, dsLane along the lane center [m]."""
 
     entity_ref: EntityName
     d_lane: int
@@ -104,14 +104,14 @@ class RelativeLanePosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class PositionOfCurrentEntity(Element):
-    """Where an entity is on the route."""
+    """Point on the route at the current position of an entity."""
 
     entity_ref: EntityName
 
 
 @dataclass(frozen=True, kw_only=True)
 class PositionInRoadCoordinates(Element):
-    """A point on the route: distance along it and lateral offset [m]."""
+    """Point on the route: distance along it and lateral offset [m]."""
 
     path_s: float
     t: float
@@ -119,7 +119,7 @@ class PositionInRoadCoordinates(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class PositionInLaneCoordinates(Element):
-    """A point on the route: distance along it, lane, offset from the lane's center [m]."""
+    """Point on the route: distance along it, lane, offset from the lane center [m]."""
 
     lane_id: str
     path_s: float
@@ -128,7 +128,7 @@ class PositionInLaneCoordinates(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class InRoutePosition(Element, content=Choice(empty_until="1.2")):
-    """How a point on a route is given."""
+    """Choice of coordinates of a point on a route."""
 
     from_current_entity: PositionOfCurrentEntity | None = None
     from_road_coordinates: PositionInRoadCoordinates | None = None
@@ -137,7 +137,7 @@ class InRoutePosition(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class RouteRef(Element, content=Choice(empty_until="1.2")):
-    """A route, in place or from a catalog."""
+    """Route, defined in place or in a catalog."""
 
     route: Route | None = None
     catalog_reference: CatalogReference | None = None
@@ -145,7 +145,7 @@ class RouteRef(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class RoutePosition(Element, content=ALL):
-    """A point on a route."""
+    """Point on a route."""
 
     route_ref: RouteRef
     orientation: Orientation | None = None
@@ -154,7 +154,7 @@ class RoutePosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class TrajectoryRef(Element, content=CHOICE):
-    """A trajectory, in place or from a catalog."""
+    """Trajectory, defined in place or in a catalog."""
 
     trajectory: Trajectory | None = None
     catalog_reference: CatalogReference | None = None
@@ -162,7 +162,7 @@ class TrajectoryRef(Element, content=CHOICE):
 
 @dataclass(frozen=True, kw_only=True)
 class TrajectoryPosition(Element, content=ALL):
-    """A point along a trajectory: s along it, t to its left [m]."""
+    """Point relative to a trajectory: s along it, t to its left [m]."""
 
     s: float
     t: float | None = None
@@ -172,7 +172,7 @@ class TrajectoryPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class GeoPosition(Element, content=ALL):
-    """A point on the globe: degrees and meters; the older attributes are in radians."""
+    """Geodetic point in degrees and meters; the older attributes are in radians."""
 
     latitude: float | None = attribute(deprecated="1.2", required_until="1.1")
     longitude: float | None = attribute(deprecated="1.2", required_until="1.1")
@@ -186,7 +186,7 @@ class GeoPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class Position(Element, content=Choice(empty_until="1.2")):
-    """A position in one of the frames."""
+    """Position in one of the coordinate systems."""
 
     world_position: WorldPosition | None = None
     relative_world_position: RelativeWorldPosition | None = None

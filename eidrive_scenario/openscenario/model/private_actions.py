@@ -1,4 +1,4 @@
-"""Actions of one entity."""
+"""Private actions: actions of one entity."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from eidrive_scenario.openscenario.model.sensors import SensorReferenceSet
 
 @dataclass(frozen=True, kw_only=True)
 class VisibilityAction(Element):
-    """Says who sees an entity: the picture, the traffic, the sensors."""
+    """Action that sets the visibility of an entity in graphics, for traffic and for sensors."""
 
     graphics: bool
     sensors: bool
@@ -29,7 +29,7 @@ class VisibilityAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class AbsoluteSpeed(Element, content=Choice(minimum=0)):
-    """A final speed [m/s]."""
+    """Final speed [m/s]."""
 
     value: float
     target_distance_steady_state: TargetDistanceSteadyState | None = child(since="1.1")
@@ -38,7 +38,7 @@ class AbsoluteSpeed(Element, content=Choice(minimum=0)):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeSpeedToMaster(Element, content=Choice(minimum=0)):
-    """A final speed relative to the master's: a difference [m/s] or a factor."""
+    """Final speed relative to the master: difference [m/s] or factor."""
 
     speed_target_value_type: SpeedTargetValueType
     value: float
@@ -48,21 +48,21 @@ class RelativeSpeedToMaster(Element, content=Choice(minimum=0)):
 
 @dataclass(frozen=True, kw_only=True)
 class TargetDistanceSteadyState(Element):
-    """The last stretch [m] is driven at the final speed."""
+    """Distance of the steady state at the final speed [m]."""
 
     distance: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class TargetTimeSteadyState(Element):
-    """The last seconds are driven at the final speed."""
+    """Duration of the steady state at the final speed [s]."""
 
     time: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class FinalSpeed(Element, content=Choice(empty_until="1.2")):
-    """The speed on arrival."""
+    """Final speed of a synchronization."""
 
     absolute_speed: AbsoluteSpeed | None = None
     relative_speed_to_master: RelativeSpeedToMaster | None = None
@@ -70,7 +70,7 @@ class FinalSpeed(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class SynchronizeAction(Element, content=ALL):
-    """Arrives at a position when the master arrives at its own; tolerances [m]."""
+    """Action that reaches a position at the arrival time of the master; tolerances [m]."""
 
     master_entity_ref: EntityName
     target_tolerance_master: float | None = attribute(since="1.1")
@@ -82,26 +82,26 @@ class SynchronizeAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class TeleportAction(Element):
-    """Puts an entity at a position."""
+    """Action that teleports an entity to a position."""
 
     position: Position
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConnectTrailerAction(Element):
-    """Couples a trailer."""
+    """Connection of a trailer."""
 
     trailer_ref: EntityName
 
 
 @dataclass(frozen=True, kw_only=True)
 class DisconnectTrailerAction(Element):
-    """Uncouples the trailer."""
+    """Disconnection of the trailer."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrailerAction(Element, content=CHOICE):
-    """Couples or uncouples a trailer."""
+    """Action that connects or disconnects a trailer."""
 
     connect_trailer_action: ConnectTrailerAction | None = None
     disconnect_trailer_action: DisconnectTrailerAction | None = None
@@ -109,7 +109,7 @@ class TrailerAction(Element, content=CHOICE):
 
 @dataclass(frozen=True, kw_only=True)
 class PrivateAction(Element, content=Choice(empty_until="1.2")):
-    """What one entity does."""
+    """Choice of one private action."""
 
     longitudinal_action: LongitudinalAction | None = None
     lateral_action: LateralAction | None = None

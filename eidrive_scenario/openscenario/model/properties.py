@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario.model.element import Element, children, text,
 
 @dataclass(frozen=True, kw_only=True)
 class Property(Element):
-    """One name and its value."""
+    """Name and value of a property."""
 
     name: str
     value: str
@@ -19,28 +19,28 @@ class Property(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class File(Element):
-    """A file, by its path."""
+    """File by its path."""
 
     filepath: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Directory(Element):
-    """A folder, by its path."""
+    """Folder by its path."""
 
     path: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class CustomContent(Element):
-    """Free text that a tool may understand."""
+    """Free text for specific tools."""
 
     content: str = text()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Properties(Element):
-    """What a tool may know about an object beyond the standard."""
+    """Properties of an object beyond the standard."""
 
     property: tuple[Property, ...] = ()
     file: tuple[File, ...] = ()

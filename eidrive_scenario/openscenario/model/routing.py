@@ -15,7 +15,7 @@ from eidrive_scenario.openscenario.model.scalars import UnsignedInt
 
 @dataclass(frozen=True, kw_only=True)
 class Waypoint(Element):
-    """A point of a route, and how the way to it is chosen."""
+    """Point of a route and the strategy of the routing to it."""
 
     route_strategy: RouteStrategy
     position: Position
@@ -23,7 +23,7 @@ class Waypoint(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Route(Element):
-    """Waypoints in their order."""
+    """Route as ordered waypoints."""
 
     closed: bool
     name: str
@@ -33,7 +33,7 @@ class Route(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Vertex(Element):
-    """A corner of a polyline; time [s]."""
+    """Vertex of a polyline; time [s]."""
 
     time: float | None = attribute(required_until="1.0")
     position: Position
@@ -41,14 +41,14 @@ class Vertex(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Polyline(Element):
-    """Straight lines from corner to corner."""
+    """Polyline between vertices."""
 
     vertex: tuple[Vertex, ...] = children(minimum=2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Clothoid(Element):
-    """A curve of linearly changing curvature [1/m]; length [m], times [s]."""
+    """Curve with linearly changing curvature [1/m]; length [m], times [s]."""
 
     curvature: float
     length: float
@@ -61,7 +61,7 @@ class Clothoid(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ClothoidSplineSegment(Element):
-    """A piece of a clothoid spline: curvatures [1/m], length [m], heading offset [rad], time [s]."""
+    """Segment of a clothoid spline: curvatures [1/m], length [m], heading offset [rad], time [s]."""
 
     curvature_start: float
     curvature_end: float
@@ -73,7 +73,7 @@ class ClothoidSplineSegment(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ClothoidSpline(Element):
-    """Clothoids, one after the other; end time [s]."""
+    """Sequence of clothoids; end time [s]."""
 
     time_end: float | None = None
     clothoid_spline_segment: tuple[ClothoidSplineSegment, ...]
@@ -81,7 +81,7 @@ class ClothoidSpline(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ControlPoint(Element):
-    """A control point of a NURBS; time [s]."""
+    """Control point of a NURBS; time [s]."""
 
     time: float | None = None
     weight: float | None = None
@@ -90,14 +90,14 @@ class ControlPoint(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Knot(Element):
-    """A value of the knot vector."""
+    """Value of the knot vector."""
 
     value: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class Nurbs(Element):
-    """A non-uniform rational B-spline."""
+    """Non-uniform rational B-spline."""
 
     order: UnsignedInt
     control_point: tuple[ControlPoint, ...] = children(minimum=2)
@@ -106,7 +106,7 @@ class Nurbs(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Shape(Element, content=Choice(empty_until="1.2")):
-    """The curve of a trajectory."""
+    """Choice of the shape of a trajectory."""
 
     polyline: Polyline | None = None
     clothoid: Clothoid | None = None
@@ -116,7 +116,7 @@ class Shape(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory(Element):
-    """A curve in space, with times where it says when."""
+    """Curve in space, optionally with times."""
 
     closed: bool
     name: str
@@ -126,12 +126,12 @@ class Trajectory(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class None_(Element):
-    """No timing: the trajectory gives the way only."""
+    """Time reference of a trajectory without timing."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Timing(Element):
-    """How a trajectory's times are read: scaled, shifted by an offset [s], absolute or relative."""
+    """Timing of a trajectory: absolute or relative, with scale and offset [s]."""
 
     domain_absolute_relative: ReferenceContext
     offset: float
@@ -140,7 +140,7 @@ class Timing(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TimeReference(Element, content=Choice(empty_until="1.2")):
-    """Whether a trajectory's times count."""
+    """Choice whether the times of a trajectory apply."""
 
     none: None_ | None = None
     timing: Timing | None = None
@@ -148,14 +148,14 @@ class TimeReference(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class TrajectoryFollowingMode(Element):
-    """Exactly on the curve, or as well as the vehicle can."""
+    """Mode of following: exactly, or within the limits of the vehicle."""
 
     following_mode: FollowingMode
 
 
 @dataclass(frozen=True, kw_only=True)
 class AssignRouteAction(Element, content=Choice(empty_until="1.2")):
-    """Gives an entity a route."""
+    """Action that assigns a route to an entity."""
 
     route: Route | None = None
     catalog_reference: CatalogReference | None = None
@@ -163,7 +163,7 @@ class AssignRouteAction(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class FollowTrajectoryAction(Element, content=ALL):
-    """Moves an entity along a trajectory; offset [m] where it begins."""
+    """Action that moves an entity along a trajectory; initial offset [m]."""
 
     initial_distance_offset: float | None = attribute(since="1.1")
     trajectory: Trajectory | None = child(deprecated="1.1")
@@ -175,19 +175,19 @@ class FollowTrajectoryAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class AcquirePositionAction(Element, content=ALL):
-    """Routes an entity to a position."""
+    """Action that routes an entity to a position."""
 
     position: Position
 
 
 @dataclass(frozen=True, kw_only=True)
 class RandomRouteAction(Element):
-    """Lets the engine choose the way."""
+    """Action that lets the engine choose the route."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoutingAction(Element, content=Choice(empty_until="1.2")):
-    """Says where an entity goes."""
+    """Routing action of an entity."""
 
     assign_route_action: AssignRouteAction | None = None
     follow_trajectory_action: FollowTrajectoryAction | None = None

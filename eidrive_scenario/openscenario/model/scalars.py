@@ -1,4 +1,4 @@
-"""Scalar types of the standard that Python has no word for, and names that point to something."""
+"""Scalar types of the standard that Python does not have, and types of references by name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 @dataclass(frozen=True)
 class Limits:
-    """The smallest and the largest value of an integer type."""
+    """Minimum and maximum value of an integer type."""
 
     lowest: int
     highest: int
@@ -16,7 +16,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class NameOf:
-    """What a name points to: entity, parameter, variable, monitor, signal controller, controller, element, sensor."""
+    """Kind of the referenced element: entity, parameter, variable, monitor, controller, sensor and others."""
 
     kind: str
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor(Element):
-    """A sensor and its field of view [rad]."""
+    """Sensor and its field of view [rad]."""
 
     sensor_category: SensorCategory
     name: str
@@ -29,7 +29,7 @@ class Sensor(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class SensorAttachment(Element):
-    """Where on the vehicle a sensor sits."""
+    """Mounting position of a sensor on the vehicle."""
 
     sensor_ref: SensorName
     mounting_position: RelativeObjectPosition
@@ -37,20 +37,20 @@ class SensorAttachment(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class SensorAttachments(Element):
-    """The sensors of a vehicle."""
+    """Sensors of a vehicle."""
 
     sensor_attachment: tuple[SensorAttachment, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorReference(Element):
-    """A sensor, by its name."""
+    """Reference to a sensor by its name."""
 
     name: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorReferenceSet(Element):
-    """Sensors, by their names."""
+    """References to sensors by their names."""
 
     sensor_reference: tuple[SensorReference, ...]

@@ -11,7 +11,7 @@ from eidrive_scenario.openscenario.model.scalars import SignalControllerName
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalState(Element):
-    """The state of one signal."""
+    """State of one signal."""
 
     state: str
     traffic_signal_id: str
@@ -19,14 +19,14 @@ class TrafficSignalState(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalGroupState(Element):
-    """The state of all signals of a controller."""
+    """State of all signals of a controller."""
 
     state: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Phase(Element):
-    """A phase of a controller; duration [s]."""
+    """Phase of a controller; duration [s]."""
 
     duration: float
     name: str
@@ -37,7 +37,7 @@ class Phase(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalController(Element):
-    """Signals that switch together; delay [s] after the controller it refers to."""
+    """Controller of signals; delay after the referenced controller [s]."""
 
     name: str
     delay: float | None = None
@@ -47,14 +47,14 @@ class TrafficSignalController(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignals(Element):
-    """The signal controllers of a scenario."""
+    """Signal controllers of a scenario."""
 
     traffic_signal_controller: tuple[TrafficSignalController, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalStateAction(Element):
-    """Sets a signal."""
+    """Action that sets the state of a signal."""
 
     name: str
     state: str
@@ -62,7 +62,7 @@ class TrafficSignalStateAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalControllerAction(Element):
-    """Sets the phase of a controller."""
+    """Action that sets the phase of a controller."""
 
     traffic_signal_controller_ref: SignalControllerName
     phase: str
@@ -70,7 +70,7 @@ class TrafficSignalControllerAction(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalAction(Element, content=Choice(empty_until="1.2")):
-    """Sets a signal or a controller."""
+    """Action that sets a signal or a controller."""
 
     traffic_signal_controller_action: TrafficSignalControllerAction | None = None
     traffic_signal_state_action: TrafficSignalStateAction | None = None
@@ -78,14 +78,14 @@ class TrafficSignalAction(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class InfrastructureAction(Element, content=ALL):
-    """What the infrastructure does."""
+    """Action of the infrastructure."""
 
     traffic_signal_action: TrafficSignalAction
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalCondition(Element):
-    """A signal shows a state."""
+    """Condition on the state of a signal."""
 
     name: str
     state: str
@@ -93,7 +93,7 @@ class TrafficSignalCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSignalControllerCondition(Element):
-    """A controller is in a phase."""
+    """Condition on the phase of a controller."""
 
     traffic_signal_controller_ref: SignalControllerName
     phase: str

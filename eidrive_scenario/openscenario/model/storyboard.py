@@ -1,4 +1,4 @@
-"""The storyboard: what happens when."""
+"""Storyboard with stories, acts, maneuver groups, maneuvers, events and actions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario.model.triggers import Trigger
 
 @dataclass(frozen=True, kw_only=True)
 class Action(Element, content=Choice(empty_until="1.2")):
-    """One thing that happens."""
+    """Named action of an event."""
 
     name: str
     global_action: GlobalAction | None = None
@@ -28,7 +28,7 @@ class Action(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class Event(Element):
-    """Actions that start together."""
+    """Actions with a common start trigger."""
 
     name: str
     priority: Priority
@@ -39,7 +39,7 @@ class Event(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Maneuver(Element):
-    """Events that belong together."""
+    """Group of events."""
 
     name: str
     parameter_declarations: ParameterDeclarations | None = None
@@ -48,7 +48,7 @@ class Maneuver(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Actors(Element):
-    """Who acts."""
+    """Actors of a maneuver group."""
 
     select_triggering_entities: bool
     entity_ref: tuple[EntityRef, ...] = ()
@@ -56,7 +56,7 @@ class Actors(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ManeuverGroup(Element):
-    """Maneuvers and who acts in them."""
+    """Maneuvers and their actors."""
 
     maximum_execution_count: UnsignedInt
     name: str
@@ -67,7 +67,7 @@ class ManeuverGroup(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Act(Element):
-    """A part of a story."""
+    """Part of a story with start and stop triggers."""
 
     name: str
     maneuver_group: tuple[ManeuverGroup, ...]
@@ -77,7 +77,7 @@ class Act(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Story(Element):
-    """Acts that belong together."""
+    """Group of acts."""
 
     name: str
     parameter_declarations: ParameterDeclarations | None = None
@@ -86,7 +86,7 @@ class Story(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Private(Element):
-    """What one entity does before the run starts."""
+    """Initial actions of one entity."""
 
     entity_ref: EntityName
     private_action: tuple[PrivateAction, ...]
@@ -94,7 +94,7 @@ class Private(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class InitActions(Element):
-    """What happens before the run starts."""
+    """Actions before the start of the run."""
 
     global_action: tuple[GlobalAction, ...] = ()
     user_defined_action: tuple[UserDefinedAction, ...] = ()
@@ -103,14 +103,14 @@ class InitActions(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Init(Element):
-    """The state at the start."""
+    """Initialization of the storyboard."""
 
     actions: InitActions
 
 
 @dataclass(frozen=True, kw_only=True)
 class Storyboard(Element):
-    """Initial state, stories, and when the run ends."""
+    """Initialization, stories, and stop trigger of the run."""
 
     init: Init
     story: tuple[Story, ...] = children(required_until="1.1")

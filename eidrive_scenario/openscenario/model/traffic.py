@@ -1,4 +1,4 @@
-"""Background traffic: who it is made of, where it comes and goes."""
+"""Background traffic: composition, sources, sinks, swarms and areas."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CentralSwarmObject(Element):
-    """The entity that a swarm surrounds."""
+    """Central entity of a swarm."""
 
     entity_ref: EntityName
 
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleCategoryDistributionEntry(Element):
-    """A category of vehicles and its share."""
+    """Category of vehicles and its share."""
 
     category: VehicleCategory
     weight: float
@@ -35,14 +35,14 @@ class VehicleCategoryDistributionEntry(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleCategoryDistribution(Element):
-    """Which categories of vehicles, by shares."""
+    """Categories of vehicles, by shares."""
 
     vehicle_category_distribution_entry: tuple[VehicleCategoryDistributionEntry, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleRoleDistributionEntry(Element):
-    """A role of vehicles and its share."""
+    """Role of vehicles and its share."""
 
     role: Role
     weight: float
@@ -50,14 +50,14 @@ class VehicleRoleDistributionEntry(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleRoleDistribution(Element):
-    """Which roles of vehicles, by shares."""
+    """Roles of vehicles, by shares."""
 
     vehicle_role_distribution_entry: tuple[VehicleRoleDistributionEntry, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficDefinition(Element, content=ALL):
-    """What traffic is made of (before 1.3)."""
+    """Composition of traffic (before 1.3)."""
 
     name: str
     vehicle_category_distribution: VehicleCategoryDistribution
@@ -67,7 +67,7 @@ class TrafficDefinition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class EntityDistributionEntry(Element):
-    """A participant and its share."""
+    """Entity template and its share."""
 
     weight: float
     scenario_object_template: ScenarioObjectTemplate
@@ -75,14 +75,14 @@ class EntityDistributionEntry(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class EntityDistribution(Element):
-    """Which participants, by shares."""
+    """Entity templates, by shares."""
 
     entity_distribution_entry: tuple[EntityDistributionEntry, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficDistributionEntry(Element):
-    """A kind of traffic and its share."""
+    """Kind of traffic and its share."""
 
     weight: float
     entity_distribution: EntityDistribution
@@ -91,7 +91,7 @@ class TrafficDistributionEntry(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficDistribution(Element):
-    """What traffic is made of, by shares."""
+    """Composition of traffic, by shares."""
 
     traffic_distribution_entry: tuple[TrafficDistributionEntry, ...]
 
@@ -116,7 +116,7 @@ class DirectionOfTravelDistribution(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSourceAction(Element, content=ALL):
-    """Makes traffic at a position: radius [m], rate [1/s], speed [m/s]."""
+    """Source of traffic at a position: radius [m], rate [1/s], speed [m/s]."""
 
     radius: float
     rate: float
@@ -129,7 +129,7 @@ class TrafficSourceAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSinkAction(Element, content=ALL):
-    """Takes traffic away at a position: radius [m], rate [1/s]."""
+    """Sink of traffic at a position: radius [m], rate [1/s]."""
 
     radius: float
     rate: float | None = None
@@ -139,7 +139,7 @@ class TrafficSinkAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficSwarmAction(Element, content=ALL):
-    """Keeps a swarm around an entity, between two ellipses [m]."""
+    """Swarm of traffic around an entity, between two ellipses [m]."""
 
     inner_radius: float
     number_of_vehicles: UnsignedInt
@@ -158,14 +158,14 @@ class TrafficSwarmAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class Lane(Element):
-    """A lane by its id."""
+    """Lane by its id."""
 
     id: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoadCursor(Element):
-    """A place on a road [m], and which lanes there."""
+    """Position along a road [m], and the lanes there."""
 
     road_id: str
     s: float | None = None
@@ -174,7 +174,7 @@ class RoadCursor(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class RoadRange(Element):
-    """A stretch of road from cursor to cursor; length [m]."""
+    """Road section between cursors; length [m]."""
 
     length: float | None = None
     road_cursor: tuple[RoadCursor, ...] = children(minimum=2)
@@ -182,14 +182,14 @@ class RoadRange(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Polygon(Element):
-    """An area by its corners."""
+    """Area by the corners of a polygon."""
 
     position: tuple[Position, ...] = children(minimum=3)
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficArea(Element, content=CHOICE):
-    """Where traffic is kept."""
+    """Area of traffic."""
 
     polygon: Polygon | None = None
     road_range: tuple[RoadRange, ...] = ()
@@ -197,7 +197,7 @@ class TrafficArea(Element, content=CHOICE):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficAreaAction(Element, content=ALL):
-    """Keeps a number of participants in an area."""
+    """Action that keeps a number of entities in an area."""
 
     number_of_entities: UnsignedInt
     continuous: bool
@@ -207,12 +207,12 @@ class TrafficAreaAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficStopAction(Element):
-    """Ends the traffic of that name."""
+    """Stop of the traffic of a name."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrafficAction(Element, content=Choice(empty_until="1.2")):
-    """Starts or ends background traffic."""
+    """Action that starts or stops background traffic."""
 
     traffic_name: str | None = attribute(since="1.1")
     traffic_source_action: TrafficSourceAction | None = None

@@ -1,4 +1,4 @@
-"""Triggers: conditions joined by and within a group, by or between groups."""
+"""Triggers: conditions are combined by AND within a group, and groups by OR."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eidrive_scenario.openscenario.model.value_conditions import ByValueConditio
 
 @dataclass(frozen=True, kw_only=True)
 class Condition(Element, content=Choice(empty_until="1.2")):
-    """A condition, its edge, and how long ago it has to have held [s]."""
+    """Condition with its edge and delay [s]."""
 
     condition_edge: ConditionEdge
     delay: float
@@ -24,13 +24,13 @@ class Condition(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class ConditionGroup(Element):
-    """Conditions that have to hold together."""
+    """Conditions that must hold at the same time."""
 
     condition: tuple[Condition, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trigger(Element):
-    """Fires when one of its groups holds; one without groups never fires."""
+    """Trigger, which is fulfilled if one of its groups holds; without groups it never is."""
 
     condition_group: tuple[ConditionGroup, ...] = ()

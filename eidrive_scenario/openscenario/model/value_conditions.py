@@ -14,7 +14,7 @@ from eidrive_scenario.openscenario.model.signals import TrafficSignalCondition, 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterCondition(Element):
-    """A parameter's value."""
+    """Condition on the value of a parameter."""
 
     parameter_ref: ParameterName
     rule: Rule
@@ -23,7 +23,7 @@ class ParameterCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableCondition(Element):
-    """A variable's value."""
+    """Condition on the value of a variable."""
 
     variable_ref: VariableName
     rule: Rule
@@ -32,7 +32,7 @@ class VariableCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TimeOfDayCondition(Element):
-    """The simulated date and time."""
+    """Condition on the simulated date and time."""
 
     date_time: datetime
     rule: Rule
@@ -40,7 +40,7 @@ class TimeOfDayCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationTimeCondition(Element):
-    """Time since the start of the run [s]."""
+    """Condition on the time since the start of the run [s]."""
 
     rule: Rule
     value: float
@@ -48,7 +48,7 @@ class SimulationTimeCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class StoryboardElementStateCondition(Element):
-    """An element of the storyboard is in a state, or passes through a transition."""
+    """Condition on a state or transition of a storyboard element."""
 
     storyboard_element_ref: StoryboardElementName
     state: StoryboardElementState
@@ -57,7 +57,7 @@ class StoryboardElementStateCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class UserDefinedValueCondition(Element):
-    """A value that comes from outside."""
+    """Condition on a value from outside the engine."""
 
     name: str
     rule: Rule
@@ -66,7 +66,7 @@ class UserDefinedValueCondition(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class ByValueCondition(Element, content=Choice(empty_until="1.2")):
-    """A condition on a value."""
+    """Choice of one condition on a value."""
 
     parameter_condition: ParameterCondition | None = None
     time_of_day_condition: TimeOfDayCondition | None = None

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Axle(Element):
-    """One axle: largest steering angle [rad], position, track width and wheel diameter [m]."""
+    """Axle: maximum steering angle [rad], position, track width and wheel diameter [m]."""
 
     max_steering: float
     position_x: float
@@ -30,7 +30,7 @@ class Axle(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Axles(Element):
-    """The axles of a vehicle."""
+    """Axles of a vehicle."""
 
     front_axle: Axle | None = child(required_until="1.2")
     rear_axle: Axle
@@ -50,7 +50,7 @@ class Performance(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrailerHitch(Element):
-    """Where a trailer is hitched, from the reference point [m]."""
+    """Position of the trailer hitch relative to the reference point [m]."""
 
     dx: float
     dz: float | None = None
@@ -58,7 +58,7 @@ class TrailerHitch(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class TrailerCoupler(Element):
-    """Where a trailer couples to what draws it, from the reference point [m]."""
+    """Position of the trailer coupler relative to the reference point [m]."""
 
     dx: float
     dz: float | None = None
@@ -66,7 +66,7 @@ class TrailerCoupler(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Trailer(Element, content=CHOICE):
-    """What a vehicle draws."""
+    """Trailer of a vehicle."""
 
     trailer: ScenarioObject | None = None
     trailer_ref: EntityRef | None = None
@@ -74,7 +74,7 @@ class Trailer(Element, content=CHOICE):
 
 @dataclass(frozen=True, kw_only=True)
 class Vehicle(Element, content=ALL):
-    """A vehicle: body, limits, axles. Mass [kg]."""
+    """Vehicle with bounding box, limits and axles. Mass [kg]."""
 
     name: str
     vehicle_category: VehicleCategory

@@ -1,4 +1,4 @@
-"""A whole file: its header, the version it is written for, and its root element."""
+"""Complete files: header, version of the standard and root element."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from eidrive_scenario.openscenario.values.scalars import Version
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
 ROOTS = ("OpenSCENARIO", "OpenScenario")
-"""The schema declares both spellings."""
+"""Names of the root element; the schema declares both spellings."""
 
 
 @dataclass(frozen=True)
 class ReadDocument:
-    """What a file holds, with the catalog references that are still to be resolved."""
+    """Content of a file, with catalog references that are not resolved yet."""
 
     root: OpenScenario
     version: Version
@@ -32,9 +32,9 @@ class ReadDocument:
 
 
 def read_document(source: Source) -> OpenScenario:
-    """The root element of a scenario, a catalog or a parameter value distribution, with its parameters put in.
+    """Return the root element of a scenario, catalog or parameter value distribution with substituted parameters.
 
-    Checks the file itself, not what it refers to. Raises ScenarioError with all findings as file:line.
+    The file itself is checked, not the files to which it refers. Raise ScenarioError with all errors of the file.
     """
     collector = DiagnosticCollector()
     read = read_root(open_document(source), collector)
@@ -46,7 +46,7 @@ def read_document(source: Source) -> OpenScenario:
 def read_root(
     document: Document, collector: DiagnosticCollector, assignments: Mapping[str, Assignment] | None = None
 ) -> ReadDocument | None:
-    """Reads a parsed file; None where it is not even recognizable as one of the versions known."""
+    """Read a parsed file; return None if its version is unknown."""
     version = version_of(document, collector)
     if version is None:
         return None
@@ -58,19 +58,19 @@ def read_root(
 
 
 def version_of(document: Document, collector: DiagnosticCollector, older: Version | None = None) -> Version | None:
-    """The version that the header names, if it is a known one; else that is a finding.
+    """Return the version in the header; report an error if it is unknown.
 
-    older  what a file of revMajor 0 is taken for, with a warning
+    older  version as which a file of revMajor 0 is read, with a warning
     """
     root = document.root
     if root.tag not in ROOTS:
         name = etree.QName(root)
         in_namespace = bool(name.namespace) and name.localname in ROOTS
         collector.error(
-            f"the root element is {root.tag}, not OpenSCENARIO",
-            f"take xmlns={name.namespace!r} out: the standard has no namespace"
+            f"the root element is {root.tag} (expected OpenSCENARIO)",
+            f"remove xmlns={name.namespace!r}: the standard has no namespace"
             if in_namespace
-            else "is this another kind of file?",
+            else "check the kind of the file",
             source=document.name,
             line=line_of(root),
         )
@@ -79,7 +79,7 @@ def version_of(document: Document, collector: DiagnosticCollector, older: Versio
     if header is None:
         collector.error(
             "OpenSCENARIO lacks the element FileHeader",
-            "its revMajor and revMinor say which version the file is written for",
+            "its revMajor and revMinor specify the version of the standard",
             source=document.name,
             line=line_of(root),
         )
@@ -94,15 +94,16 @@ def _revision(
     for name in ("revMajor", "revMinor"):
         text = header.get(name)
         if text is None or not (text.strip().isascii() and text.strip().isdigit()):
-            what = f"lacks the attribute {name!r}" if text is None else f"has the {name} {text!r}"
-            collector.error(f"FileHeader {what}", "1.3 is 1 and 3", source=document.name, line=line_of(header))
+            problem = f"lacks the attribute {name!r}" if text is None else f"has the {name} {text!r}"
+            hint = "version 1.3 is revMajor 1 and revMinor 3"
+            collector.error(f"FileHeader {problem}", hint, source=document.name, line=line_of(header))
             return None
         numbers.append(int(text.strip()[:9]))
     version = (numbers[0], numbers[1])
     if version in VERSIONS:
         return version
-    known = "known are " + ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
+    known = "known: " + ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
     report = collector.warning if older and version < older else collector.error
-    message = f"the file is written for OpenSCENARIO {version[0]}.{version[1]}"
+    message = f"FileHeader has the version {version[0]}.{version[1]}"
     report(message, known, source=document.name, line=line_of(header))
     return older if older and version < older else None

@@ -1,7 +1,7 @@
-"""Whether the children of an element stand in the order and number that its content model says.
+"""Match of the children of an element with the order and number in its content model.
 
-A content model becomes an automaton (Glushkov's construction: one state for each place of a name in the model), as
-XML Schema's rules make every model deterministic. Places tell what would have been right where the automaton is stuck.
+A content model is converted to an automaton by Glushkov's construction, with one state for each occurrence of a name;
+XML Schema requires that each model is deterministic. The states give the expected children if a match fails.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from itertools import pairwise
 
 @dataclass(frozen=True)
 class Leaf:
-    """A child by its name, between `minimum` and `maximum` times; None is without limit."""
+    """Child by its name, between `minimum` and `maximum` times; None for no limit."""
 
     name: str
     minimum: int
@@ -22,7 +22,7 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Group:
-    """Parts in order, or one of the parts; the whole may be left out, or repeated."""
+    """Sequence or choice of parts, optional or repeated as a whole."""
 
     parts: tuple[Leaf | Group, ...]
     exclusive: bool
@@ -32,32 +32,32 @@ class Group:
 
 @dataclass
 class Automaton:
-    """State 0 is before the first child; `steps` leads on by the next child's name."""
+    """Automaton with state 0 before the first child; `steps` maps the name of the next child to the next state."""
 
     steps: list[dict[str, int]] = field(default_factory=lambda: [{}])
     accepting: set[int] = field(default_factory=set)
 
     def after(self, state: int, name: str) -> int:
-        """The state after a child of that name: by the model, or else as if it stood where it may."""
+        """Return the state after a child of that name; for a misplaced child, the next state that it may reach."""
         entrances = {step[name] for step in self.steps if name in step}
         return self.steps[state].get(name, min((to for to in entrances if to > state), default=min(entrances)))
 
     def skipped(self, state: int, name: str) -> tuple[str, ...] | None:
-        """The fewest children that have to stand before a child of that name; None if none would let it stand."""
+        """Return the minimum children required before a child of that name; None if it is not allowed any more."""
         paths: dict[int, tuple[str, ...]] = {state: ()}
         queue = deque([state])
         while queue:
-            at = queue.popleft()
-            if name in self.steps[at]:
-                return paths[at]
-            for through, to in self.steps[at].items():
+            current = queue.popleft()
+            if name in self.steps[current]:
+                return paths[current]
+            for label, to in self.steps[current].items():
                 if to not in paths:
-                    paths[to] = (*paths[at], through)
+                    paths[to] = (*paths[current], label)
                     queue.append(to)
         return None
 
     def missing(self, state: int) -> list[tuple[str, ...]]:
-        """What has to follow at least: for each further child, the names of which one has to stand there."""
+        """Return the alternatives for each of the minimum children that must follow."""
         distance = self._distances()
         needed: list[tuple[str, ...]] = []
         while distance[state] > 0:
@@ -67,7 +67,7 @@ class Automaton:
         return needed
 
     def _distances(self) -> dict[int, int]:
-        """For each state, how many children it is away from an end."""
+        """Return the minimum number of children from each state to an accepting state."""
         into: dict[int, set[int]] = {}
         for state, step in enumerate(self.steps):
             for to in step.values():
@@ -85,7 +85,7 @@ class Automaton:
 
 @dataclass
 class _Piece:
-    """A part of the automaton: the states where it begins and ends, and whether it may be empty."""
+    """Part of the automaton: its first and last states, and whether it may be empty."""
 
     empty: bool
     first: list[int]
@@ -100,11 +100,11 @@ class _Builder:
     def piece(self, part: Leaf | Group) -> _Piece:
         if isinstance(part, Leaf):
             return self._leaf(part)
-        made = [self.piece(one) for one in part.parts]
-        whole = self._either(made) if part.exclusive else self._chain(made)
+        pieces = [self.piece(one) for one in part.parts]
+        group = self._alternatives(pieces) if part.exclusive else self._chain(pieces)
         if part.repeated:
-            self._link(whole.last, whole.first)
-        return _Piece(whole.empty or part.optional, whole.first, whole.last)
+            self._link(group.last, group.first)
+        return _Piece(group.empty or part.optional, group.first, group.last)
 
     def _leaf(self, leaf: Leaf) -> _Piece:
         copies = [self._state(leaf.name) for _ in range(max(leaf.minimum, 1))]
@@ -115,18 +115,18 @@ class _Builder:
         return _Piece(leaf.minimum == 0, copies[:1], copies[-1:])
 
     def _chain(self, pieces: list[_Piece]) -> _Piece:
-        whole = _Piece(True, [], [])
+        chain = _Piece(True, [], [])
         for piece in pieces:
-            self._link(whole.last, piece.first)
-            whole = _Piece(
-                whole.empty and piece.empty,
-                whole.first + piece.first if whole.empty else whole.first,
-                whole.last + piece.last if piece.empty else piece.last,
+            self._link(chain.last, piece.first)
+            chain = _Piece(
+                chain.empty and piece.empty,
+                chain.first + piece.first if chain.empty else chain.first,
+                chain.last + piece.last if piece.empty else piece.last,
             )
-        return whole
+        return chain
 
     @staticmethod
-    def _either(pieces: list[_Piece]) -> _Piece:
+    def _alternatives(pieces: list[_Piece]) -> _Piece:
         return _Piece(
             not pieces or any(piece.empty for piece in pieces),
             [state for piece in pieces for state in piece.first],
@@ -144,9 +144,9 @@ class _Builder:
 
 
 def automaton(model: Group) -> Automaton:
-    """The automaton of a content model."""
+    """Build the automaton of a content model."""
     builder = _Builder()
-    whole = builder.piece(model)
-    builder.follow[0] = whole.first
+    root = builder.piece(model)
+    builder.follow[0] = root.first
     steps = [{builder.names[to]: to for to in following} for following in builder.follow]
-    return Automaton(steps, set(whole.last) | ({0} if whole.empty else set()))
+    return Automaton(steps, set(root.last) | ({0} if root.empty else set()))

@@ -1,4 +1,4 @@
-"""Bytes of a file into an XML tree: no network, no document type, no entities, bounded size and depth."""
+"""Parser from files to XML trees: no network, no document type, no entities, bounded size and depth."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
 
 
 class SupportsGetElement(Protocol):
-    """What scenariogeneration calls a Scenario, and whatever else gives its XML on demand."""
+    """Object that creates its XML on demand, such as a Scenario of scenariogeneration."""
 
     def get_element(self) -> Any:
-        """The root element."""
+        """Return the root element."""
 
 
 Source: TypeAlias = (
@@ -34,12 +34,12 @@ LIMITS = XmlLimits(max_bytes=64 * MIB, max_nodes=2_000_000)
 
 @dataclass(frozen=True)
 class Document:
-    """A parsed file.
+    """Parsed file.
 
-    name    what messages call it
-    path    where it lies; None where it was handed in otherwise
-    folder  what its relative paths start from
-    text    what it was parsed from, where there is no file to read again
+    name    name in messages
+    path    path of the file; None for other sources
+    folder  base of relative paths
+    text    parsed text of a source without a file
     digest  SHA-256 of the content, as hexadecimal digits
     """
 
@@ -52,7 +52,7 @@ class Document:
 
 
 def open_document(source: Source) -> Document:
-    """Parses a file, its bytes, or takes a tree that is parsed already. Raises ScenarioError with file:line."""
+    """Parse a file or its bytes, or wrap a parsed tree. Raise ScenarioError with file and line if it is invalid."""
     if isinstance(source, bytes):
         return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source, _digest(source))
     if not isinstance(source, str | Path):
@@ -62,7 +62,7 @@ def open_document(source: Source) -> Document:
 
 
 def text_of(source: Source) -> bytes:
-    """The text of a file: its bytes, or those that a tree has as a file. Raises ScenarioError with file:line."""
+    """Return the bytes of a file, or of a tree written as a file. Raise ScenarioError if the source is invalid."""
     if isinstance(source, bytes):
         return source
     if isinstance(source, str | Path):
@@ -74,12 +74,12 @@ def _content(path: str | Path) -> bytes:
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
-        diagnostic = Diagnostic(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(path)))
+        diagnostic = Diagnostic(f"cannot read: {reason_of(error)}", "check the path", shortened(str(path)))
         raise ScenarioError(diagnostic) from error
 
 
 def _from_tree(source: Any) -> Document:
-    """The tree as it is where lxml made it, as then it knows its lines."""
+    """Return the document of a tree; a tree of lxml is used directly, as it has line numbers."""
     name = f"<{type(source).__name__}>"
     root = source
     if hasattr(root, "get_element"):
@@ -91,52 +91,54 @@ def _from_tree(source: Any) -> Document:
         digest = _digest(etree.tostring(root))
         return Document(root, str(base or "<element>"), base, base.parent if base else Path(), digest=digest)
     if not isinstance(root, ElementTree.Element):
-        what = "this is neither a path nor XML"
-        hint = "give a path, bytes, an XML tree, or an object with get_element()"
-        raise ScenarioError(Diagnostic(what, hint, name))
-    text = _as_written(root, name)
+        message = "the source is neither a path nor XML"
+        hint = "use a path, bytes, an XML tree, or an object with get_element()"
+        raise ScenarioError(Diagnostic(message, hint, name))
+    text = _serialize(root, name)
     return Document(parse(text, name), name, None, Path(), text, _digest(text))
 
 
 def _element_of(source: SupportsGetElement, name: str) -> Any:
-    """Its root element. Raises ScenarioError where the library that made it finds something wrong by now."""
+    """Return the root element. Raise ScenarioError if its library reports an error."""
     try:
         return source.get_element()
-    except Exception as error:  # of whichever library that is: scenariogeneration raises what its versions do not have
-        what = f"get_element() gives no XML: {error} ({type(error).__name__})"
-        raise ScenarioError(Diagnostic(what, "write_xml would fail alike; mend what it names", name)) from error
+    except Exception as error:  # libraries raise any type; scenariogeneration raises errors of unsupported versions
+        message = f"get_element() raises {type(error).__name__}: {error}"
+        raise ScenarioError(
+            Diagnostic(message, "correct the object; write_xml fails for the same reason", name)
+        ) from error
 
 
-def _as_written(root: ElementTree.Element, name: str) -> bytes:
-    """The text of a tree that knows no lines.
+def _serialize(root: ElementTree.Element, name: str) -> bytes:
+    """Return the text of a tree without line numbers.
 
-    It has one element a line after the XML declaration, as write_xml of scenariogeneration sets it: the line of a
-    message is the line that the element would have in such a file. Attributes that are None are left out.
+    It has one element per line after the XML declaration, like write_xml of scenariogeneration: the line of a message
+    is the line of the element in such a file. Attributes that are None are omitted.
     """
     indented = copy.deepcopy(root)
     try:
         for node in indented.iter():
-            _texts_only(node, name)
+            _check_attributes(node, name)
         ElementTree.indent(indented)
         text: bytes = ElementTree.tostring(indented, "utf-8", xml_declaration=True)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise ScenarioError(Diagnostic(f"cannot be written as XML: {error}", "give texts only", name)) from error
+        raise ScenarioError(Diagnostic(f"cannot be written as XML: {error}", "use only texts", name)) from error
     return text
 
 
-def _texts_only(node: ElementTree.Element, name: str) -> None:
-    """Takes the attributes away that are None. Raises ScenarioError for others that are no text."""
+def _check_attributes(node: ElementTree.Element, name: str) -> None:
+    """Remove attributes that are None. Raise ScenarioError for others that are not texts."""
     attributes: list[tuple[str, Any]] = list(node.items())
     for attribute, value in attributes:
         if value is None:
             del node.attrib[attribute]
         elif not isinstance(value, str):
-            what = f"{attribute} of {node.tag} is {value!r} of the type {type(value).__name__}"
-            raise ScenarioError(Diagnostic(what, "give a text, as XML has nothing else", name))
+            message = f"{attribute} of {node.tag} is {value!r} of the type {type(value).__name__}"
+            raise ScenarioError(Diagnostic(message, "use a text, the only type of XML attributes", name))
 
 
 def parse(content: bytes, name: str) -> etree._Element:
-    """The root element of an XML file's bytes. Raises ScenarioError with file:line."""
+    """Return the root element of the bytes of an XML file. Raise ScenarioError if they are invalid."""
     return parse_untrusted(content, name, LIMITS, ScenarioError)
 
 
@@ -145,5 +147,5 @@ def _digest(content: bytes) -> str:
 
 
 def line_of(node: etree._Element) -> int | None:
-    """The line where an element begins."""
+    """Return the line of the start tag of an element."""
     return cast("int | None", node.sourceline)

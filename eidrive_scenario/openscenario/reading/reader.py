@@ -1,4 +1,4 @@
-"""XML elements into the model, as the classes of the model say; every finding with its file and line."""
+"""Reader from XML elements to model objects, by the schema rules of the model classes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from eidrive_scenario.openscenario.values.scalars import DOUBLE, STRING, Version
 _SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
 _IGNORED = {_SCHEMA_INSTANCE + "noNamespaceSchemaLocation", _SCHEMA_INSTANCE + "schemaLocation"}
 _MAY_BE_EMPTY = (Action, ObjectController)
-"""An action that does nothing, an object without controller."""
+"""Classes that may be empty up to 1.2: an action without effect, an object without a controller."""
 _INFINITE = ("inf", "-inf")
 _WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
 _WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
@@ -40,17 +40,17 @@ _WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
 
 @dataclass(frozen=True)
 class FoundReference:
-    """A catalog reference and the kinds of entry that fit there."""
+    """Catalog reference and the kinds of entries that are allowed for it."""
 
     reference: CatalogReference
     kinds: tuple[type[Element], ...]
 
 
 class Reader:
-    """Reads elements of one file.
+    """Reader of the elements of one file.
 
-    Elements that are wrong are built as far as they go, so that all findings of a file come in one go; use what
-    was built only if `findings` has no problems.
+    Invalid elements are built incompletely, so that all errors of a file are reported together. The result is valid
+    only if `collector` has no errors.
     """
 
     def __init__(self, source: str, version: Version, collector: DiagnosticCollector) -> None:
@@ -59,8 +59,8 @@ class Reader:
         self.collector = collector
         self.references: list[FoundReference] = []
         self.declared: Scope | None = None
-        """The parameters that the element read declares itself."""
-        self._flaws = 0
+        """Parameters that the root element declares."""
+        self._error_count = 0
         self._with_text: set[etree._Element] = set()
         self._with_space: set[etree._Element] = set()
 
@@ -71,9 +71,9 @@ class Reader:
         assignments: Mapping[str, Assignment] | None = None,
         lent: Scope | None = None,
     ) -> Element:
-        """The element and all below.
+        """Read an element with its descendants.
 
-        assignments  values for the parameters that it declares itself
+        assignments  values of the parameters that it declares
         lent         parameters of another file, for those that it does not declare
         """
         self._with_text = set(cast(list[etree._Element], _WITH_TEXT(node)))
@@ -88,9 +88,9 @@ class Reader:
     ) -> Element:
         known = rules(cls, self.version)
         values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
-        below = list(node.iterchildren(etree.Element))
+        children = list(node.iterchildren(etree.Element))
         if "ParameterDeclarations" in known.children:
-            declarations = next((child for child in below if child.tag == "ParameterDeclarations"), None)
+            declarations = next((child for child in children if child.tag == "ParameterDeclarations"), None)
             if declarations is not None:
                 scope = scope.inner()
                 self.declared = self.declared or scope
@@ -100,13 +100,13 @@ class Reader:
         if cls is Property or cls is CustomCommandAction:
             _keep_scope(node, scope, values)
         repeated: dict[str, list[Element]] = {}
-        for child in below:
+        for child in children:
             self._child(node, child, known, scope, values, repeated)
         values.update((name, tuple(found)) for name, found in repeated.items())
-        if below or known.children:
-            check_children(node, below, known, self.version, self._error)
-        if known.choice and not any(child.tag in known.choice or child.tag not in known.children for child in below):
-            self._chooses_nothing(node, cls, known)
+        if children or known.children:
+            check_children(node, children, known, self.version, self._error)
+        if known.choice and not any(one.tag in known.choice or one.tag not in known.children for one in children):
+            self._report_empty(node, cls, known)
         if "catalog_reference" in values:
             self._note_references(known, values["catalog_reference"])
         return make(cls, values)
@@ -124,22 +124,22 @@ class Reader:
                 self._error(f"{node.tag} has no attribute {name!r}", hint, node)
         for name, rule in known.attributes.items():
             if rule.required and name not in present:
-                self._error(f"{node.tag} lacks the attribute {name!r}", f"it is {rule.scalar.name}", node)
+                self._error(f"{node.tag} lacks the attribute {name!r}", f"expected {rule.scalar.name}", node)
 
     def _value(self, node: etree._Element, name: str, text: str, rule: AttributeRule, scope: Scope) -> Any:
         value: Any = None
         try:
-            value = self._converted(text, rule, scope)
+            value = self._convert(text, rule, scope)
         except ExpressionError as error:
-            self._flaws += 1
+            self._error_count += 1
             if error.message:
                 self._error(f"{name} of {node.tag}: {error.message}", error.hint, node)
         except ValueError as error:
             if text == "None" and not rule.required:
-                self._by_python(name, node, text, "as Python writes what is missing; it is taken so", "leave it out")
+                self._warn_of_python(name, node, text, "which is read as a missing attribute", "omit it")
             elif text in _INFINITE and rule.scalar is DOUBLE:
                 value = float(text)
-                self._by_python(name, node, text, "as Python writes infinity; it is taken so", f"write {text.upper()}")
+                self._warn_of_python(name, node, text, "which is read as infinity", f"write {text.upper()}")
             else:
                 message = f"{name} of {node.tag} is {quoted(text)}, which is not {rule.scalar.name}"
                 self._error(message, str(error), node)
@@ -149,7 +149,7 @@ class Reader:
             self._deprecated(f"{value.value!r} of {type(value).__name__}", value.usage.deprecated, node)
         return value
 
-    def _converted(self, text: str, rule: AttributeRule, scope: Scope) -> Any:
+    def _convert(self, text: str, rule: AttributeRule, scope: Scope) -> Any:
         if not text.startswith("$"):
             return rule.scalar.convert(text)
         if rule.points_to == "parameter" and REFERENCE.fullmatch(text):
@@ -157,17 +157,17 @@ class Reader:
         if text.startswith("${") and self.version < (1, 1):
             if rule.scalar is STRING:
                 return text
-            raise ExpressionError(f"{quoted(text)} is an expression", "OpenSCENARIO has them since 1.1")
+            raise ExpressionError(f"{quoted(text)} is an expression", "expressions require OpenSCENARIO 1.1")
         return scope.resolve(text, rule.scalar)
 
     def _text(self, node: etree._Element, known: Rules, values: dict[str, Any]) -> None:
         if known.text_field:
             values[known.text_field] = "".join(cast(list[str], node.xpath("text()")))
         elif node in self._with_text:
-            self._error(f"{node.tag} holds text, where only elements may stand", "remove the text", node)
+            self._error(f"{node.tag} contains text; only elements are allowed", "remove the text", node)
         elif not known.children and node in self._with_space:
             self.collector.warning(
-                f"{node.tag} holds white space, where the schema wants nothing",
+                f"{node.tag} contains white space; the schema allows no content",
                 f"write <{node.tag} …/>",
                 source=self.source,
                 line=line_of(node),
@@ -195,59 +195,58 @@ class Reader:
         else:
             values.setdefault(rule.field, element)
 
-    def _chooses_nothing(self, node: etree._Element, cls: type[Element], known: Rules) -> None:
-        """Up to 1.2 the schema lets an element choose nothing. That is in use where _MAY_BE_EMPTY says so."""
+    def _report_empty(self, node: etree._Element, cls: type[Element], known: Rules) -> None:
+        """Report an empty choice, which the schemas up to 1.2 allow; a warning for classes that files leave empty."""
         report = self.collector.warning if cls in _MAY_BE_EMPTY else self.collector.error
-        hint = "it holds one of " + ", ".join(known.choice)
+        hint = "it contains one of " + ", ".join(known.choice)
         report(f"{node.tag} is empty", hint, source=self.source, line=line_of(node))
 
     def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> Element:
-        """Reads declarations one by one, so that each may use those before it."""
+        """Read declarations in their order, so that each may use those before it."""
         known = rules(ParameterDeclarations, self.version)
         values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
-        below = list(node.iterchildren(etree.Element))
+        children = list(node.iterchildren(etree.Element))
         self._attributes(node, known, scope, values)
         self._text(node, known, values)
-        check_children(node, below, known, self.version, self._error)
+        check_children(node, children, known, self.version, self._error)
         declared = []
-        for child in below:
+        for child in children:
             if child.tag in known.children:
-                before = self._flaws
+                errors_before = self._error_count
                 declaration = self._element(child, ParameterDeclaration, scope, {})
-                sound = self._flaws == before
-                declared.append(self._declared(cast(ParameterDeclaration, declaration), scope, assignments, sound))
+                is_valid = self._error_count == errors_before
+                declared.append(self._declare(cast(ParameterDeclaration, declaration), scope, assignments, is_valid))
         values["parameter_declaration"] = tuple(declared)
         self._unknown_parameters(assignments, scope.parameters)
         assignments.clear()
         return make(ParameterDeclarations, values)
 
-    def _declared(
-        self, declaration: ParameterDeclaration, scope: Scope, assignments: dict[str, Assignment], sound: bool
+    def _declare(
+        self, declaration: ParameterDeclaration, scope: Scope, assignments: dict[str, Assignment], is_valid: bool
     ) -> ParameterDeclaration:
-        """Puts a parameter into its scope. The declaration comes back with the value that counts."""
+        """Add a parameter to its scope, and return the declaration with its final value."""
         name = str(declaration.name)
-        given = assignments.pop(name, None)
+        assignment = assignments.pop(name, None)
         other = scope.parameters.get(name)
         if other is not None:
-            self._declared_twice(declaration, other)
+            self._report_duplicate(declaration, other)
             return replace(declaration, value=other.text)
-        if not sound:
+        if not is_valid:
             scope.parameters[name] = Parameter(name, "", "", "", is_valid=False)
             return declaration
-        declare(scope, declaration, given, self.collector)
-        return replace(declaration, value=given.text) if given else declaration
+        declare(scope, declaration, assignment, self.collector)
+        return replace(declaration, value=assignment.text) if assignment else declaration
 
-    def _declared_twice(self, declaration: ParameterDeclaration, other: Parameter) -> None:
-        message = f"the parameter {declaration.name!r} is declared twice"
+    def _report_duplicate(self, declaration: ParameterDeclaration, other: Parameter) -> None:
+        message = f"parameter {declaration.name!r} is declared twice"
         report = self.collector.warning if declaration.value == other.declared else self.collector.error
         report(message, "rename or remove one", source=self.source, line=declaration.line)
 
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
-            place = assignment.origin or Diagnostic("", "", self.source)
-            self.collector.error(
-                f"unknown parameter {name!r}", suggestion(name, declared), source=place.source, line=place.line
-            )
+            origin = assignment.origin or Diagnostic("", "", self.source)
+            hint = suggestion(name, declared)
+            self.collector.error(f"unknown parameter {name!r}", hint, source=origin.source, line=origin.line)
 
     def _note_references(self, known: Rules, value: Any) -> None:
         entries = {child.cls for child in rules(Catalog, self.version).children.values()}
@@ -255,25 +254,25 @@ class Reader:
         references = value if isinstance(value, tuple) else (value,)
         self.references.extend(FoundReference(reference, kinds) for reference in references)
 
-    def _by_python(self, name: str, node: etree._Element, text: str, what: str, hint: str) -> None:
-        """Warns of a word of Python's that is none of XML's; scenariogeneration 0.16 writes some."""
-        message = f"{name} of {node.tag} is {quoted(text)}, {what}"
+    def _warn_of_python(self, name: str, node: etree._Element, text: str, effect: str, hint: str) -> None:
+        """Warn of a Python literal that XML does not have; scenariogeneration 0.16 writes some."""
+        message = f"{name} of {node.tag} is {quoted(text)}, {effect}"
         self.collector.warning(message, hint, source=self.source, line=line_of(node))
 
-    def _deprecated(self, what: str, since: str, node: etree._Element) -> None:
+    def _deprecated(self, subject: str, since: str, node: etree._Element) -> None:
         self.collector.warning(
-            f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node)
+            f"{subject} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node)
         )
 
     def _error(self, message: str, hint: str, node: etree._Element) -> None:
-        self._flaws += 1
+        self._error_count += 1
         self.collector.error(message, hint, source=self.source, line=line_of(node))
 
 
 def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> None:
-    """Keep the visible parameters for references inside a text, or inside the file that a command names.
+    """Keep the visible parameters for references inside a text, or inside the file of a command.
 
-    A property whose value begins with a reference is resolved already.
+    A property whose value begins with a reference is already resolved.
     """
     text = node.get("value") or ""
     if "content" in values or ("$" in text and not text.startswith("$")):
@@ -281,7 +280,7 @@ def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> N
 
 
 def make(cls: type[Element], values: Mapping[str, Any]) -> Element:
-    """An element with these values and its defaults, complete or not: a wrong file is reported, not half refused."""
+    """Return an element with these values and its defaults; it may be incomplete, as errors are reported separately."""
     defaults = _DEFAULTS.get(cls)
     if defaults is None:
         defaults = {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}

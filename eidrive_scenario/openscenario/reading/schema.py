@@ -1,4 +1,4 @@
-"""What a class of the model allows in one version of the standard: read off its fields, once, when first needed."""
+"""Schema rules of a model class in one version of the standard, derived from its fields on first use."""
 
 from __future__ import annotations
 
@@ -28,36 +28,37 @@ _PLAIN = Usage()
 
 @dataclass(frozen=True)
 class AttributeRule:
-    """An attribute: its field, its type, whether it has to be there."""
+    """Rule of an attribute: field of the class, type, and whether it is required."""
 
     field: str
     scalar: Scalar
     required: bool
     deprecated: str
     points_to: str
-    """What the attribute names: see model.scalars.NameOf; "" where it is no name of anything."""
+    """Kind of the element to which the attribute refers (see model.scalars.NameOf); "" if it is not a reference."""
 
 
 @dataclass(frozen=True)
 class ChildRule:
-    """A child: its field, its class, how often it may stand."""
+    """Rule of a child element: field of the class, type, and number of occurrences."""
 
     field: str
     cls: type[Element]
     minimum: int
     many: bool
     single: bool
-    """Whether the version allows one only, though the field holds many."""
+    """Whether the version allows only one, although the field is a tuple."""
     deprecated: str
 
 
 @dataclass(frozen=True)
 class Rules:
-    """What one version allows an element of a class to have.
+    """Content that one version allows for an element of a class.
 
-    order      automaton over the children's names; None where any order will do
-    elsewhere  attributes and children that only other versions have
-    summary    how the children have to stand, in words
+    order             automaton over the names of the children; None for any order
+    other_attributes  attributes that only other versions have
+    other_children    children that only other versions have
+    summary           description of the content model
     """
 
     cls: type[Element]
@@ -69,12 +70,11 @@ class Rules:
     other_children: MappingProxyType[str, Usage]
     summary: str
     choice: tuple[str, ...]
-    """Children of which one has to be there for the element to mean anything, though this version's schema lets it be
-    empty."""
+    """Children of which one is required by meaning, although the schema of this version allows none."""
 
 
 def rules(cls: type[Element], version: Version) -> Rules:
-    """The rules for a class in a version."""
+    """Return the rules of a class in a version."""
     key = (cls, version)
     known = _KNOWN.get(key)
     if known is None:
@@ -85,7 +85,7 @@ def rules(cls: type[Element], version: Version) -> Rules:
 def _read(cls: type[Element], version: Version) -> Rules:
     hints = get_type_hints(cls, localns=vars(model), include_extras=True)
     attributes: dict[str, AttributeRule] = {}
-    below: dict[str, ChildRule] = {}
+    children: dict[str, ChildRule] = {}
     other_attributes: dict[str, Usage] = {}
     other_children: dict[str, Usage] = {}
     spelling: dict[str, str] = {}
@@ -99,11 +99,11 @@ def _read(cls: type[Element], version: Version) -> Rules:
             continue
         kind, extras, many = _kind(hints[entry.name])
         is_child = isinstance(kind, type) and issubclass(kind, Element)
-        name = usage.name or _spelled(entry.name, capital=is_child)
+        name = usage.name or _xml_name(entry.name, capital=is_child)
         if not is_known(usage, version):
             (other_children if is_child else other_attributes)[name] = usage
         elif is_child:
-            below[name] = _child(entry, usage, kind, many, version)
+            children[name] = _child(entry, usage, kind, many, version)
             spelling[entry.name] = name
         else:
             attributes[name] = AttributeRule(
@@ -116,22 +116,22 @@ def _read(cls: type[Element], version: Version) -> Rules:
     content = cls.content_model
     if isinstance(content, Changed):
         content = content.before if version < parsed(content.since) else content.after
-    group = _group(content, below, spelling, version)
+    group = _group(content, children, spelling, version)
     return Rules(
         cls,
         MappingProxyType(attributes),
-        MappingProxyType(below),
+        MappingProxyType(children),
         text_field,
         None if isinstance(content, All) else automaton(group),
         MappingProxyType(other_attributes),
         MappingProxyType(other_children),
-        "in any order " + ", ".join(below) if isinstance(content, All) else _in_words(group),
-        _meant_choice(cls, spelling, version),
+        "in any order " + ", ".join(children) if isinstance(content, All) else _describe_group(group),
+        _required_choice(cls, spelling, version),
     )
 
 
 def _kind(hint: Any) -> tuple[Any, tuple[Any, ...], bool]:
-    """The type behind Optional, Annotated and tuple; what Annotated says of it; whether it is a tuple."""
+    """Return the type inside Optional, Annotated and tuple, its annotations, and whether it is a tuple."""
     if get_origin(hint) in (Union, UnionType):
         hint = next(option for option in get_args(hint) if option is not type(None))
     many = get_origin(hint) is tuple
@@ -171,23 +171,23 @@ def _deprecated(usage: Usage, version: Version) -> str:
     return usage.deprecated if usage.deprecated and version >= parsed(usage.deprecated) else ""
 
 
-def _spelled(field_name: str, *, capital: bool) -> str:
-    """The spelling in the file: camel case, children with a capital."""
+def _xml_name(field_name: str, *, capital: bool) -> str:
+    """Return the name in the file: camel case, for children with a capital."""
     first, *rest = field_name.rstrip("_").split("_")
     head = first[:1].upper() + first[1:] if capital else first
     return head + "".join(word[:1].upper() + word[1:] for word in rest)
 
 
-def _group(content: Content, below: dict[str, ChildRule], spelling: dict[str, str], version: Version) -> Group:
-    """A content model with the fields that the version has, under the names of the file."""
+def _group(content: Content, children: dict[str, ChildRule], spelling: dict[str, str], version: Version) -> Group:
+    """Return a content model with the fields of the version, under their names in the file."""
     exclusive = isinstance(content, Choice)
-    named = getattr(content, "parts", ()) or tuple(spelling)
+    fields_or_groups = getattr(content, "parts", ()) or tuple(spelling)
     parts: list[Leaf | Group] = []
-    for part in named:
+    for part in fields_or_groups:
         if isinstance(part, Sequence | Choice):
-            parts.append(_group(part, below, spelling, version))
+            parts.append(_group(part, children, spelling, version))
         elif part in spelling:
-            child = below[spelling[part]]
+            child = children[spelling[part]]
             repeated = isinstance(content, Choice) and content.maximum is None
             minimum = max(child.minimum, 1) if exclusive else child.minimum
             parts.append(Leaf(spelling[part], minimum, 1 if child.single or repeated else None))
@@ -197,7 +197,7 @@ def _group(content: Content, below: dict[str, ChildRule], spelling: dict[str, st
     return Group(tuple(parts), True, content.minimum == 0 or empty or not parts, content.maximum is None)
 
 
-def _meant_choice(cls: type[Element], spelling: dict[str, str], version: Version) -> tuple[str, ...]:
+def _required_choice(cls: type[Element], spelling: dict[str, str], version: Version) -> tuple[str, ...]:
     content = cls.content_model
     if isinstance(content, Changed):
         lenient = version < parsed(content.since)
@@ -208,15 +208,15 @@ def _meant_choice(cls: type[Element], spelling: dict[str, str], version: Version
     return tuple(spelling[name] for name in alternatives(cls) if name in spelling) if lenient else ()
 
 
-def _in_words(group: Group) -> str:
-    def word(part: Leaf | Group) -> str:
+def _describe_group(group: Group) -> str:
+    def describe(part: Leaf | Group) -> str:
         if isinstance(part, Group):
-            return f"({_in_words(part)})"
+            return f"({_describe_group(part)})"
         return part.name + ("…" if part.maximum is None else "")
 
     if not group.parts:
         return "nothing"
-    return (" or " if group.exclusive else ", ").join(word(part) for part in group.parts)
+    return (" or " if group.exclusive else ", ").join(describe(part) for part in group.parts)
 
 
 _KNOWN: dict[tuple[type[Element], Version], Rules] = {}

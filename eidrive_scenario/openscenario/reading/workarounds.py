@@ -1,7 +1,7 @@
-"""Slips of programs that write scenarios: what the schema refuses, and what can mean one thing only.
+"""Tolerated schema deviations of authoring tools with a single possible meaning.
 
-Their users cannot mend them, so that such a file is read as it is meant, with a warning. All of these are written by
-scenariogeneration 0.16.
+Users of the tools cannot correct them. Such a file is read with the intended content, and with a warning.
+scenariogeneration 0.16 writes all of them.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from eidrive_scenario.openscenario.values.scalars import Version
 
 @dataclass(frozen=True)
 class Workaround:
-    """One of them, in elements of one name.
+    """Repair of one deviation in elements of one name.
 
-    since, before  the versions of the standard in which it is one
-    found          whether an element has it
-    mend           puts it right
+    since, before  versions of the standard in which it is a deviation
+    found          returns whether an element has the deviation
+    repair         corrects an element
     """
 
     element: str
@@ -38,20 +38,20 @@ class Workaround:
 def apply_workarounds(
     root: etree._Element, name: str, version: Version, collector: DiagnosticCollector
 ) -> etree._Element:
-    """The tree as it is meant: itself, or a copy where something had to be put right, with a warning for each."""
-    slips = {slip.element: slip for slip in WORKAROUNDS if slip.since <= version < slip.before}
-    wrong = [node for node in root.iter(*slips) if slips[str(node.tag)].found(node)]
-    if not wrong:
+    """Return the tree itself, or a repaired copy with a warning for each deviation."""
+    by_tag = {one.element: one for one in WORKAROUNDS if one.since <= version < one.before}
+    deviating = [node for node in root.iter(*by_tag) if by_tag[str(node.tag)].found(node)]
+    if not deviating:
         return root
-    for node in wrong:
-        slip = slips[str(node.tag)]
-        collector.warning(slip.message, slip.hint, source=name, line=line_of(node))
-    meant = copy.deepcopy(root)
-    for node in list(meant.iter(*slips)):
-        slip = slips[str(node.tag)]
-        if slip.found(node):
-            slip.repair(node)
-    return meant
+    for node in deviating:
+        workaround = by_tag[str(node.tag)]
+        collector.warning(workaround.message, workaround.hint, source=name, line=line_of(node))
+    repaired = copy.deepcopy(root)
+    for node in list(repaired.iter(*by_tag)):
+        workaround = by_tag[str(node.tag)]
+        if workaround.found(node):
+            workaround.repair(node)
+    return repaired
 
 
 def _light_type_second(node: etree._Element) -> bool:
@@ -104,18 +104,18 @@ def _bare_command(node: etree._Element) -> bool:
 
 def _wrapped_command(node: etree._Element) -> None:
     for command in list(node.iterchildren("CustomCommandAction")):
-        around = etree.Element("UserDefinedAction")
-        around.sourceline = command.sourceline
-        node.replace(command, around)
-        around.append(command)
+        parent = etree.Element("UserDefinedAction")
+        parent.sourceline = command.sourceline
+        node.replace(command, parent)
+        parent.append(command)
 
 
 WORKAROUNDS = (
     *(
         Workaround(
             holder,
-            f"a CustomCommandAction stands in {holder} by itself",
-            "put it into a UserDefinedAction; other tools may refuse it",
+            f"{holder} contains a CustomCommandAction without a UserDefinedAction",
+            "put it into a UserDefinedAction; other tools may reject it",
             _bare_command,
             _wrapped_command,
         )
@@ -123,37 +123,37 @@ WORKAROUNDS = (
     ),
     Workaround(
         "MiscObject",
-        "the category of a MiscObject is written 'grafficIsland'",
-        "write trafficIsland; other tools may refuse it",
+        "MiscObject has the misspelled category 'grafficIsland'",
+        "write trafficIsland; other tools may reject it",
         _graffic,
         _traffic,
     ),
     Workaround(
         "ManeuverGroup",
-        "a CatalogReference stands behind a Maneuver in ManeuverGroup",
-        "put CatalogReferences first; other tools may refuse it",
+        "ManeuverGroup has a CatalogReference after a Maneuver",
+        "put CatalogReferences first; other tools may reject it",
         _maneuver_first,
         _catalog_references_first,
     ),
     Workaround(
         "LightStateAction",
-        "LightState stands before LightType in LightStateAction",
-        "put LightType first; other tools may refuse it",
+        "LightStateAction has LightState before LightType",
+        "put LightType first; other tools may reject it",
         _light_type_second,
         _light_type_first,
     ),
     Workaround(
         "Phase",
         "TrafficeSignalGroupState is the spelling of OpenSCENARIO up to 1.2",
-        "write TrafficSignalGroupState; other tools may refuse it",
+        "write TrafficSignalGroupState; other tools may reject it",
         _old_group_state,
         _new_group_state,
         since=(1, 3),
     ),
     Workaround(
         "Sun",
-        "Sun has the illuminance of OpenSCENARIO 1.3 in place of intensity",
-        "write intensity, or raise revMinor to 3; other tools may refuse it",
+        "Sun has the illuminance of OpenSCENARIO 1.3 instead of intensity",
+        "write intensity, or increase revMinor to 3; other tools may reject it",
         _illuminance_alone,
         _intensity,
         before=(1, 3),

@@ -1,4 +1,4 @@
-"""Values of variables and parameters that are not of the type that is declared: kept as texts, with a warning."""
+"""Check of variable and parameter values against their declared types; deviating values are used as texts."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from eidrive_scenario.openscenario.values.parameters import TYPES, fits_type
 
 _WITHOUT_NUMBERS = (ParameterType.BOOLEAN, ParameterType.DATE_TIME, ParameterType.STRING)
 _TRUTH = ("true", "false")
-"""Whatever their case: Python writes capitals."""
+"""Boolean texts, which are compared case-insensitively, as Python capitalizes them."""
 
 
 def check_types(elements: Iterable[Element], collector: DiagnosticCollector) -> None:
-    """Warns of values that are declared, set or calculated with against the declared type."""
+    """Warn of values and calculations that contradict the declared type."""
     elements = tuple(elements)
     types: dict[tuple[str, str], set[ParameterType]] = {}
     for one in elements:
@@ -29,8 +29,8 @@ def check_types(elements: Iterable[Element], collector: DiagnosticCollector) -> 
             types.setdefault(("variable", one.name), set()).add(one.variable_type)
             if _misfits(one.value, one.variable_type):
                 declared = one.variable_type.value
-                what = f"the variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
-                collector.warning(what, "it is taken as a text", source=one.source, line=one.line)
+                message = f"variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
+                collector.warning(message, "the value is used as a text", source=one.source, line=one.line)
         elif isinstance(one, ParameterDeclaration):
             types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
     for one in elements:
@@ -47,21 +47,21 @@ def _check_action(
     types: set[ParameterType] | None,
     collector: DiagnosticCollector,
 ) -> None:
-    """One action; several declarations of a name in different types leave open which one is meant."""
+    """Check one action; the type is unknown if a name has several declarations with different types."""
     if types is None or len(types) != 1:
         return
     (declared,) = types
     setting = action.set_action
     if setting is not None and _misfits(setting.value, declared):
-        what = f"the {kind} {name!r} is declared as {declared.value}, and here set to {setting.value!r}"
-        collector.warning(what, "it is taken as a text", source=setting.source, line=setting.line)
+        message = f"{kind} {name!r} is declared as {declared.value}, but set to {setting.value!r}"
+        collector.warning(message, "the value is used as a text", source=setting.source, line=setting.line)
     elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
-        what = f"the {kind} {name!r} is declared as {declared.value}, and here calculated with"
-        collector.warning(what, "declare it as double", source=action.source, line=action.line)
+        message = f"{kind} {name!r} is declared as {declared.value}, but modified as a number"
+        collector.warning(message, "declare it as double", source=action.source, line=action.line)
 
 
 def _misfits(text: object, declared: ParameterType) -> bool:
-    """Whether a value is not of a type; what could not be read has been reported."""
+    """Whether a value is not of a type; values that could not be read are already reported."""
     if not isinstance(text, str) or not isinstance(declared, ParameterType):
         return False
     if declared is ParameterType.BOOLEAN and text.lower() in _TRUTH:

@@ -1,4 +1,4 @@
-"""Names: whether each is given once, and whether each that is referred to is there."""
+"""Check of names: uniqueness, and existence of the referenced ones."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from eidrive_scenario.openscenario.validation.storyboard_names import Storyboard
 from eidrive_scenario.openscenario.values.scalars import Version
 
 CRITERIA = "criteria_"
-"""ScenarioRunner's criteria are parameter conditions of such names; their parameter is none of the file's."""
+"""Prefix of the names of ScenarioRunner criteria, which are ParameterConditions without a declared parameter."""
 
 _DECLARED_BY: Mapping[type[Element], str] = {
     ParameterDeclaration: "parameter",
@@ -48,25 +48,27 @@ def check_names(
     entries: Mapping[CatalogReference, Element],
     collector: DiagnosticCollector,
 ) -> None:
-    """Reports names given twice and references to nothing."""
+    """Report duplicate names and references to missing elements."""
     elements = list(elements)
     known: dict[str, dict[str, Element]] = {kind: {} for kind in ("entity", *_DECLARED_BY.values())}
-    nameless: set[str] = set()
-    for kind, name, element in _given(root, elements, entries):
+    unnamed: set[str] = set()
+    for kind, name, element in _definitions(root, elements, entries):
         if name is None:
-            nameless.add(kind)
+            unnamed.add(kind)
             continue
         if name in known[kind] and kind in _UNIQUE:
             collector.error(
                 f"two {_plural(kind)} are named {name!r}",
-                f"the other stands in line {known[kind][name].line}; rename one",
+                f"the other one is in line {known[kind][name].line}; rename one",
                 source=element.source,
                 line=element.line,
             )
         known[kind].setdefault(name, element)
-    complete = {kind: names for kind, names in known.items() if kind not in nameless}
+    complete = {kind: names for kind, names in known.items() if kind not in unnamed}
     exempt = {id(one) for element in elements if isinstance(element, Condition) for one in _criterion(element)}
-    exempt |= {id(element.trailer_ref) for element in elements if isinstance(element, Trailer) and _draws_none(element)}
+    exempt |= {
+        id(element.trailer_ref) for element in elements if isinstance(element, Trailer) and _has_no_trailer(element)
+    }
     storyboard = StoryboardNames(root.storyboard, entries)
     storyboard.check_unique(collector)
     for element in elements:
@@ -76,10 +78,10 @@ def check_names(
             _check_references(element, version, complete, collector)
 
 
-def _given(
+def _definitions(
     root: OpenScenario, elements: Iterable[Element], entries: Mapping[CatalogReference, Element]
 ) -> Iterator[tuple[str, str | None, Element]]:
-    """Every name with its kind and the element that gives it; None where the reader could not make out the name."""
+    """Yield every defined name with its kind and element; None for a name that could not be read."""
     for one, _ in scenario_objects(root.entities, entries):
         yield "entity", one.name, one
     for selection in root.entities.entity_selection if root.entities else ():
@@ -97,8 +99,8 @@ def _criterion(condition: Condition) -> Iterator[ParameterCondition]:
             yield parameter
 
 
-def _draws_none(trailer: Trailer) -> bool:
-    """Catalogs let a scenario say by a parameter what a vehicle draws; its default is the empty name."""
+def _has_no_trailer(trailer: Trailer) -> bool:
+    """Whether a trailer has an empty reference, the default of catalog vehicles with a trailer parameter."""
     return trailer.trailer_ref is not None and trailer.trailer_ref.entity_ref == ""
 
 
@@ -110,7 +112,7 @@ def _check_references(
         name = getattr(element, rule.field) if kind in known else None
         if isinstance(name, str) and name not in known[kind]:
             collector.error(
-                f"{spelling} of {type(element).__name__} names the {kind} {name!r}, which is not there",
+                f"{spelling} of {type(element).__name__} refers to {kind} {name!r}, which does not exist",
                 suggestion(name, known[kind]),
                 source=element.source,
                 line=element.line,

@@ -1,4 +1,4 @@
-"""Numbers that XML Schema allows and nobody can calculate with: NaN, infinite ones, immense ones, negative lengths."""
+"""Check of numbers that XML Schema allows but runs cannot use: NaN, infinite, too large, negative lengths."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ from eidrive_scenario.openscenario.model import (
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.values.scalars import Version
 
-MOST = 1e9
-"""No place is further away [m], no time later [s] than this, and nothing is faster [m/s]."""
+MAX_ABSOLUTE = 1e9
+"""Maximum absolute value of coordinates [m], times [s] and speeds [m/s]."""
 UNLIMITED: tuple[type[Element], ...] = (
     DynamicConstraints,
     Fog,
@@ -56,7 +56,7 @@ UNLIMITED: tuple[type[Element], ...] = (
     Stochastic,
     TrafficSinkAction,
 )
-"""Whose numbers are bounds, so that one may be infinite: there is no bound."""
+"""Elements whose numbers are limits; an infinite number is no limit."""
 NOT_NEGATIVE: Mapping[type[Element], tuple[str, ...]] = {
     AngleCondition: ("angle_tolerance",),
     AnimationAction: ("animation_duration",),
@@ -95,31 +95,31 @@ NOT_NEGATIVE: Mapping[type[Element], tuple[str, ...]] = {
     TrafficSignalController: ("delay",),
     Wind: ("speed",),
 }
-"""Attributes that the standard's reference counts from 0 on."""
+"""Attributes that must be at least 0 by the reference of the standard."""
 POSITIVE: Mapping[type[Element], tuple[str, ...]] = {
     Axle: ("wheel_diameter",),
     Clothoid: ("length",),
     ClothoidSplineSegment: ("length",),
     ControlPoint: ("weight",),
 }
-"""Attributes that have to be above 0."""
+"""Attributes that must be above 0."""
 
 
 def unusable(element: Element, version: Version) -> str:
-    """What is wrong with a number of an element, and what would be right; "" if nothing is."""
+    """Return the error of the first unusable number of an element, with the expected value; "" if there is none."""
     kind = type(element)
     for name, value in vars(element).items():
         if not isinstance(value, float):
             continue
         message = ""
         if math.isnan(value):
-            message = "is NaN; give a number"
-        elif abs(value) > MOST and not _may_be_immense(element, name):
-            message = f"is {_spelled(value)}; nothing can be calculated with it, give a number within {MOST:g}"
+            message = "is NaN; a number is expected"
+        elif abs(value) > MAX_ABSOLUTE and not _may_be_immense(element, name):
+            message = f"is {_format(value)}; a number within {MAX_ABSOLUTE:g} is expected"
         elif value < 0.0 and name in NOT_NEGATIVE.get(kind, ()):
-            message = f"is {_spelled(value)}; give a number that is not negative"
+            message = f"is {_format(value)}; a number of at least 0 is expected"
         elif value <= 0.0 and name in POSITIVE.get(kind, ()):
-            message = f"is {_spelled(value)}; give a number above 0"
+            message = f"is {_format(value)}; a number above 0 is expected"
         if message:
             known = rules(kind, version).attributes.items()
             spelling = next((spelling for spelling, rule in known if rule.field == name), name)
@@ -128,17 +128,17 @@ def unusable(element: Element, version: Version) -> str:
 
 
 def _may_be_immense(element: Element, name: str) -> bool:
-    """Limits and the values of conditions only compare; a change at an infinite rate is a step."""
+    """Whether a number may be infinite: limits, values of conditions, and the rate of a step."""
     if isinstance(element, TransitionDynamics):
         return element.dynamics_dimension is DynamicsDimension.RATE
     if name == "delay":
         return False
     kind = type(element)
-    compares = kind.__name__.endswith("Condition") and kind is not RoadCondition
-    return compares or isinstance(element, UNLIMITED) or name.startswith("max_")
+    is_compared = kind.__name__.endswith("Condition") and kind is not RoadCondition
+    return is_compared or isinstance(element, UNLIMITED) or name.startswith("max_")
 
 
-def _spelled(value: float) -> str:
+def _format(value: float) -> str:
     if math.isinf(value):
         return "INF" if value > 0.0 else "-INF"
     return f"{value:g}"

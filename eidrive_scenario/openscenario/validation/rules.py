@@ -1,6 +1,6 @@
-"""What the schema cannot say but is wrong all the same: double names, dangling ones, values that exclude others.
+"""Rules that the schema cannot express: duplicate names, dangling references, contradictory values.
 
-The rules look at a scenario as far as it could be read, so a field may be missing where the reader has complained.
+The rules apply to incompletely read scenarios too: a field may be missing if the reader has reported an error.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from eidrive_scenario.openscenario.validation.names import check_names
 from eidrive_scenario.openscenario.validation.numbers import unusable
 from eidrive_scenario.openscenario.values.scalars import Version
 
-_NOTHING_SAID = Orientation()
+_EMPTY_ORIENTATION = Orientation()
 
 
 def check_rules(
     root: OpenScenario, version: Version, entries: Mapping[CatalogReference, Element], collector: DiagnosticCollector
 ) -> None:
-    """Reports whatever breaks a rule in a scenario or in the catalog entries that it uses."""
+    """Report violations of the rules in a scenario and in the catalog entries that it uses."""
     elements = [element for tree in (root, *entries.values()) for element in tree.walk()]
     check_values(elements, version, collector)
     check_types(elements, collector)
@@ -45,27 +45,27 @@ def check_rules(
 
 
 def check_values(elements: Sequence[Element], version: Version, collector: DiagnosticCollector) -> None:
-    """Report elements whose values exclude each other, or cannot be calculated with."""
-    flawed = {(diagnostic.source, diagnostic.line) for diagnostic in collector.errors}
+    """Report elements with contradictory values or unusable numbers."""
+    reported = {(diagnostic.source, diagnostic.line) for diagnostic in collector.errors}
     for element in elements:
         check = _CHECKS.get(type(element))
         message = unusable(element, version) or (check(element) if check else "")
-        if message and (element.source, element.line) not in flawed:
+        if message and (element.source, element.line) not in reported:
             collector.error(message, source=element.source, line=element.line)
-        if isinstance(element, Orientation) and element == _NOTHING_SAID:
-            what = "Orientation says nothing, which by the standard means the heading 0 of the world"
-            hint = 'leave it out, or write type="relative", to look along the road'
-            collector.warning(what, hint, source=element.source, line=element.line)
+        if isinstance(element, Orientation) and element == _EMPTY_ORIENTATION:
+            message = "Orientation is empty, which by the standard is heading 0 of the world frame"
+            hint = 'omit it, or write type="relative", for the heading of the road'
+            collector.warning(message, hint, source=element.source, line=element.line)
 
 
 def _distance(action: LongitudinalDistanceAction) -> str:
-    given = sum(value is not None for value in (action.distance, action.time_gap))
-    return "" if given == 1 else "LongitudinalDistanceAction has to have either distance or timeGap"
+    count = sum(value is not None for value in (action.distance, action.time_gap))
+    return "" if count == 1 else "LongitudinalDistanceAction must have either distance or timeGap"
 
 
 def _lane_position(position: RelativeLanePosition) -> str:
     both = position.ds is not None and position.ds_lane is not None
-    return "RelativeLanePosition has to have either ds or dsLane" if both else ""
+    return "RelativeLanePosition must have either ds or dsLane" if both else ""
 
 
 def _nurbs(curve: Nurbs) -> str:
@@ -74,34 +74,34 @@ def _nurbs(curve: Nurbs) -> str:
     if order is None or None in knots:
         return ""
     if order < 2:
-        return f"Nurbs has the order {order}; it has to be at least 2, of which straight lines are"
+        return f"Nurbs has the order {order}; it must be at least 2, the order of straight lines"
     if points < order:
-        return f"Nurbs of order {order} has {points} control points; it has to have at least {order}"
+        return f"Nurbs of order {order} has {points} control points; at least {order} are required"
     if len(knots) != points + order:
-        return f"Nurbs has {len(knots)} knots; {points} control points of order {order} want {points + order}"
+        return f"Nurbs has {len(knots)} knots; {points} control points of order {order} require {points + order}"
     if any(after < before for before, after in pairwise(knots)):
-        return "Nurbs has knots that descend; each has to be at least the one before"
+        return "Nurbs has descending knots; each must be at least the previous one"
     if knots[order - 1] == knots[points]:
         return f"Nurbs has no extent: its knots {order} to {points + 1} are all {knots[points]:g}"
-    return _clock([point.time for point in curve.control_point])
+    return _descending_times([point.time for point in curve.control_point])
 
 
 def _polyline(line: Polyline) -> str:
-    return _clock([vertex.time for vertex in line.vertex or ()])
+    return _descending_times([vertex.time for vertex in line.vertex or ()])
 
 
 def _clothoid(curve: Clothoid) -> str:
-    return _clock([curve.start_time, curve.stop_time])
+    return _descending_times([curve.start_time, curve.stop_time])
 
 
 def _clothoid_spline(curve: ClothoidSpline) -> str:
-    return _clock([*(segment.time_start for segment in curve.clothoid_spline_segment or ()), curve.time_end])
+    return _descending_times([*(segment.time_start for segment in curve.clothoid_spline_segment or ()), curve.time_end])
 
 
-def _clock(times: Sequence[float | None]) -> str:
+def _descending_times(times: Sequence[float | None]) -> str:
     for before, after in pairwise([time for time in times if time is not None]):
         if after < before:
-            return f"a trajectory goes back in time, from {before:g} s to {after:g} s; times have to ascend"
+            return f"times of the trajectory descend from {before:g} s to {after:g} s; they must ascend"
     return ""
 
 
@@ -110,7 +110,7 @@ def _delay(condition: Condition) -> str:
 
 
 def _transition(dynamics: TransitionDynamics) -> str:
-    """A rate may have a sign in practice: it does not matter."""
+    """Return the error of a negative duration or distance; the sign of a rate has no effect."""
     if dynamics.value is None or dynamics.value >= 0 or dynamics.dynamics_dimension is DynamicsDimension.RATE:
         return ""
     return f"a transition cannot take {dynamics.value:g} {'s' if _takes_time(dynamics) else 'm'}"
@@ -121,8 +121,8 @@ def _takes_time(dynamics: TransitionDynamics) -> bool:
 
 
 def _timing(timing: Timing) -> str:
-    wrong = timing.scale is not None and timing.scale <= 0
-    return f"Timing has the scale {timing.scale:g}; it has to be above 0" if wrong else ""
+    is_invalid = timing.scale is not None and timing.scale <= 0
+    return f"Timing has the scale {timing.scale:g}; it must be above 0" if is_invalid else ""
 
 
 _CHECKS: Mapping[type[Element], Callable[[Any], str]] = {

@@ -1,4 +1,4 @@
-"""Who takes part in a scenario: scenario objects, the trailers they draw, and what they are made of."""
+"""Scenario objects of a scenario, including trailers, and their bodies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario.model import CatalogReference, Element, Entit
 def scenario_objects(
     entities: Entities | None, entries: Mapping[CatalogReference, Element]
 ) -> Iterator[tuple[ScenarioObject, Element | None]]:
-    """Every scenario object and its body, trailers after what draws them; None where nothing is known of the body."""
+    """Yield every scenario object and its body, trailers after their towing vehicles; None for an unknown body."""
     for one in entities.scenario_object if entities else ():
         yield from _with_trailers(one, entries)
 

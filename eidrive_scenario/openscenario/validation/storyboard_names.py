@@ -1,4 +1,4 @@
-"""Names within the storyboard, and references to them: by the name alone, or with those above it, as in `act/event`."""
+"""Names in the storyboard and references to them, with or without the names above, such as `act/event`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from eidrive_scenario.openscenario.model import (
 T = TypeVar("T")
 
 SEPARATOR = re.compile(r"::|/")
-"""The standard writes ::, many files a slash."""
+"""Separators of names in references: `::` in the standard, a slash in many files."""
 
 LEVELS: Mapping[type[Element], StoryboardElementType] = {
     Story: StoryboardElementType.STORY,
@@ -40,24 +40,24 @@ LEVELS: Mapping[type[Element], StoryboardElementType] = {
 
 @dataclass(frozen=True)
 class NamedElement:
-    """An element of the storyboard and the names from the story down to it."""
+    """Element of the storyboard with its path of names from the story on."""
 
     element: Element
     path: tuple[str, ...]
 
     @property
     def level(self) -> StoryboardElementType:
-        """Story, act, maneuver group, maneuver, event or action."""
+        """Return the level: story, act, maneuver group, maneuver, event or action."""
         return LEVELS[type(self.element)]
 
 
 class StoryboardNames:
-    """The named elements of a storyboard, with the maneuvers that come from catalogs."""
+    """Named elements of a storyboard, including maneuvers from catalogs."""
 
     def __init__(self, storyboard: Storyboard | None, entries: Mapping[CatalogReference, Element]) -> None:
         self._entries = entries
         self.named = [named for story in (storyboard.story if storyboard else ()) for named in self._below(story, ())]
-        self._meant = ReferenceMatch((named.path, named) for named in self.named)
+        self._references = ReferenceMatch((named.path, named) for named in self.named)
 
     def _below(self, element: Element, above: tuple[str, ...]) -> Iterator[NamedElement]:
         path = (*above, str(getattr(element, "name", "")))
@@ -71,7 +71,7 @@ class StoryboardNames:
                 yield from self._below(child, path)
 
     def check_unique(self, collector: DiagnosticCollector) -> None:
-        """Warns of elements of one kind that have the same name side by side: a reference could mean either."""
+        """Warn of siblings of one kind with the same name, as references to them are ambiguous."""
         seen: dict[tuple[StoryboardElementType, tuple[str, ...]], Element] = {}
         for named in self.named:
             key = (named.level, named.path)
@@ -79,31 +79,31 @@ class StoryboardNames:
             if other is not named.element:
                 collector.warning(
                     f"two elements of the kind {named.level.value} are named {named.path[-1]!r}",
-                    f"the other stands in line {other.line}",
+                    f"the other one is in line {other.line}",
                     source=named.element.source,
                     line=named.element.line,
                 )
 
     def check_reference(self, condition: StoryboardElementStateCondition, collector: DiagnosticCollector) -> None:
-        """Reports a condition on an element that is not there, or is of another kind."""
+        """Report a condition on an element that does not exist or is of another kind."""
         reference: str | None = condition.storyboard_element_ref
-        wanted: StoryboardElementType | None = condition.storyboard_element_type
-        if reference is None or wanted is None:
+        level: StoryboardElementType | None = condition.storyboard_element_type
+        if reference is None or level is None:
             return
-        found = self._meant.by(reference)
-        if any(named.level is wanted for named in found):
+        found = self._references.by(reference)
+        if any(named.level is level for named in found):
             return
         if found:
-            message = f"{reference!r} is of the kind {found[0].level.value}, not {wanted.value}"
+            message = f"storyboardElementRef: {reference!r} is of the kind {found[0].level.value}, not {level.value}"
             hint = f"write storyboardElementType={found[0].level.value!r}"
         else:
-            message = f"storyboardElementRef names the {wanted.value} {reference!r}, which is not there"
-            hint = suggestion(reference, {named.path[-1] for named in self.named if named.level is wanted})
+            message = f"storyboardElementRef refers to {level.value} {reference!r}, which does not exist"
+            hint = suggestion(reference, {named.path[-1] for named in self.named if named.level is level})
         collector.error(message, hint, source=condition.source, line=condition.line)
 
 
 class ReferenceMatch(Generic[T]):
-    """Elements with their paths, to be asked which of them a reference means."""
+    """Index of elements by their paths, for the resolution of references."""
 
     def __init__(self, elements: Iterable[tuple[tuple[str, ...], T]]) -> None:
         self._by_name: dict[str, list[tuple[int, tuple[str, ...], T]]] = {}
@@ -111,7 +111,7 @@ class ReferenceMatch(Generic[T]):
             self._by_name.setdefault(path[-1], []).append((number, path, element))
 
     def by(self, reference: str) -> list[T]:
-        """Those that are meant, in the order in which they were given."""
+        """Return the referenced elements in the order of the index."""
         last = [name for name in SEPARATOR.split(reference) if name][-1:]
         found = {
             number: element
@@ -123,9 +123,9 @@ class ReferenceMatch(Generic[T]):
 
 
 def is_suffix(reference: str, path: tuple[str, ...]) -> bool:
-    """Whether a reference means the element of this path: its name, with as many of those above as need be.
+    """Whether a reference applies to the element of this path: its name, optionally with names above.
 
-    Names in between may be left out; a name may itself hold a separator.
+    Intermediate names may be omitted; a name may itself contain a separator.
     """
     if reference == path[-1]:
         return True

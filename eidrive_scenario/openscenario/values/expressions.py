@@ -1,4 +1,4 @@
-"""Expressions in `${…}`: arithmetic and logic over parameters, and nothing else of Python.
+"""Expressions in `${…}`: arithmetic and logic over parameters, without any other feature of Python.
 
 Operators: + - * / % and the unary minus, not, and, or, brackets. Functions and constants: see FUNCTIONS and CONSTANTS.
 """
@@ -20,16 +20,16 @@ from eidrive_scenario.errors import quoted, suggestion
 Value: TypeAlias = float | int | bool | str
 
 MAX_LENGTH = 1000
-"""Characters in one expression."""
+"""Maximum number of characters of an expression."""
 
 _PARAMETER = re.compile(r"\$([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 _WORD = re.compile(r"(?<![\w$.])[A-Za-z_]\w*", re.ASCII)
-_GLUED = re.compile(r"(?<![\w$.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?+[A-Za-z_]", re.ASCII)
+_NUMBER_BEFORE_WORD = re.compile(r"(?<![\w$.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?+[A-Za-z_]", re.ASCII)
 _PREFIX = "parameter_"
 
 
 class ExpressionError(Exception):
-    """An expression is wrong: what is wrong, and the remedy."""
+    """Invalid expression, with message and hint."""
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(message, hint)
@@ -80,28 +80,28 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Not: operator.not_,
 }
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.boolop, ast.Call, ast.Name, ast.Constant, ast.Load)
-HELP = "it takes + - * / % not and or, brackets, and " + " ".join(FUNCTIONS)
+HELP = "allowed are + - * / % not and or, brackets, and " + " ".join(FUNCTIONS)
 _KEYWORDS = {"and", "or", "not"}
 
 
 def parameters_of(text: str) -> list[str]:
-    """The parameters that an expression names."""
+    """Return the parameters in an expression."""
     return _PARAMETER.findall(text)
 
 
 def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
-    """The value of an expression, without its `${` and `}`. Raises ExpressionError."""
+    """Return the value of an expression without its `${` and `}`. Raise ExpressionError if it is invalid."""
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"the expression has {len(text)} characters", f"at most {MAX_LENGTH} are allowed")
-    if _GLUED.search(text):
-        raise ExpressionError(f"{quoted(text)} is not an expression", "a number ends before a word begins")
+    if _NUMBER_BEFORE_WORD.search(text):
+        raise ExpressionError(f"{quoted(text)} is not an expression", "separate numbers from words")
     source = _PARAMETER.sub(rf" {_PREFIX}\1 ", text).strip()
     names = {_PREFIX + name: _number(name, value) for name, value in parameters.items()}
     evaluator = simpleeval.SimpleEval(
         operators=dict(_OPERATORS), functions=dict(FUNCTIONS), names=names | dict(CONSTANTS)
     )
     try:
-        tree = _parsed(source)
+        tree = _parse(source)
         _check(tree, text)
         result = evaluator.eval(source, previously_parsed=tree.body)
         if not isinstance(result, int | float) or not math.isfinite(result):
@@ -116,32 +116,32 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
 
 
 def concatenate(text: str, parameters: Mapping[str, str]) -> str:
-    """The text that an expression such as `brake_ + $side` joins: words as they stand, parameters by their values."""
+    """Concatenate the words and parameter values of an expression such as `brake_ + $side`."""
     parts = [part.strip() for part in text.split("+")]
     return "".join(_PARAMETER.sub(lambda match: parameters[match.group(1)], part) for part in parts)
 
 
 def joins_text(text: str, parameters: Mapping[str, Value]) -> bool:
-    """Whether an expression joins text: it has a bare word that is no function, or a parameter that is no number."""
+    """Whether an expression concatenates texts: it has a word that is not a function, or a text parameter."""
     words = set(_WORD.findall(text)) - _KEYWORDS - FUNCTIONS.keys() - CONSTANTS.keys()
     return bool(words) or any(isinstance(value, str) for value in parameters.values())
 
 
 def _number(name: str, value: Value) -> float | int | bool:
     if isinstance(value, str):
-        raise ExpressionError(f"${name} is {value!r}, which is no number")
+        raise ExpressionError(f"${name} is {value!r}, which is not a number")
     return value
 
 
-def _parsed(source: str) -> ast.Expression:
-    """The tree. What Python warns of, such as a number glued to a word, is wrong here, and no warning to our users."""
+def _parse(source: str) -> ast.Expression:
+    """Return the syntax tree. Warnings of Python, such as for `1if`, are errors of the expression."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return ast.parse(source, mode="eval")
 
 
 def _check(tree: ast.Expression, text: str) -> None:
-    """Only what the standard has may reach the evaluator."""
+    """Raise ExpressionError if the tree contains anything that the standard does not define."""
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     for node in ast.walk(tree):
         if isinstance(node, ast.operator | ast.unaryop):
@@ -153,8 +153,8 @@ def _check(tree: ast.Expression, text: str) -> None:
         else:
             allowed = isinstance(node, _NODES)
         if not allowed:
-            what = type(node).__name__
-            raise ExpressionError(f"{quoted(text)} is not an expression of the standard: {what} is not part of it")
+            kind = type(node).__name__
+            raise ExpressionError(f"{quoted(text)} is not an expression of the standard: {kind} is not allowed")
         if isinstance(node, ast.Name) and not node.id.startswith(_PREFIX):
             known = FUNCTIONS if id(node) in called else CONSTANTS
             if node.id not in known:

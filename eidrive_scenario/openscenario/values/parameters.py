@@ -1,4 +1,4 @@
-"""Parameters: declared with a type and a default, overridden from outside, and put in wherever `$name` stands."""
+"""Parameters: declaration with type and default, assignment from outside, and substitution of `$name`."""
 
 from __future__ import annotations
 
@@ -40,24 +40,24 @@ TYPES: Mapping[ParameterType, Scalar] = {
 }
 
 TEXTUAL = (STRING, DOUBLE, BOOLEAN, DATE_TIME)
-"""Types whose texts are read as they stand. Whole numbers may be written with a fraction of zero, as -5.0."""
+"""Types whose texts are converted unchanged. Other types are integers, which may have a zero fraction, such as -5.0."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter and its value, as text and as what its type makes of it."""
+    """Parameter with its value as a text and in its type."""
 
     name: str
     text: str
     value: Any
     declared: str
-    """The text of its declaration; `text` may be another that was assigned."""
+    """Text of its declaration; `text` may be an assigned one."""
     is_valid: bool = True
-    """False where its declaration is wrong: what follows from that is not worth a further message."""
+    """False if its declaration is invalid; consequential errors are not reported."""
 
     @property
     def operand(self) -> Value:
-        """The value as an expression takes it: a text that reads as a number is one."""
+        """Return the value as an operand of expressions; a numeric text is a number."""
         if isinstance(self.value, int | float):
             return self.value
         try:
@@ -69,42 +69,42 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Assignment:
-    """A parameter's value from outside the file, and where it was given if that is a file too."""
+    """Value of a parameter from outside the file, with its location if that is a file too."""
 
     text: str
     origin: Diagnostic | None = None
 
 
 def as_assignments(values: Mapping[str, str | Assignment] | None) -> dict[str, Assignment]:
-    """Values of parameters by name, each as an Assignment."""
+    """Return the values by parameter name, each as an Assignment."""
     return {
-        name: value if isinstance(value, Assignment) else Assignment(_typed(value))
+        name: value if isinstance(value, Assignment) else Assignment(_text_of(value))
         for name, value in (values or {}).items()
     }
 
 
-def _typed(value: object) -> str:
-    """A value as a caller in Python gives it: `True` is `true` in a file."""
+def _text_of(value: object) -> str:
+    """Return the text of a Python value in a file: `True` is `true`."""
     return written(value) if isinstance(value, bool) else str(value)
 
 
 @dataclass
 class Scope:
-    """The parameters that are visible at a place; those of the surrounding scopes are too."""
+    """Parameters that are visible at an element, including those of the outer scopes."""
 
     outer: Scope | None = None
     parameters: dict[str, Parameter] = field(default_factory=dict)
     lent: set[str] | None = None
-    """Where another file's parameters are lent to this one: those that it has made use of."""
+    """Names of the used parameters of a scope that belongs to another file; None for the own file."""
     budget: Budget = field(default_factory=Budget)
-    """What the texts of expressions may add up to."""
+    """Limits of the texts of expressions."""
 
     def inner(self) -> Scope:
-        """A scope within this one."""
+        """Return a new inner scope."""
         return Scope(self, budget=self.budget)
 
     def find(self, name: str) -> Parameter:
-        """The parameter of that name. Raises ExpressionError."""
+        """Return the parameter of a name. Raise ExpressionError if it is unknown or invalid."""
         scope: Scope | None = self
         while scope is not None:
             found = scope.parameters.get(name)
@@ -118,11 +118,14 @@ class Scope:
         raise ExpressionError(f"unknown parameter ${shortened(name, 200)}", suggestion(name, self.names()))
 
     def names(self) -> set[str]:
-        """All names that are visible here."""
+        """Return all visible names."""
         return set(self.parameters) | (self.outer.names() if self.outer else set())
 
     def resolve(self, text: str, scalar: Scalar) -> Any:
-        """The value of an attribute that begins with `$`. Raises ExpressionError, or ValueError as `convert` does."""
+        """Return the value of an attribute that begins with `$`.
+
+        Raise ExpressionError if it is invalid, or ValueError like `convert`.
+        """
         match = REFERENCE.fullmatch(text)
         if match:
             parameter = self.find(match.group(1))
@@ -131,12 +134,12 @@ class Scope:
             return scalar.convert(text)
         if scalar is not STRING and not EXPRESSION.fullmatch(text):
             raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
-        return self._evaluated(text[2:-1], scalar)
+        return self._evaluate_as(text[2:-1], scalar)
 
     def evaluate(self, text: str) -> Value:
-        """The value of `$name` or `${expression}` by its own type, for texts that are no attributes.
+        """Return the value of `$name` or `${expression}` in its own type, for texts outside of attributes.
 
-        Raises ExpressionError.
+        Raise ExpressionError if it is invalid.
         """
         match = REFERENCE.fullmatch(text)
         if match:
@@ -146,36 +149,36 @@ class Scope:
         used = {name: self.find(name) for name in expressions.parameters_of(body)}
         operands = {name: parameter.operand for name, parameter in used.items()}
         if expressions.joins_text(body, operands):
-            return self._joined(body, {name: parameter.text for name, parameter in used.items()})
+            return self._concatenate(body, {name: parameter.text for name, parameter in used.items()})
         if not EXPRESSION.fullmatch(text):
             raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
         return expressions.evaluate(body, operands)
 
-    def _evaluated(self, text: str, scalar: Scalar) -> Any:
+    def _evaluate_as(self, text: str, scalar: Scalar) -> Any:
         used = {name: self.find(name) for name in expressions.parameters_of(text)}
         operands = {name: parameter.operand for name, parameter in used.items()}
         if scalar is STRING and expressions.joins_text(text, operands):
-            return self._joined(text, {name: parameter.text for name, parameter in used.items()})
+            return self._concatenate(text, {name: parameter.text for name, parameter in used.items()})
         result = written(expressions.evaluate(text, operands))
         return self._convert(result, scalar, f"the expression {quoted(text)} is {result}")
 
-    def _joined(self, text: str, values: Mapping[str, str]) -> str:
+    def _concatenate(self, text: str, values: Mapping[str, str]) -> str:
         length = len(text) + sum(len(values[name]) for name in expressions.parameters_of(text))
         try:
             self.budget.join(length)
         except BudgetError as error:
-            raise ExpressionError(f"the expression {quoted(text)} is too long: {error}", "join less") from error
+            raise ExpressionError(f"the expression {quoted(text)} is too long: {error}", "concatenate less") from error
         return expressions.concatenate(text, values)
 
-    def _convert(self, text: str, scalar: Scalar, what: str) -> Any:
+    def _convert(self, text: str, scalar: Scalar, subject: str) -> Any:
         try:
             return scalar.convert(text if scalar in TEXTUAL else _whole(text))
         except ValueError as error:
-            raise ExpressionError(f"{what}, which is not {scalar.name}", str(error)) from error
+            raise ExpressionError(f"{subject}, which is not {scalar.name}", str(error)) from error
 
 
 def written(value: Value) -> str:
-    """A value as a file writes it."""
+    """Return the text of a value in a file."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
@@ -186,50 +189,50 @@ def written(value: Value) -> str:
 def declare(
     scope: Scope, declaration: ParameterDeclaration, assignment: Assignment | None, collector: DiagnosticCollector
 ) -> None:
-    """Puts a parameter into its scope, once its value fits its type and its constraints."""
+    """Add a parameter to its scope; report a value that does not match its type or its constraints."""
     scalar = TYPES[declaration.parameter_type]
-    place = (assignment and assignment.origin) or Diagnostic("", "", declaration.source, declaration.line)
+    origin = (assignment and assignment.origin) or Diagnostic("", "", declaration.source, declaration.line)
     name, text = declaration.name, assignment.text if assignment else declaration.value
     text = _without_fraction(text, scalar)
     if not fits_type(_without_fraction(declaration.value, scalar), scalar):
         collector.warning(
-            f"the parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
+            f"parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
             f"{quoted(declaration.value)}",
-            "it is taken as a text",
+            "the value is used as a text",
             source=declaration.source,
             line=declaration.line,
         )
         scalar = STRING
     try:
         if len(text) > MAX_TEXT:
-            raise ValueError(f"at most {MAX_TEXT} characters are read")
+            raise ValueError(f"at most {MAX_TEXT} characters are allowed")
         value = scalar.convert(text)
     except ValueError as error:
         collector.error(
-            f"the parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}",
+            f"parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}",
             str(error),
-            source=place.source,
-            line=place.line,
+            source=origin.source,
+            line=origin.line,
         )
         scope.parameters[name] = Parameter(name, text[:MAX_TEXT], text[:MAX_TEXT], declaration.value, is_valid=False)
         return
     scope.parameters[name] = Parameter(name, text, value, declaration.value)
     groups = declaration.constraint_group
     try:
-        fits = not groups or any(_holds(group, value, scalar) for group in groups)
+        is_allowed = not groups or any(_holds(group, value, scalar) for group in groups)
     except ValueError as error:
-        message = f"a constraint of the parameter {name!r} is not {scalar.name}"
+        message = f"a constraint of parameter {name!r} is not {scalar.name}"
         collector.error(message, str(error), source=declaration.source, line=declaration.line)
         return
-    if not fits:
+    if not is_allowed:
         allowed = " or ".join(
             " and ".join(f"{one.rule.value} {one.value}" for one in group.value_constraint) for group in groups
         )
         collector.constraint_error(
-            f"the parameter {name!r} is {quoted(text)}, outside its constraints",
-            f"it has to be {allowed}",
-            source=place.source,
-            line=place.line,
+            f"parameter {name!r} is {quoted(text)}, outside its constraints",
+            f"expected {allowed}",
+            source=origin.source,
+            line=origin.line,
         )
 
 
@@ -249,7 +252,7 @@ def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
 
 
 def compare(left: Any, rule: Rule, right: Any) -> bool:
-    """Whether two values of one type are as the rule says."""
+    """Whether two values of one type satisfy a rule."""
     if isinstance(left, datetime) and isinstance(right, datetime):
         left, right = (moment if moment.tzinfo else moment.replace(tzinfo=UTC) for moment in (left, right))
     return bool(_COMPARISONS[rule](left, right))
@@ -266,12 +269,12 @@ _COMPARISONS = {
 
 
 def _without_fraction(text: str, scalar: Scalar) -> str:
-    """Return a text that is no whole number, where one is expected, without its fraction of zero: -5.0 is -5."""
+    """Remove a fraction of zero if a whole number is expected: -5.0 becomes -5."""
     return text if scalar in TEXTUAL or fits_type(text, scalar) else _whole(text)
 
 
 def _whole(text: str) -> str:
-    """A number without a fraction as a whole number; any other text as it is."""
+    """Return a number without a fraction as a whole number; any other text unchanged."""
     try:
         number: float = DOUBLE.convert(text)
     except ValueError:

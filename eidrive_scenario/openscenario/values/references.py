@@ -1,6 +1,6 @@
 """References to parameters inside settings: `{seconds: $Latency}`, `{seconds: ${$Latency * 2}}`.
 
-A value is put in after the text was parsed: whatever it looks like, it stays one number, truth value or text.
+A value is substituted after parsing, so it is always a single number, Boolean or text.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from eidrive_scenario.openscenario.values.parameters import REFERENCE, Scope
 
 
 def is_reference(value: object) -> bool:
-    """Whether a value is the text `$name` or `${expression}`, and nothing else beside it."""
+    """Whether a value is exactly the text `$name` or `${expression}`."""
     return isinstance(value, str) and (
         REFERENCE.fullmatch(value) is not None or (value.startswith("${") and value.endswith("}"))
     )
@@ -31,11 +31,12 @@ def resolve_references(
 ) -> Any:
     """Return parsed settings with the values of the parameters to which they refer.
 
-    data   mappings, lists and scalars as YAML gives them; keys stay as they are
+    data   mappings, lists and scalars from YAML; keys are not changed
     scope  visible parameters; None leaves the data unchanged
-    line   of the settings; `lines` of single keys, by their dotted path from `path` on, as `key_lines` gives them
+    line   line of the settings
+    lines  lines of single keys, by their dotted path from `path` on, as returned by `key_lines`
 
-    Raises SettingError with one Problem per unknown parameter or wrong expression.
+    Raise SettingError with one diagnostic per unknown parameter or invalid expression.
     """
     if scope is None:
         return data
@@ -63,8 +64,8 @@ def _resolve(
         }
     if isinstance(data, list | tuple):
         return [
-            _resolve(value, scope, _below(path, place), source, line, lines, diagnostics)
-            for place, value in enumerate(data)
+            _resolve(value, scope, _below(path, index), source, line, lines, diagnostics)
+            for index, value in enumerate(data)
         ]
     if not is_reference(data):
         return data
@@ -72,8 +73,8 @@ def _resolve(
         return scope.evaluate(data)
     except ExpressionError as error:
         if error.message:
-            what = f"setting {path!r}: {error.message}" if path else error.message
-            diagnostics.append(Diagnostic(what, error.hint, source, line))
+            message = f"setting {path!r}: {error.message}" if path else error.message
+            diagnostics.append(Diagnostic(message, error.hint, source, line))
         return data
 
 
@@ -82,7 +83,7 @@ def _below(path: str, key: object) -> str:
 
 
 def without(scope: Scope | None, names: Iterable[str]) -> Scope | None:
-    """The scope without some parameters, such as those that have no value yet."""
+    """Return the scope without some parameters, such as those without a value yet."""
     if scope is None:
         return None
     hidden = set(names)

@@ -1,4 +1,4 @@
-"""Text of a file into values, as XML Schema's simple types say."""
+"""Conversion of texts to values by the simple types of XML Schema."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 @dataclass(frozen=True)
 class Scalar:
-    """A simple type. `convert` raises ValueError, with the remedy as its text, where a text does not fit."""
+    """Simple type. `convert` raises ValueError with a hint if a text is invalid."""
 
     name: str
-    """As in "is not …"."""
+    """Noun for messages, such as "a number"."""
     convert: Callable[[str], Any]
     takes_expressions: bool = False
     deprecated: frozenset[Any] = frozenset()
-    """Values that the version still knows, but deprecates."""
+    """Values that the version deprecates."""
 
     def is_deprecated(self, value: Any) -> bool:
         """Whether the version deprecates this value."""
@@ -48,15 +48,15 @@ def _double(text: str) -> float:
 
 
 def integer(limits: Limits) -> Callable[[str], int]:
-    """A converter for whole numbers within limits."""
+    """Return a converter to whole numbers within limits."""
 
     def convert(text: str) -> int:
         text = text.strip(_WHITE_SPACE)
         if not _INTEGER.fullmatch(text):
-            raise ValueError("write it in digits, without a decimal point")
+            raise ValueError("write digits without a decimal point")
         value = int(text) if len(text) < 64 else limits.highest + 1
         if not limits.lowest <= value <= limits.highest:
-            raise ValueError(f"it has to lie between {limits.lowest} and {limits.highest}")
+            raise ValueError(f"expected a number between {limits.lowest} and {limits.highest}")
         return value
 
     return convert
@@ -92,42 +92,42 @@ DATE_TIME = Scalar("a date and time", _date_time)
 
 
 def whole_number(limits: Limits) -> Scalar:
-    """A whole number within limits."""
+    """Return the type of whole numbers within limits."""
     return Scalar("a whole number", integer(limits), True)
 
 
 def enumeration(cls: type[Enumeration], version: Version) -> Scalar:
-    """A word of an enumeration, out of those that the version knows."""
-    words = {member.value: member for member in cls if is_known(member.usage, version)}
+    """Return the type of the literals of an enumeration that a version has."""
+    literals = {member.value: member for member in cls if is_known(member.usage, version)}
 
     def convert(text: str) -> Enumeration:
-        member = words.get(text)
+        member = literals.get(text)
         if member is None:
             try:
                 other = cls(text)
             except ValueError:
-                raise ValueError(suggestion(text, words)) from None
+                raise ValueError(suggestion(text, literals)) from None
             raise ValueError(availability(other.usage, version))
         return member
 
     deprecated = {
-        member for member in words.values() if member.usage.deprecated and version >= parsed(member.usage.deprecated)
+        member for member in literals.values() if member.usage.deprecated and version >= parsed(member.usage.deprecated)
     }
-    return Scalar(f"a word of {cls.__name__}", convert, deprecated=frozenset(deprecated))
+    return Scalar(f"a literal of {cls.__name__}", convert, deprecated=frozenset(deprecated))
 
 
 def parsed(version: str) -> Version:
-    """The numbers of a version that is written as in "1.2"."""
+    """Return the numbers of a version such as "1.2"."""
     major, minor = version.split(".")
     return int(major), int(minor)
 
 
 def is_known(usage: Usage, version: Version) -> bool:
-    """Whether a version has the word, the attribute or the element."""
+    """Whether a version has the literal, attribute or element."""
     return not (usage.since and version < parsed(usage.since)) and not (usage.until and version > parsed(usage.until))
 
 
 def availability(usage: Usage, version: Version) -> str:
-    """Which versions have it, and which one the file is."""
+    """Describe the versions that have a literal, attribute or element, and the version of the file."""
     span = f"since {usage.since}" if usage.since and version < parsed(usage.since) else f"up to {usage.until} only"
-    return f"OpenSCENARIO has it {span}; the file says {version[0]}.{version[1]}"
+    return f"part of OpenSCENARIO {span}; the version of the file is {version[0]}.{version[1]}"

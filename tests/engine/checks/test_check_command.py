@@ -1,4 +1,4 @@
-"""`eidrive check`: every mistake of every file."""
+"""Command `eidrive check` on scenarios, road files, catalogs and folders."""
 
 import re
 from collections.abc import Callable
@@ -12,7 +12,7 @@ Eidrive = Callable[..., Result]
 
 @pytest.fixture
 def folder(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
-    """A folder with the scenario, and with copies in which one text stands in place of another."""
+    """Return a function that fills a folder with the scenario and with copies with one replaced text."""
 
     def fill(**replacements: tuple[str, str]) -> Path:
         text = passing_by.read_text(encoding="utf-8")
@@ -25,12 +25,12 @@ def folder(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
     return fill
 
 
-def test_nothing_wrong(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_valid_folder_reports_no_diagnostic(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     result = eidrive("check", folder())
     assert (result.exit_code, result.stdout) == (0, "1 file, 0 errors, 0 warnings\n")
 
 
-def test_all_mistakes_of_all_files(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_folder_reports_errors_of_all_files(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     place = folder(
         criterion=("min_distance: {of: Ego, to: Parked", "min_distance: {of: Ego, to: Parkd"),
         command=('type="eidrive.criterion"', 'type="eidrive.criterium"'),
@@ -46,7 +46,7 @@ def test_all_mistakes_of_all_files(eidrive: Eidrive, folder: Callable[..., Path]
     assert result.stderr == ""
 
 
-def test_what_is_not_judged_is_a_warning(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_unsupported_criterion_is_a_warning(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     condition = (
         '<Condition name="criteria_KeepLaneTest" delay="0" conditionEdge="rising"><ByValueCondition>'
         '<ParameterCondition parameterRef="" value="" rule="lessThan"/></ByValueCondition></Condition>'
@@ -58,7 +58,7 @@ def test_what_is_not_judged_is_a_warning(eidrive: Eidrive, folder: Callable[...,
     assert result.stdout.splitlines()[-1] == "1 file, 0 errors, 1 warning"
 
 
-def test_what_is_not_there_keeps_nothing_from_being_checked(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+def test_check_missing_paths_continues_with_other_files(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     result = eidrive("check", tmp_path / "missing.xosc", tmp_path, passing_by)
     assert result.exit_code == 2
     first, second, count = result.stdout.splitlines()
@@ -67,7 +67,7 @@ def test_what_is_not_there_keeps_nothing_from_being_checked(eidrive: Eidrive, pa
     assert count == "1 file, 2 errors, 0 warnings"
 
 
-def test_a_folder_without_scenarios(eidrive: Eidrive, tmp_path: Path) -> None:
+def test_check_folder_without_scenarios_is_an_error(eidrive: Eidrive, tmp_path: Path) -> None:
     result = eidrive("check", tmp_path)
     assert result.exit_code == 2
     assert "no .xosc or .xodr file in" in result.stdout
@@ -81,7 +81,7 @@ ROADS = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
 DEAD_END = '<link><successor elementType="junction" elementId="4"/></link>'
 
 
-def test_road_files(eidrive: Eidrive, tmp_path: Path) -> None:
+def test_check_road_files_reports_errors_and_map_warnings(eidrive: Eidrive, tmp_path: Path) -> None:
     for name, link, width in (("sound", "", "3"), ("doubtful", DEAD_END, "3"), ("wrong", "", "wide")):
         (tmp_path / f"{name}.xodr").write_text(ROADS.format(link, width), encoding="utf-8")
     (tmp_path / "broken.xodr").write_text("<OpenDRIVE>\n<road></OpenDRIVE>", encoding="utf-8")
@@ -107,24 +107,23 @@ UNUSED = (
 )
 
 
-def test_a_rule_that_is_broken_is_named(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_rule_violation_reports_the_rule_name(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     path = folder(unused=UNUSED) / "unused.xosc"
     result = eidrive("check", path)
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines() == [
-        f"{path}:5: the parameter 'N' is never used; take it out, or write $N where its value belongs "
-        "(warning: unused-parameter)",
+        f"{path}:5: parameter 'N' is never used; remove it, or use its value as $N (warning: unused-parameter)",
         "1 file, 0 errors, 1 warning",
     ]
 
 
-def test_strict_lets_warnings_count(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_strict_with_warning_exits_with_2(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     place = folder(unused=UNUSED)
     assert eidrive("check", "--strict", place).exit_code == 2
     assert eidrive("check", "--strict", place / "right.xosc").exit_code == 0
 
 
-def test_a_rule_can_be_left_out(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_ignored_rule_is_not_reported(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     path = folder(unused=UNUSED) / "unused.xosc"
     result = eidrive("check", "--strict", "--ignore", "unused-parameter", path)
     assert (result.exit_code, result.stdout) == (0, "1 file, 0 errors, 0 warnings\n")
@@ -133,7 +132,7 @@ def test_a_rule_can_be_left_out(eidrive: Eidrive, folder: Callable[..., Path]) -
     assert "did you mean 'unused-parameter'?" in unknown.stderr
 
 
-def test_notes_are_counted_apart(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_notes_are_counted_separately(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     catalog = '<CatalogLocations><RouteCatalog><Directory path="routes"/></RouteCatalog></CatalogLocations>'
     path = folder(noted=("<CatalogLocations/>", catalog)) / "noted.xosc"
     result = eidrive("check", "--strict", path)
@@ -142,8 +141,8 @@ def test_notes_are_counted_apart(eidrive: Eidrive, folder: Callable[..., Path]) 
     assert result.stdout.splitlines()[1] == "1 file, 0 errors, 0 warnings, 1 note"
 
 
-def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_path: Path) -> None:
-    """The library's own scenario, with an event that teleports somebody beyond the end of a road."""
+def test_check_unknown_road_in_an_event_is_an_error(eidrive: Eidrive, tmp_path: Path) -> None:
+    """The scenario is a library scenario with an event that teleports the Ego to an unknown road."""
     library = Path(__file__).parents[3] / "xosc"
     text = (library / "coop" / "scenario_1.xosc").read_text(encoding="utf-8").replace("../", f"{library}/")
     event = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
@@ -159,28 +158,28 @@ def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_pa
     assert "(error: unresolvable-position)" in result.stdout
 
 
-def test_one_that_breaks_the_checker_is_named_and_keeps_none_from_being_checked(
+def test_check_internal_error_continues_with_other_files(
     eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from eidrive_scenario.checks import scenario_checks
 
     inspect = scenario_checks.check_scenario
 
-    def broken(path: Path, ignored: tuple[str, ...]) -> object:
+    def raise_for_a(path: Path, ignored: tuple[str, ...]) -> object:
         if path.name == "a.xosc":
             raise ZeroDivisionError("division by zero")
         return inspect(path, ignored)
 
     for name in ("a.xosc", "b.xosc"):
         (tmp_path / name).write_text("<OpenSCENARIO/>")
-    monkeypatch.setattr(scenario_checks, "check_scenario", broken)
+    monkeypatch.setattr(scenario_checks, "check_scenario", raise_for_a)
     result = eidrive("check", tmp_path)
     assert result.exit_code == 3
     assert f"{tmp_path / 'a.xosc'}: internal error: ZeroDivisionError: division by zero" in result.stderr
     assert f"{tmp_path / 'b.xosc'}:1: " in result.stdout
 
 
-def test_an_empty_name_is_not_the_folder_one_stands_in(
+def test_check_empty_path_is_not_the_current_folder(
     eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -190,7 +189,7 @@ def test_an_empty_name_is_not_the_folder_one_stands_in(
     assert result.stdout.splitlines()[-1] == "0 files, 1 error, 0 warnings"
 
 
-def test_selections_in_a_circle_are_a_problem(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+def test_check_circular_selections_are_an_error(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     ring = '<EntitySelection name="{}"><Members><EntityRef entityRef="{}"/></Members></EntitySelection>'
     rings = ring.format("a", "b") + ring.format("b", "c") + ring.format("c", "a")
     broken = folder(ring=("</Entities>", f"{rings}</Entities>")) / "ring.xosc"
@@ -220,7 +219,7 @@ DECLARED = """<ParameterDeclarations><ParameterDeclaration name="Limit" paramete
         ([("a", DECLARED.format(kind="dbl", value="1"), "$Limit")], 3, "'dbl'"),
     ],
 )
-def test_catalog_is_checked_by_itself(
+def test_check_catalog_without_scenario_reports_errors(
     eidrive: Eidrive, tmp_path: Path, entries: list[tuple[str, str, str]], line: int, message: str
 ) -> None:
     path = tmp_path / "boxes.xosc"
@@ -231,7 +230,7 @@ def test_catalog_is_checked_by_itself(
     assert re.search(rf"^{re.escape(str(path))}:{line}: .*({message})", result.stdout, re.MULTILINE), result.stdout
 
 
-def test_sound_catalog_has_no_problems(eidrive: Eidrive, tmp_path: Path) -> None:
+def test_check_valid_catalog_reports_no_diagnostic(eidrive: Eidrive, tmp_path: Path) -> None:
     path = tmp_path / "boxes.xosc"
     declared = DECLARED.format(kind="double", value="2")
     path.write_text(CATALOG.format(entries=ENTRY.format(name="a", declared=declared, x="$Limit")), encoding="utf-8")
@@ -239,9 +238,7 @@ def test_sound_catalog_has_no_problems(eidrive: Eidrive, tmp_path: Path) -> None
     assert (result.exit_code, result.stdout) == (0, "1 file, 0 errors, 0 warnings\n")
 
 
-def test_check_of_folder_with_folders_named_like_files_checks_the_files_only(
-    eidrive: Eidrive, folder: Callable[..., Path]
-) -> None:
+def test_check_folders_named_like_files_are_not_read(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     place = folder()
     inner = place / "inner.xosc"
     inner.mkdir()

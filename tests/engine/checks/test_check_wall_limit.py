@@ -1,4 +1,4 @@
-"""`eidrive check` of files that take too long, and of files whose extensions end the process."""
+"""Wall limit of `eidrive check`, and extensions that hang or end the process."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from faulty_extensions import install, line_of, write_scenario
 from eidrive_scenario.library import library_path
 
 pytestmark = pytest.mark.timeout(600)
-"""Hung checks take their limit and the grace after it, and several processes load the engine."""
+"""Hanging checks take their limit and the grace time, and several processes load the engine."""
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with the faulty extensions and a scenario that is right."""
+    """Return a folder with the faulty extensions and a valid scenario."""
     install(tmp_path)
     write_scenario(tmp_path / "z_right.xosc")
     return tmp_path
@@ -37,7 +37,7 @@ def check(folder: Path, *arguments: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def test_check_that_exceeds_its_wall_limit_ends_with_3_and_names_each_file(folder: Path) -> None:
+def test_check_beyond_wall_limit_exits_with_3_and_reports_each_file(folder: Path) -> None:
     """No file is checked within a microsecond."""
     names = ("coop/scenario_1", "coop/scenario_2")
     code, out, err = check(folder, *names, "--wall-limit", "1e-6")
@@ -48,11 +48,11 @@ def test_check_that_exceeds_its_wall_limit_ends_with_3_and_names_each_file(folde
     assert out == "2 files, 0 errors, 0 warnings\n"
 
 
-def test_check_within_its_wall_limit_is_as_without(folder: Path) -> None:
+def test_check_within_wall_limit_has_unchanged_output(folder: Path) -> None:
     assert check(folder, "coop/scenario_1", "--wall-limit", "600") == check(folder, "coop/scenario_1")
 
 
-def test_check_of_extension_that_hangs_names_it_and_goes_on_with_other_files(folder: Path) -> None:
+def test_check_hanging_extension_is_reported_and_other_files_checked(folder: Path) -> None:
     write_scenario(folder / "hangs.xosc", detector="hangs_when_built")
     code, out, err = check(folder, "hangs.xosc", "z_right.xosc", "--wall-limit", "20")
     assert code == 3
@@ -63,7 +63,7 @@ def test_check_of_extension_that_hangs_names_it_and_goes_on_with_other_files(fol
     assert out == "2 files, 0 errors, 0 warnings\n"
 
 
-def test_check_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
+def test_check_hanging_native_code_exits_with_3(folder: Path) -> None:
     write_scenario(folder / "hangs.xosc", detector="hangs_in_c_when_built")
     code, _, err = check(folder, "hangs.xosc", "--wall-limit", "6")
     assert code == 3
@@ -71,7 +71,7 @@ def test_check_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
     assert f"{place} (faulty:HangsInCWhenBuilt): still running in __init__ after 6 s of wall time" in err
 
 
-def test_check_of_extension_that_exits_reports_it_and_goes_on_with_other_files(folder: Path) -> None:
+def test_check_exiting_extension_is_reported_and_other_files_checked(folder: Path) -> None:
     write_scenario(folder / "exits.xosc", detector="exits_when_built")
     code, out, err = check(folder, "exits.xosc", "z_right.xosc")
     assert code == 3
@@ -82,7 +82,7 @@ def test_check_of_extension_that_exits_reports_it_and_goes_on_with_other_files(f
 
 
 @pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])
-def test_check_wall_limit_that_is_not_positive_is_wrong_input(folder: Path, limit: str) -> None:
+def test_check_nonpositive_wall_limit_exits_with_2(folder: Path, limit: str) -> None:
     code, _, err = check(folder, "z_right.xosc", "--wall-limit", limit)
     assert code == 2
     assert "--wall-limit" in err

@@ -1,4 +1,4 @@
-"""The rules of `eidrive check`: docs/checks.md names each of them, and each of its examples breaks its rule."""
+"""Rules of `eidrive check`: docs/checks.md describes each rule, and each of its examples violates only this rule."""
 
 import re
 from collections.abc import Iterator
@@ -73,31 +73,31 @@ INTO = {
     "Private": "Init/Actions",
     "VariableDeclaration": "VariableDeclarations",
 }
-"""The element of the scaffold to which an example's element is added."""
-IN_PLACE_OF = {
+"""Element of the scaffold to which the element of an example is added."""
+REPLACED = {
     "GlobalAction": "PrivateAction",
     "PrivateAction": "PrivateAction",
     "StartTrigger": "StartTrigger",
 }
-"""What of the first event an example's element replaces."""
-OF_ROADS = {"link", "planView", "lateralProfile", "lanes", "signals", "junction"}
+"""Part of the first event that the element of an example replaces."""
+ROAD_ELEMENTS = {"link", "planView", "lateralProfile", "lanes", "signals", "junction"}
 """Elements of the road file."""
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a road, 200 m with one lane, and a catalog with one car."""
+    """Return a folder with a road of 200 m with one lane, and a catalog with one car."""
     (tmp_path / "street.xodr").write_text(ROAD, encoding="utf-8")
     (tmp_path / "cars.xosc").write_text(CATALOG, encoding="utf-8")
     return tmp_path
 
 
-def collector(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Diagnostic]]:
-    """What the rules find in the scaffold with elements put in their places."""
+def diagnostics_of(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Diagnostic]]:
+    """Return the diagnostics of the rules in the scaffold with additional or replaced elements."""
     root = etree.fromstring(text)
     for fragment in fragments:
         for element in list(etree.fromstring(f"<Fragment>{fragment}</Fragment>")):
-            if element.tag in OF_ROADS:
+            if element.tag in ROAD_ELEMENTS:
                 put_on_road(folder, element)
             else:
                 put(root, element)
@@ -107,7 +107,7 @@ def collector(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple
 
 
 def put_on_road(folder: Path, element: etree._Element) -> None:
-    """An example of a rule about the road file takes the place of the road's part, or is added to the file."""
+    """Replace a part of the road by an example, or add the example to the road file."""
     root = etree.fromstring(ROAD)
     old = root.find(f".//{element.tag}")
     if old is None:
@@ -120,8 +120,8 @@ def put_on_road(folder: Path, element: etree._Element) -> None:
 def put(root: etree._Element, element: etree._Element) -> None:
     if element.tag == "StopTrigger":
         old = root.find("Storyboard/StopTrigger")
-    elif element.tag in IN_PLACE_OF:
-        old = root.find(f".//Event[@name='First']//{IN_PLACE_OF[element.tag]}")
+    elif element.tag in REPLACED:
+        old = root.find(f".//Event[@name='First']//{REPLACED[element.tag]}")
     elif element.tag == "ScenarioObject":
         root.find("Entities").insert(0, element)
         return
@@ -131,12 +131,12 @@ def put(root: etree._Element, element: etree._Element) -> None:
     old.getparent().replace(old, element)
 
 
-def broken(folder: Path, *fragments: str) -> set[str]:
-    return {diagnostic.rule for _, diagnostic in collector(folder, *fragments)}
+def violated_rules(folder: Path, *fragments: str) -> set[str]:
+    return {diagnostic.rule for _, diagnostic in diagnostics_of(folder, *fragments)}
 
 
 def documented() -> Iterator[tuple[str, str, str]]:
-    """Name, level and example of each rule in docs/checks.md."""
+    """Yield name, level and example of each rule in docs/checks.md."""
     text = DOCUMENT.read_text(encoding="utf-8")
     for part in re.split(r"^### ", text, flags=re.MULTILINE)[1:]:
         heading, _, body = part.partition("\n")
@@ -144,42 +144,42 @@ def documented() -> Iterator[tuple[str, str, str]]:
         examples = re.findall(r"^```xml\n(.*?)^```", body, flags=re.MULTILINE | re.DOTALL)
         assert len(examples) == 1, name
         after = body.rpartition("```")[2].partition("\n## ")[0].strip()
-        assert after, f"{name} has no remedy"
+        assert after, f"{name} has no correction"
         yield name, level, examples[0]
 
 
 EXAMPLES = {name: (level, example) for name, level, example in documented()}
 
 
-def test_the_document_has_every_rule_with_its_level() -> None:
+def test_document_lists_every_rule_with_its_level() -> None:
     assert {name: level for name, (level, _) in EXAMPLES.items()} == {r.name: r.level.value for r in ALL_RULES}
     assert len(ALL_RULES) == len({rule.name for rule in ALL_RULES})
 
 
-def test_the_scaffold_breaks_no_rule(folder: Path) -> None:
-    assert collector(folder) == []
+def test_scaffold_violates_no_rule(folder: Path) -> None:
+    assert diagnostics_of(folder) == []
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_each_example_breaks_its_rule_and_no_other(folder: Path, name: str) -> None:
+def test_document_example_violates_only_its_rule(folder: Path, name: str) -> None:
     level, example = EXAMPLES[name]
-    found = collector(folder, example)
+    found = diagnostics_of(folder, example)
     assert {diagnostic.rule for _, diagnostic in found} == {name}
     assert {level.value for level, _ in found} == {level}
-    in_roads = etree.fromstring(f"<Fragment>{example}</Fragment>")[0].tag in OF_ROADS
+    in_road_file = etree.fromstring(f"<Fragment>{example}</Fragment>")[0].tag in ROAD_ELEMENTS
     for _, diagnostic in found:
-        assert diagnostic.source == str(folder / ("street.xodr" if in_roads else "scenario.xosc"))
+        assert diagnostic.source == str(folder / ("street.xodr" if in_road_file else "scenario.xosc"))
         assert diagnostic.line is not None
         assert diagnostic.hint
 
 
-def test_backwards_a_car_is_no_faster(folder: Path) -> None:
-    assert "above-max-speed" in broken(folder, SPEED.replace('value="10"', 'value="-61"'))
-    assert "above-max-speed" not in broken(folder, SPEED.replace('value="10"', 'value="-60"'))
+def test_above_max_speed_applies_to_negative_speeds(folder: Path) -> None:
+    assert "above-max-speed" in violated_rules(folder, SPEED.replace('value="10"', 'value="-61"'))
+    assert "above-max-speed" not in violated_rules(folder, SPEED.replace('value="10"', 'value="-60"'))
 
 
-def test_a_rule_can_be_left_out(folder: Path) -> None:
-    collector(folder, "<StopTrigger/>")
+def test_run_rules_ignored_rule_yields_nothing(folder: Path) -> None:
+    diagnostics_of(folder, "<StopTrigger/>")
     scenario = load_scenario(folder / "scenario.xosc")
     assert list(run_rules(scenario, ["no-stop-trigger"])) == []
     with pytest.raises(SettingError, match="rule 'no-stop' does not exist; did you mean 'no-stop-trigger'"):

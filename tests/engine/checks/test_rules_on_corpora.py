@@ -1,4 +1,4 @@
-"""The rules over files that others wrote: every finding was looked at by hand, so that none is raised in vain."""
+"""Rules on third-party files: every diagnostic was examined by hand, so that there are no false positives."""
 
 import os
 from collections import Counter
@@ -14,12 +14,12 @@ from eidrive_scenario.openscenario import load_scenario
 CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
 pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA is not set")
 
-PLENTY = {"unused-parameter", "unused-catalog", "no-stop-trigger"}
-"""Rules that many files break: declarations copied from file to file, the empty stop triggers of 1.0."""
+FREQUENT = {"unused-parameter", "unused-catalog", "no-stop-trigger"}
+"""Rules that many files violate: copied declarations, and empty stop triggers of 1.0."""
 
-AT_TIME_0 = "time = 0 is true when the act first looks, so `rising` never comes"
-AFTER_TIME_0 = "its act starts after time 0, so time > 0 is true when the event first looks"
-EDGES_APART = "the edges of one group belong to things that happen one after the other"
+AT_TIME_0 = "time = 0 is true at the first evaluation of the act, so there is no rising edge"
+AFTER_TIME_0 = "its act starts after time 0, so time > 0 is true at the first evaluation of the event"
+EDGES_APART = "the edges of one group occur one after the other"
 NO_WIDTH = "two lanes of SampleDatabase.xodr, of type none, have no <width>"
 CONTACT = "a connection of junction 7 names the end of road 148, whose start is where road 170 ends"
 SAMPLES = ("DoubleLaneChanger", "FastOvertakeWithReInitialization", "Overtaker", "SimpleOvertake", "TrafficJam")
@@ -46,7 +46,7 @@ EXAMINED = {
     "scenario_runner/InitAddEntityAction.xosc": {"simultaneous-edges": EDGES_APART},
     "scenario_runner/InitDeleteEntityAction.xosc": {
         "simultaneous-edges": EDGES_APART,
-        "entity-without-position": "two adversaries are deleted in Init, and never put anywhere",
+        "entity-without-position": "two adversaries are deleted in Init, and never placed",
     },
     "scenario_runner/LaneChangeSimple.xosc": {"unobserved-edge": AT_TIME_0},
     "scenario_runner/LaneOffsetActionExample.xosc": {"unobserved-edge": AT_TIME_0},
@@ -61,7 +61,7 @@ EXAMINED = {
 
 @pytest.fixture(scope="module")
 def maps() -> Iterator[None]:
-    """Where ScenarioRunner's maps lie."""
+    """Set the folder of the maps of ScenarioRunner."""
     patch = pytest.MonkeyPatch()
     patch.setenv("EIDRIVE_MAPS", f"{CORPORA}/carla_towns")
     yield
@@ -70,7 +70,7 @@ def maps() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def found(maps: None) -> dict[str, Counter[str]]:
-    """By file, how often each rule is broken."""
+    """Return the number of violations of each rule by file."""
     assert CORPORA is not None
     counts: dict[str, Counter[str]] = {}
     for path in sorted(CORPORA.rglob("*.xosc")):
@@ -85,15 +85,15 @@ def found(maps: None) -> dict[str, Counter[str]]:
     return counts
 
 
-def test_every_finding_was_examined(found: dict[str, Counter[str]]) -> None:
-    telling = {path: set(rules) - PLENTY for path, rules in found.items()}
-    assert {path: rules for path, rules in telling.items() if rules} == {
+def test_corpora_diagnostics_equal_the_examined_ones(found: dict[str, Counter[str]]) -> None:
+    relevant = {path: set(rules) - FREQUENT for path, rules in found.items()}
+    assert {path: rules for path, rules in relevant.items() if rules} == {
         path: set(rules) for path, rules in EXAMINED.items()
     }
 
 
-def test_most_files_break_no_rule_of_importance(found: dict[str, Counter[str]]) -> None:
+def test_corpora_most_files_violate_no_important_rule(found: dict[str, Counter[str]]) -> None:
     assert len(found) > 110
-    in_all = sum(found.values(), Counter())
-    assert in_all["no-stop-trigger"] == sum("no-stop-trigger" in rules for rules in found.values())
-    assert sum(not (set(rules) - PLENTY - {"lane-width", "geometry-gap"}) for rules in found.values()) > 100
+    total = sum(found.values(), Counter())
+    assert total["no-stop-trigger"] == sum("no-stop-trigger" in rules for rules in found.values())
+    assert sum(not (set(rules) - FREQUENT - {"lane-width", "geometry-gap"}) for rules in found.values()) > 100

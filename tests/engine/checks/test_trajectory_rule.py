@@ -1,4 +1,4 @@
-"""Checks of trajectories against the roads."""
+"""Rule about trajectories outside of roads."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ FILE = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2024-01-01T0
 
 
 @pytest.mark.parametrize(("end", "points"), [(1000.0, round(1000.0 / SPACING) + 1), (1.5e6, MAX_POINTS)])
-def test_trajectory_off_road_check_looks_at_a_bounded_number_of_points(
+def test_trajectory_off_road_checks_a_bounded_number_of_points(
     monkeypatch: pytest.MonkeyPatch, end: float, points: int
 ) -> None:
     counts = []
     outside = RoadLintContext.outside
 
-    def counted(self: RoadLintContext, x: Sequence[float], y: Sequence[float]) -> Sequence[float]:
+    def count_points(self: RoadLintContext, x: Sequence[float], y: Sequence[float]) -> Sequence[float]:
         counts.append(len(x))
         return outside(self, x, y)
 
-    monkeypatch.setattr(RoadLintContext, "outside", counted)
+    monkeypatch.setattr(RoadLintContext, "outside", count_points)
     report = check_scenario(FILE.format(end=end).encode())
     assert not report.errors
-    assert any("the trajectory 'far' leaves the road after" in str(warning) for warning in report.warnings)
+    assert any("trajectory 'far' leaves the road after" in str(warning) for warning in report.warnings)
     assert max(counts) == points

@@ -1,4 +1,4 @@
-"""What the rules say about triggers, worked out by hand from the standard's words on edges, delays and states."""
+"""Rules about triggers; expectations are derived by hand from the standard on edges, delays and states."""
 
 from collections.abc import Callable
 
@@ -64,14 +64,14 @@ Check = Callable[..., list[str]]
 
 
 def selecting(events: str, start: str = "") -> str:
-    """An act whose only actors are those who trigger it."""
+    """Return an act whose only actors are its triggering entities."""
     named = '<Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>'
     return act(events, start).replace(named, '<Actors selectTriggeringEntities="true"/>')
 
 
 @pytest.fixture
 def check(scenario_xml: Callable[..., bytes]) -> Check:
-    """The rules that a story of these acts breaks, in the order of the file."""
+    """Return a function for the rules that a story of acts violates, in the order of the file."""
 
     def found(*acts: str, **parts: str) -> list[str]:
         story = f'<Story name="story">{"".join(acts)}</Story>'
@@ -109,11 +109,11 @@ def check(scenario_xml: Callable[..., bytes]) -> Check:
         (time("notEqualTo", 0), "rising", []),
     ],
 )
-def test_time_at_the_start_of_an_act(check: Check, condition: str, edge: str, expected: list[str]) -> None:
+def test_act_start_time_conditions(check: Check, condition: str, edge: str, expected: list[str]) -> None:
     assert check(act(event("go"), trigger(when(condition, edge)))) == expected
 
 
-def test_an_event_first_looks_when_its_act_runs(check: Check) -> None:
+def test_event_first_evaluation_is_at_the_start_of_its_act(check: Check) -> None:
     positive = when(time(GREATER, 0), "rising")
     assert check(act(event("go", trigger(positive)), trigger(when(time(AT_LEAST, 0))))) == []
     assert check(act(event("go", trigger(positive)), trigger(when(time(GREATER, 0))))) == ["unobserved-edge"]
@@ -122,7 +122,7 @@ def test_an_event_first_looks_when_its_act_runs(check: Check) -> None:
     ]
 
 
-def test_the_stop_trigger_of_an_act_first_looks_when_it_runs(check: Check) -> None:
+def test_act_stop_trigger_first_evaluation_is_at_its_start(check: Check) -> None:
     late = when(time(GREATER, 5), "rising")
     assert check(act(event("go"), trigger(late), trigger(late, kind="StopTrigger"))) == ["unobserved-edge"]
     assert check(act(event("go"), "", trigger(late, kind="StopTrigger"))) == []
@@ -141,17 +141,17 @@ def test_the_stop_trigger_of_an_act_first_looks_when_it_runs(check: Check) -> No
         (when(time(LESS, 5), "falling", 4) + when(time(GREATER, 8)), []),
     ],
 )
-def test_conditions_of_one_group(check: Check, group: str, expected: list[str]) -> None:
+def test_contradictory_group_of_time_conditions(check: Check, group: str, expected: list[str]) -> None:
     assert check(act(event("go", trigger(group)))) == expected
 
 
-def test_another_group_may_still_fire(check: Check) -> None:
+def test_trigger_with_another_possible_group_is_reachable(check: Check) -> None:
     both = trigger(when(time(LESS, -1)), when(time(GREATER, 5)))
     follower = event("follower", trigger(when(state("event", "go", "endTransition"))))
     assert check(act(event("go", both) + follower)) == ["impossible-condition"]
 
 
-def test_events_that_wait_for_each_other(check: Check) -> None:
+def test_events_with_circular_wait_are_unreachable(check: Check) -> None:
     after = {name: when(state("event", name, "endTransition")) for name in ("one", "other")}
     circle = event("one", trigger(after["other"])) + event("other", trigger(after["one"]))
     assert check(act(circle)) == ["unreachable", "unreachable"]
@@ -159,14 +159,14 @@ def test_events_that_wait_for_each_other(check: Check) -> None:
     assert check(act(opened)) == []
 
 
-def test_an_event_that_repeats_itself(check: Check) -> None:
+def test_event_with_repetitions_may_wait_for_itself(check: Check) -> None:
     again = trigger(when(time(GREATER, 5)), when(state("event", "go", "endTransition")))
     assert check(act(event("go", again, count=3))) == []
     assert check(act(event("go", again, count=1))) == ["unreachable"]
     assert check(act(event("go", trigger(when(state("event", "go", "endTransition"))), count=3))) == ["unreachable"]
 
 
-def test_what_waits_for_an_element_that_never_starts(check: Check) -> None:
+def test_condition_on_unreachable_element_is_unreachable(check: Check) -> None:
     dead = event("dead", trigger(when(time(LESS, -1))))
     first = act(dead + event("alive"), name="first")
     ended = act(event("go"), trigger(when(state("act", "first", "endTransition"))), name="second")
@@ -176,12 +176,12 @@ def test_what_waits_for_an_element_that_never_starts(check: Check) -> None:
     assert check(stopped, complete) == ["impossible-condition"]
 
 
-def test_nothing_is_said_about_what_is_below_an_unreachable_act(check: Check) -> None:
+def test_elements_below_unreachable_act_are_not_reported(check: Check) -> None:
     below = event("go", trigger(when(time(LESS, -1))))
     assert check(act(below, trigger(when(time(LESS, -1))))) == ["impossible-condition"]
 
 
-def test_times_add_up_along_a_chain_of_events(check: Check) -> None:
+def test_earliest_times_accumulate_along_chained_events(check: Check) -> None:
     chain = event("first", trigger(when(time(GREATER, 10))))
     chain += event("second", trigger(when(state("event", "first", "endTransition")) + when(time(LESS, 8))))
     assert check(act(chain)) == ["contradictory-group"]
@@ -201,11 +201,11 @@ def test_times_add_up_along_a_chain_of_events(check: Check) -> None:
         ("skipTransition", "none", ["impossible-state"]),
     ],
 )
-def test_an_event_looks_at_the_act_around_it(check: Check, what: str, edge: str, expected: list[str]) -> None:
+def test_event_condition_on_its_own_act(check: Check, what: str, edge: str, expected: list[str]) -> None:
     assert check(act(event("go", trigger(when(state("act", "act", what), edge))))) == expected
 
 
-def test_what_can_be_skipped_and_stopped(check: Check) -> None:
+def test_skip_and_stop_transitions_require_matching_elements(check: Check) -> None:
     waits = {
         what: event("waits", trigger(when(state("event", "rival", what))))
         for what in ("skipTransition", "stopTransition")
@@ -218,13 +218,13 @@ def test_what_can_be_skipped_and_stopped(check: Check) -> None:
     assert check(act(rival + waits["stopTransition"], "", trigger(when(time(GREATER, 5)), kind="StopTrigger"))) == []
 
 
-def test_the_end_of_an_action_that_has_none(check: Check) -> None:
+def test_end_transition_of_continuous_action_is_impossible(check: Check) -> None:
     waits = event("waits", trigger(when(state("action", "rival action", "endTransition"))))
     assert check(act(event("rival", target=FOREVER) + waits)) == ["impossible-state"]
     assert check(act(event("rival") + waits)) == []
 
 
-def test_edges_of_parameters_that_nobody_sets(
+def test_edge_of_constant_parameter_is_unobserved(
     check: Check, parameters_xml: Callable[..., str], scenario_xml: Callable[..., bytes]
 ) -> None:
     declarations = parameters_xml(Mode=("integer", "1"))
@@ -250,16 +250,16 @@ def test_edges_of_parameters_that_nobody_sets(
         ('<TraveledDistanceCondition value="10"/>', []),
     ],
 )
-def test_quantities_of_entities(check: Check, condition: str, expected: list[str]) -> None:
+def test_entity_conditions_with_impossible_values(check: Check, condition: str, expected: list[str]) -> None:
     assert check(act(event("go", trigger(when(entity(condition), "rising"))))) == expected
 
 
-def test_no_way_at_all_is_traveled_at_once(check: Check) -> None:
+def test_traveled_distance_of_zero_has_no_edge(check: Check) -> None:
     start = trigger(when(entity('<TraveledDistanceCondition value="0"/>'), "rising"))
     assert check(act(event("go", start))) == ["unobserved-edge"]
 
 
-def test_conditions_on_who_is_nowhere(check: Check) -> None:
+def test_conditions_on_unplaced_entities_are_impossible(check: Check) -> None:
     moving = trigger(when(entity('<SpeedCondition rule="greaterThan" value="5"/>')))
     assert check(act(event("go", moving)), init="") == ["entity-without-position", "impossible-condition"]
     added = """<Event name="add" priority="parallel"><Action name="add"><GlobalAction><EntityAction entityRef="Ego">
@@ -268,36 +268,36 @@ def test_conditions_on_who_is_nowhere(check: Check) -> None:
     assert check(act(event("go", moving) + added), init="") == []
 
 
-def test_the_time_of_day_needs_an_environment(check: Check) -> None:
+def test_time_of_day_without_environment_is_impossible(check: Check) -> None:
     noon = (
         '<ByValueCondition><TimeOfDayCondition rule="greaterThan" dateTime="2025-01-01T12:00:00"/></ByValueCondition>'
     )
     assert check(act(event("go", trigger(when(noon))))) == ["impossible-condition"]
 
 
-def test_two_edges_at_one_instant(check: Check) -> None:
+def test_simultaneous_edges_are_reported(check: Check) -> None:
     fast = when(entity('<SpeedCondition rule="greaterThan" value="5"/>'), "rising")
     ended = when(state("event", "other", "endTransition"), "rising")
     assert check(act(event("other") + event("go", trigger(fast + ended)))) == ["simultaneous-edges"]
     assert check(act(event("other") + event("go", trigger(fast, ended)))) == []
 
 
-def test_criteria_in_the_stop_trigger_are_no_conditions(check: Check) -> None:
+def test_stop_trigger_criteria_are_not_conditions(check: Check) -> None:
     criterion = when(parameter(""), "rising").replace("a condition", "criteria_CollisionTest")
     assert check(act(event("go")), stop=f"<ConditionGroup>{criterion}</ConditionGroup>") == []
 
 
-def test_a_storyboard_without_end(check: Check) -> None:
+def test_storyboard_without_stop_trigger_is_reported(check: Check) -> None:
     assert check(act(event("go")), stop="") == ["no-stop-trigger"]
 
 
-def test_what_the_road_network_has_need_not_be_placed(check: Check, scenario_xml: Callable[..., bytes]) -> None:
+def test_external_objects_need_no_position(check: Check, scenario_xml: Callable[..., bytes]) -> None:
     post = '<ScenarioObject name="Ego"><ExternalObjectReference name="post"/></ScenarioObject>'
     near = trigger(when(entity('<SpeedCondition rule="greaterThan" value="5"/>')))
     assert check(act(event("go", near)), init="", entities=post) == []
 
 
-def test_who_triggers_an_act_acts_in_it_and_who_triggers_an_event_does_not(check: Check) -> None:
+def test_select_triggering_entities_applies_to_acts_only(check: Check) -> None:
     fast = trigger(when(entity('<SpeedCondition rule="greaterThan" value="1"/>')))
     assert check(selecting(event("go"), fast)) == []
     assert check(selecting(event("go", fast))) == ["no-actors"]

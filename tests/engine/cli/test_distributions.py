@@ -65,8 +65,8 @@ def test_run_of_distribution_executes_every_run(eidrive: Eidrive, six: Path) -> 
     assert {line["scenario"] for line in lines} == {"passing_by"}
     assert f"6 runs in {six}: 2 passed, 2 not passed, 2 excluded by constraints" in result.stderr
     assert (
-        f"run 4 (OtherY=9,End=2) is skipped: {six}:6: the parameter 'OtherY' is '9', outside its constraints; "
-        "it has to be lessThan 9"
+        f"run 4 (OtherY=9,End=2) is skipped: {six}:6: parameter 'OtherY' is '9', outside its constraints; "
+        "expected lessThan 9"
     ) in result.stderr
 
 
@@ -136,7 +136,7 @@ def test_invalid_value_of_first_run_ends_distribution(
     result = eidrive("run", path, "--json")
     assert result.exit_code == code
     assert len(result.stdout.splitlines()) == completed
-    assert f"{path}:6: the parameter 'OtherY' is 'fast', which is not a number" in result.stderr
+    assert f"{path}:6: parameter 'OtherY' is 'fast', which is not a number" in result.stderr
 
 
 def test_max_runs_of_scenario_is_invalid_input(eidrive: Eidrive, passing_by: Path) -> None:
@@ -166,10 +166,10 @@ class TestCheck:
         result = eidrive("check", path)
         assert result.exit_code == 2
         lines = result.stdout.splitlines()
-        assert f"{path}:6: the parameter 'OtherY' is 'far', which is not a number; write it as 12.5 or 1e-3" in lines
-        assert f"{path}:7: the parameter 'End' is 'late', which is not a number; write it as 12.5 or 1e-3" in lines
+        assert f"{path}:6: parameter 'OtherY' is 'far', which is not a number; write it as 12.5 or 1e-3" in lines
+        assert f"{path}:7: parameter 'End' is 'late', which is not a number; write it as 12.5 or 1e-3" in lines
         assert (
-            f"{path}:6: the parameter 'OtherY' is '9', outside its constraints; it has to be lessThan 9; "
+            f"{path}:6: parameter 'OtherY' is '9', outside its constraints; expected lessThan 9; "
             "such runs are skipped (warning)"
         ) in lines
         assert lines[-1] == "1 file, 2 errors, 1 warning"
@@ -185,7 +185,7 @@ class TestCheck:
         result = eidrive("check", path)
         lines = [line for line in result.stdout.splitlines() if "impossible-condition" in line]
         assert len(lines) == 1
-        assert "in run 1: simulation time < 0 s never counts as true" in lines[0]
+        assert "in run 1: simulation time < 0 s is never true" in lines[0]
         assert result.exit_code == 0
         assert "impossible-condition" not in eidrive("check", path, "--ignore", "impossible-condition").stdout
 

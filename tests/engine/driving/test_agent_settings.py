@@ -138,7 +138,7 @@ WRONG = [
     ([("conflict_area", "5")], "an area is [x0, x1, y0, y1]"),
     ([("conflict_area", "[1, 2")], "s.xosc:12: property 'conflict_area' is '[1, 2', which is not valid YAML"),
     ([("range", "2001-13-45")], "s.xosc:12: property 'range' is '2001-13-45', which is not valid YAML: month must be"),
-    ([("sensors", "{truth: {range: 5}, truth: {}}")], "not valid YAML: 'truth' stands here twice"),
+    ([("sensors", "{truth: {range: 5}, truth: {}}")], "not valid YAML: duplicate key 'truth'"),
     ([("sensors", "truth, radar")], "sensor 'radar' needs a kind"),
     ([("sensors", "{a: {kind: truth}, b: {kind: truth}}")], "a station has one truth sensor, found a, b"),
     (

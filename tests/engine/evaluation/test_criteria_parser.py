@@ -180,7 +180,7 @@ def test_invalid_yaml_is_reported() -> None:
 
 def test_duplicate_yaml_key_is_reported() -> None:
     (diagnostic,) = diagnostics("collision: {of: A}\ncollision: {of: B}")
-    assert diagnostic.startswith("a.xosc:11: not valid YAML: 'collision' stands here twice")
+    assert diagnostic.startswith("a.xosc:11: not valid YAML: duplicate key 'collision'")
 
 
 @pytest.mark.parametrize(("kind", "passed"), [("exitSuccess", True), ("exitFailure", False)])

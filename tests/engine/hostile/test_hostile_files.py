@@ -76,16 +76,16 @@ def test_read_regular_file_whose_size_is_not_stated_is_bounded() -> None:
 
 
 @needs_pipes
-def test_check_and_run_pipes_and_devices_in_the_place_of_files_are_refused(write: Write, tmp_path: Path) -> None:
+def test_check_and_run_pipes_and_devices_as_files_are_refused(write: Write, tmp_path: Path) -> None:
     pipe = tmp_path / "pipe.yaml"
     os.mkfifo(pipe)
     for name in ("C.xosc", "roads.xodr", "weights.npz", "weights.onnx", "trace.csv"):
         (tmp_path / name).symlink_to(pipe)
     profile = tmp_path / "profile.yaml"
     profile.write_text("delay: {kind: trace, file: trace.csv}\n")
-    assert "no road file" in output_of(write(road="roads.xodr"))
+    assert "is neither in the folder of the scenario" in output_of(write(road="roads.xodr"))
     assert "no file" in output_of(write(channel=str(pipe)))
-    assert "the path leads to a pipe; a regular file is expected" in output_of(write(channel=str(profile)))
+    assert "the path leads to a pipe (expected a regular file)" in output_of(write(channel=str(profile)))
     for suffix, more in (("npz", ""), ("onnx", ", classes: [car], input_size: [96, 64]")):
         given = {"detector": "yolov5", "detector_settings": f"{{weights: {tmp_path}/weights.{suffix}{more}}}"}
         assert "no file" in output_of(write(given))
@@ -102,13 +102,13 @@ def test_check_and_run_a_pipe_as_catalog_does_not_block(write: Write, tmp_path: 
     content = path.read_text()
     controller = content[content.index("<Controller ") : content.index("</Controller>") + len("</Controller>")]
     path.write_text(content.replace(controller, '<CatalogReference catalogName="C" entryName="e"/>'))
-    assert f"{tmp_path}/C.xosc: cannot be read: the path leads to a pipe" in output_of(path)
+    assert f"{tmp_path}/C.xosc: cannot read: the path leads to a pipe" in output_of(path)
     assert definition(tmp_path / "C.xosc") == "unreadable"
     assert CliRunner().invoke(app, ["check", str(tmp_path)]).exit_code == 2
 
 
 @pytest.mark.parametrize("column", ["0", "1", "9", "hunter2", "root"])
-def test_check_and_run_a_file_that_is_no_trace_is_not_quoted(write: Write, tmp_path: Path, column: str) -> None:
+def test_check_and_run_invalid_trace_is_not_quoted(write: Write, tmp_path: Path, column: str) -> None:
     secret = tmp_path / "secret"
     for content in (f"{SECRET}\n", f"a,b\n1,{SECRET}\n", f"-4711,{SECRET}\n", '"' + SECRET):
         secret.write_text(content)
@@ -203,7 +203,7 @@ def array(value: np.ndarray) -> bytes:
     return stream.getvalue()
 
 
-def test_read_arrays_are_those_that_numpy_wrote() -> None:
+def test_read_arrays_returns_arrays_of_numpy_files() -> None:
     stream = BytesIO()
     values = {
         "a": np.arange(6.0).reshape(2, 3),
@@ -218,7 +218,7 @@ def test_read_arrays_are_those_that_numpy_wrote() -> None:
         assert found[name].dtype == value.dtype
 
 
-def test_read_arrays_objects_lies_and_bombs_are_refused() -> None:
+def test_read_arrays_hostile_archives_are_refused() -> None:
     with pytest.raises(ValueError, match="Python objects"):
         read_arrays(archive(a=array(np.array([{}], dtype=object))))
     immense = array(np.zeros(3)).replace(b"(3,)", b"(9999999999999,)".ljust(4))

@@ -114,7 +114,7 @@ def _owner(model: type[BaseModel], field: str) -> type[BaseModel]:
     return [kind for kind in model.__mro__ if field in getattr(kind, "model_fields", {})][-1]
 
 
-def test_tables_hold_every_setting_with_a_number() -> None:
+def test_tables_contain_every_numeric_setting() -> None:
     roots: list[type[BaseModel]] = [AgentSettings, Weather]
     for group in ("detectors", "fusion", "criteria", "planners"):
         kinds = [registry(group).load(name, object) for name in registry(group)]
@@ -135,7 +135,7 @@ def test_tables_hold_every_setting_with_a_number() -> None:
     assert missing == with_files  # weights and a delay trace, which have tests of their own
 
 
-def test_hostile_value_in_any_setting_is_accepted_or_refused() -> None:
+def test_setting_with_hostile_value_is_accepted_or_refused() -> None:
     counts = {True: 0, False: 0}
     for kind, name, what, data in all_variants():
         try:
@@ -148,7 +148,7 @@ def test_hostile_value_in_any_setting_is_accepted_or_refused() -> None:
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the limits of a trial need Linux")
 @pytest.mark.timeout(0)
-def test_runs_with_hostile_values_that_are_accepted_end_without_internal_error_or_hang(tmp_path: Path) -> None:
+def test_runs_with_accepted_hostile_values_end_without_internal_error(tmp_path: Path) -> None:
     """In a process with one thread: each trial is a fork, and locks of other threads would stay locked in it."""
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     done = subprocess.run(

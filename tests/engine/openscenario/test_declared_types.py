@@ -1,4 +1,4 @@
-"""Values of variables and parameters against the types that are declared."""
+"""Check of variable and parameter values against their declared types."""
 
 from collections.abc import Callable
 
@@ -20,20 +20,22 @@ ADD = """<GlobalAction><VariableAction variableRef="{name}"><ModifyAction><Rule>
 @pytest.mark.parametrize(
     ("speed", "init", "message"),
     [
-        ("fast", "", "the variable 'speed' is declared as double, but its value is 'fast'; it is taken as a text"),
-        ("1", SET.format(name="speed", value="fast"), "'speed' is declared as double, and here set to 'fast'"),
-        ("1", SET.format(name="count", value="1.5"), "'count' is declared as int, and here set to '1.5'"),
-        ("1", ADD.format(name="mood"), "'mood' is declared as string, and here calculated with; declare it as double"),
+        ("fast", "", "variable 'speed' is declared as double, but its value is 'fast'; the value is used as a text"),
+        ("1", SET.format(name="speed", value="fast"), "'speed' is declared as double, but set to 'fast'"),
+        ("1", SET.format(name="count", value="1.5"), "'count' is declared as int, but set to '1.5'"),
+        ("1", ADD.format(name="mood"), "'mood' is declared as string, but modified as a number; declare it as double"),
     ],
 )
-def test_what_does_not_fit_is_told(scenario_xml: Callable[..., bytes], speed: str, init: str, message: str) -> None:
+def test_values_of_other_types_are_warnings(
+    scenario_xml: Callable[..., bytes], speed: str, init: str, message: str
+) -> None:
     (warning,) = load_scenario(scenario_xml(declarations=VARIABLES.format(speed=speed), init=init)).warnings
     assert message in str(warning)
     assert warning.line is not None
 
 
-def test_what_fits_is_not(scenario_xml: Callable[..., bytes]) -> None:
-    """Truth values may have the capitals that Python writes."""
+def test_values_of_declared_types_are_accepted(scenario_xml: Callable[..., bytes]) -> None:
+    """Booleans may be capitalized, as Python writes them."""
     init = "".join(
         (
             SET.format(name="speed", value="1e-3"),

@@ -42,7 +42,7 @@ from eidrive_scenario.openscenario.values.expressions import (
         ("false or false", False),
     ],
 )
-def test_value(text: str, value: float) -> None:
+def test_expression_has_expected_value(text: str, value: float) -> None:
     assert evaluate(text, {"a": 5, "b": 2, "flag": True}) == pytest.approx(value)
 
 
@@ -81,24 +81,24 @@ def test_value(text: str, value: float) -> None:
         "1+" * MAX_LENGTH + "1",
     ],
 )
-def test_what_is_no_expression_is_refused(text: str) -> None:
+def test_invalid_expression_raises_error(text: str) -> None:
     with pytest.raises(ExpressionError):
         evaluate(text, {})
 
 
-def test_a_misspelt_function_is_named_with_its_nearest() -> None:
+def test_misspelled_function_error_suggests_similar_name() -> None:
     with pytest.raises(ExpressionError) as caught:
         evaluate("squrt(4)", {})
     assert caught.value.hint == "did you mean 'sqrt'?"
 
 
-def test_a_bare_word_may_lack_its_dollar() -> None:
+def test_bare_word_error_suggests_dollar_sign() -> None:
     with pytest.raises(ExpressionError) as caught:
         evaluate("speed + 1", {"speed": 3})
     assert caught.value.hint == "a parameter begins with $"
 
 
-def test_text_is_joined_where_a_bare_word_stands() -> None:
+def test_bare_words_are_concatenated() -> None:
     text = "BrakeCondition_HWT + _ + $HeadwayTime"
     assert joins_text(text, {"HeadwayTime": 1.5})
     assert concatenate(text, {"HeadwayTime": "1.5"}) == "BrakeCondition_HWT_1.5"
@@ -106,7 +106,7 @@ def test_text_is_joined_where_a_bare_word_stands() -> None:
 
 
 @given(st.text(alphabet="0123456789.+-*/%() ,eE_$abcxyzmaxinpowsqrtand'\"[]{}:;=<>!@\\\n", max_size=60))
-def test_nothing_but_our_error_comes_out(text: str) -> None:
+def test_random_expressions_raise_only_expression_errors(text: str) -> None:
     try:
         result = evaluate(text, {"a": 1, "b": 2.5, "c": True})
     except ExpressionError:
@@ -115,7 +115,7 @@ def test_nothing_but_our_error_comes_out(text: str) -> None:
 
 
 @given(st.text(max_size=80))
-def test_no_text_at_all_reaches_python(text: str) -> None:
+def test_python_names_in_expressions_raise_error(text: str) -> None:
     try:
         assert isinstance(evaluate(text, {}), int | float)
     except ExpressionError:

@@ -1,6 +1,6 @@
-"""100,000 hostile texts as expressions and as parameters: they bring out a value or our error, quickly, and no Python.
+"""100,000 hostile texts as expressions and parameters: each gives a value or an ExpressionError, without Python code.
 
-Python's own audit hooks (PEP 578) watch: any import, opened file, executed code object or looked-up frame would be an
+The audit hooks of Python (PEP 578) record: any import, opened file, executed code object or looked-up frame would be an
 event. The seed is fixed; the texts are the same in every run.
 """
 
@@ -31,7 +31,7 @@ from eidrive_scenario.openscenario.values.expressions import (
 )
 
 HARMLESS = {"compile", "builtins.id"}
-"""Events of parsing an expression, and of looking through its tree; to execute a code object is another event."""
+"""Audit events of parsing an expression and of traversing its tree; the execution of code is a different event."""
 
 Build = Callable[..., bytes]
 Text = Callable[..., str]
@@ -39,7 +39,7 @@ Text = Callable[..., str]
 TEXTS = 100_000
 LOADED = 4_000
 SLOWEST = 0.5
-"""Seconds of processor time for one text; a right answer takes less than a thousandth of one, the longest 0.03."""
+"""Maximum processor time of one text [s]; a valid result takes less than 0.001 s, the slowest one 0.03 s."""
 MEMORY = 64 * 2**20
 PARAMETERS = {"a": 1, "b": 2.5, "c": True, "d": 10**300, "e2": -0.0}
 
@@ -153,7 +153,7 @@ WORDS += [
 
 
 def hostile(count: int, seed: int) -> Iterator[str]:
-    """Breakouts, whole, cut and glued together; random words; nests; numbers that grow."""
+    """Yield breakouts, complete, truncated and combined; random words; nested texts; growing numbers."""
     dice = random.Random(seed)
     kinds: list[Callable[[], str]] = [
         lambda: dice.choice(BREAKOUTS),
@@ -174,7 +174,7 @@ def hostile(count: int, seed: int) -> Iterator[str]:
 
 
 def cut(dice: random.Random, text: str) -> str:
-    """One part left out, or one character changed."""
+    """Return a text with one part removed or one character changed."""
     start = dice.randrange(len(text))
     return text[:start] + dice.choice(["", chr(dice.randrange(32, 127))]) + text[start + dice.randrange(3) :]
 
@@ -187,8 +187,8 @@ def nested(dice: random.Random) -> str:
     return opening * depth + dice.choice(["1", "$a", "$d", ""]) + closing * (depth - dice.choice([0, 0, 0, 1]))
 
 
-class Watch:
-    """What Python's audit hooks report while it is on. A hook cannot be taken away again, so there is one only."""
+class AuditLog:
+    """Audit events of Python while enabled. There is a single hook, as hooks cannot be removed."""
 
     def __init__(self) -> None:
         self.on = False
@@ -196,60 +196,60 @@ class Watch:
         sys.addaudithook(self._note)
 
     def _note(self, event: str, arguments: tuple[object, ...]) -> None:
-        # What is kept of an event must not keep frames alive.
+        # The stored part of an event must not keep frames alive.
         if self.on and event not in HARMLESS:
             self.events.add(event if event != "import" else f"import {arguments[0]}")
 
 
 @pytest.fixture(scope="module")
-def watch() -> Watch:
-    return Watch()
+def audit_log() -> AuditLog:
+    return AuditLog()
 
 
-def test_the_watch_sees_what_python_does(watch: Watch) -> None:
-    watch.on = True
+def test_audit_hook_records_python_operations(audit_log: AuditLog) -> None:
+    audit_log.on = True
     eval("__import__('this_module_is_nowhere') if 0 else open('/dev/null').close()")
-    watch.on = False
-    assert {"exec", "open"} <= watch.events
-    watch.events.clear()
+    audit_log.on = False
+    assert {"exec", "open"} <= audit_log.events
+    audit_log.events.clear()
 
 
 @pytest.mark.timeout(300)
-def test_no_expression_reaches_python(watch: Watch) -> None:
+def test_expressions_execute_no_python_code(audit_log: AuditLog) -> None:
     for text in BREAKOUTS:
-        answer(text)  # what is imported late by what the answer needs itself is imported now
+        has_value(text)  # performs late imports of the evaluation
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     values = 0
     slowest = (0.0, "")
-    watch.on = True
+    audit_log.on = True
     try:
         for text in hostile(TEXTS, 1):
             started = time.thread_time()
-            values += answer(text)
+            values += has_value(text)
             spent = time.thread_time() - started
-            if spent >= SLOWEST:  # a collection of garbage that other tests left costs as much, but only once
+            if spent >= SLOWEST:  # a garbage collection after other tests takes as long, but only once
                 started = time.thread_time()
-                answer(text)
+                has_value(text)
                 spent = min(spent, time.thread_time() - started)
             slowest = max(slowest, (spent, text))
     finally:
-        watch.on = False
-    assert watch.events == set()
+        audit_log.on = False
+    assert audit_log.events == set()
     assert slowest[0] < SLOWEST, slowest
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MEMORY
     assert values > TEXTS / 100, "some are expressions after all"
 
 
 @pytest.mark.parametrize("text", ["or2.5in 1", "'\\d'", "1 is 1", "(1)(2)"])
-def test_python_warns_nobody(text: str) -> None:
+def test_expressions_emit_no_python_warnings(text: str) -> None:
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
-        assert not answer(text)
+        assert not has_value(text)
     assert seen == []
 
 
-def answer(text: str) -> bool:
-    """Whether the text has a value; the only other answer that it may have is our error."""
+def has_value(text: str) -> bool:
+    """Whether the text has a value; the only other permitted result is ExpressionError."""
     try:
         result = evaluate(text, PARAMETERS)
     except ExpressionError:
@@ -259,7 +259,7 @@ def answer(text: str) -> bool:
     return True
 
 
-def test_no_text_is_joined_to_anything_but_a_text() -> None:
+def test_concatenation_accepts_only_texts() -> None:
     texts = {name: str(value) for name, value in PARAMETERS.items()}
     for text in hostile(TEXTS // 10, 2):
         assert joins_text(text, PARAMETERS) in (True, False)
@@ -267,13 +267,15 @@ def test_no_text_is_joined_to_anything_but_a_text() -> None:
             assert len(concatenate(text, texts)) <= len(text) + 310 * text.count("$")
 
 
-def test_no_scenario_reaches_python(watch: Watch, scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
-    """The same texts where a file has them: a parameter's default, a value from outside, any attribute."""
+def test_scenario_expressions_execute_no_python_code(
+    audit_log: AuditLog, scenario_xml: Build, story_xml: Text, parameters_xml: Text
+) -> None:
+    """The texts are parameter defaults, assigned values and attributes."""
     dice = random.Random(3)
     kinds = ["double", "int", "string", "boolean", "dateTime", "unsignedShort", "integer"]
     load_scenario(scenario_xml(declarations=parameters_xml(P=("double", "1")), story=story_xml()))
     taken = refused = 0
-    watch.on = True
+    audit_log.on = True
     try:
         for text in hostile(LOADED, 3):
             written = quoteattr("".join(each for each in text if each in "\t\n" or " " <= each < "\ud800"))[1:-1]
@@ -287,15 +289,15 @@ def test_no_scenario_reaches_python(watch: Watch, scenario_xml: Build, story_xml
             except ScenarioError:
                 refused += 1
     finally:
-        watch.on = False
-    assert watch.events == set()
+        audit_log.on = False
+    assert audit_log.events == set()
     assert taken > LOADED / 20
     assert refused > LOADED / 4
 
 
 @settings(deadline=None, max_examples=500)
 @given(st.text(max_size=MAX_LENGTH + 50), st.dictionaries(st.text("abc_", min_size=1), st.floats() | st.integers()))
-def test_no_value_of_a_parameter_reaches_python(text: str, parameters: dict[str, float]) -> None:
+def test_parameter_values_execute_no_python_code(text: str, parameters: dict[str, float]) -> None:
     for expression in (
         text,
         *(f"${name} * 2 + sin(${name})" for name in parameters),

@@ -1,4 +1,4 @@
-"""Catalogs, roads and scenarios of the library, named from any folder by paths that begin with eidrive_library."""
+"""Paths that begin with eidrive_library: catalogs, roads and scenarios of the library from any folder."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_library_catalog_is_found_from_any_folder(tmp_path: Path, place: str) ->
     assert CliRunner().invoke(app, ["run", str(path)]).exit_code == 0
 
 
-def test_copy_beside_the_scenario_wins(tmp_path: Path) -> None:
+def test_copy_in_scenario_folder_takes_precedence(tmp_path: Path) -> None:
     path = write(tmp_path)
     shutil.copytree(library_path() / "catalogs", tmp_path / PLACE)
     copy = tmp_path / PLACE / "vehicles.xosc"
@@ -75,7 +75,7 @@ def test_file_stays_valid_against_the_schema(tmp_path: Path) -> None:
     schema.assertValid(etree.parse(write(tmp_path)))
 
 
-def test_distribution_names_scenario_of_the_library(tmp_path: Path) -> None:
+def test_distribution_may_refer_to_library_scenario(tmp_path: Path) -> None:
     path = tmp_path / "speeds.xosc"
     path.write_text(
         """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
@@ -100,22 +100,22 @@ def test_distribution_names_scenario_of_the_library(tmp_path: Path) -> None:
         "catalogs",
     ],
 )
-def test_other_paths_count_from_the_folder(tmp_path: Path, path: str) -> None:
+def test_other_paths_are_relative_to_the_folder(tmp_path: Path, path: str) -> None:
     assert place_of(path, tmp_path) == tmp_path / path
 
 
-def test_broken_link_beside_the_scenario_is_not_replaced(tmp_path: Path) -> None:
+def test_broken_link_in_scenario_folder_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "eidrive_library").mkdir()
     (tmp_path / PLACE).symlink_to(tmp_path / "gone")
     assert place_of(PLACE, tmp_path) == tmp_path / PLACE
 
 
-def test_missing_catalog_is_reported_with_that_of_the_library(tmp_path: Path) -> None:
+def test_missing_catalog_error_suggests_library_path(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="correct the Directory; that of the library is eidrive_library/catalogs"):
         load_scenario(write(tmp_path, "../catalogs"))
 
 
-def test_list_catalogs_names_entries_with_sizes_and_the_way_to_refer() -> None:
+def test_list_catalogs_prints_sizes_and_reference_path() -> None:
     printed = CliRunner().invoke(app, ["list", "catalogs"]).stdout.splitlines()
     bus = next(line for line in printed if line.split()[1:2] == ["bus"])
     assert "12.13 x 2.55 x 3.12 m" in bus
@@ -131,7 +131,7 @@ REAL = {
     "bus": (12.135, 2.550, 3.120),
     "van": (5.932, 2.020, 2.623),
 }
-"""Length, width, height [m] by the makers; of lincoln_mkz_2017 with mirrors."""
+"""Length, width, height [m] by the manufacturers; of lincoln_mkz_2017 with mirrors."""
 BLUEPRINTS = {
     "firetruck": (8.468, 2.891, 3.827),
     "ambulance": (6.366, 2.351, 2.431),
@@ -139,12 +139,12 @@ BLUEPRINTS = {
     "seat_leon": (4.19, 1.82, 1.47),
     "tesla_model3": (4.79, 2.16, 1.49),
 }
-"""The same of CARLA 0.9.14, which the entries claim to be."""
+"""Length, width, height [m] of the blueprints of CARLA 0.9.14 that the entries represent."""
 LEGAL_WIDTH, LEGAL_HEIGHT = 2.55, 4.0
 """EU directive 96/53/EC [m]."""
 
 
-def test_vehicles_have_the_sizes_that_they_claim() -> None:
+def test_library_vehicles_have_documented_sizes() -> None:
     sizes = {entry.name: entry.size for entry in library_catalog_entries() if entry.kind == "Vehicle"}
     for name, size in REAL.items():
         assert sizes[name] == pytest.approx(size, rel=0.025), name

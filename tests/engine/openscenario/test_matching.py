@@ -24,21 +24,21 @@ def accepts(machine: Automaton, word: str) -> bool:
     ("model", "pattern"),
     [(SEQUENCE, "a?b+c"), (CHOICE, "a|bb+"), (NESTED, "a(b|c)?"), (REPEATED, "(a|b)*")],
 )
-def test_automaton_accepts_what_the_model_says(model: Group, pattern: str) -> None:
+def test_automaton_accepts_sequences_of_the_content_model(model: Group, pattern: str) -> None:
     machine = automaton(model)
     words = ("".join(word) for length in range(6) for word in itertools.product("abc", repeat=length))
     for word in words:
         assert accepts(machine, word) == bool(re.fullmatch(pattern, word)), word
 
 
-def test_missing_names_what_has_to_follow() -> None:
+def test_missing_returns_required_following_children() -> None:
     machine = automaton(SEQUENCE)
     assert machine.missing(0) == [("b",), ("c",)]
     assert automaton(NESTED).missing(0) == [("a",)]
     assert automaton(Group((Leaf("a", 1, 1), Leaf("b", 1, 1)), exclusive=True)).missing(0) == [("a", "b")]
 
 
-def test_skipped_names_what_should_have_come_before() -> None:
+def test_skipped_returns_required_preceding_children() -> None:
     machine = automaton(SEQUENCE)
     assert machine.skipped(0, "c") == ("b",)
     assert machine.skipped(0, "a") == ()

@@ -10,14 +10,14 @@ from eidrive_scenario.openscenario.reading.schema import rules
 CLASSES = sorted(model.Element.__subclasses__(), key=lambda cls: cls.__name__)
 
 
-def test_lines_do_not_count_when_elements_are_compared() -> None:
+def test_element_comparison_ignores_lines() -> None:
     one = model.WorldPosition(x=1.0, y=2.0, line=3, source="a.xosc")
     other = model.WorldPosition(x=1.0, y=2.0, line=4, source="b.xosc")
     assert one == other
     assert hash(one) == hash(other)
 
 
-def test_elements_are_frozen_and_travel_between_processes() -> None:
+def test_elements_are_frozen_and_picklable() -> None:
     position = model.Position(world_position=model.WorldPosition(x=1.0, y=2.0, line=7))
     with pytest.raises(dataclasses.FrozenInstanceError):
         position.world_position = None  # type: ignore[misc]
@@ -26,21 +26,21 @@ def test_elements_are_frozen_and_travel_between_processes() -> None:
     assert again.world_position.line == 7
 
 
-def test_chosen_is_the_alternative_that_is_set() -> None:
+def test_chosen_returns_the_set_alternative() -> None:
     world = model.WorldPosition(x=0.0, y=0.0)
     assert model.Position(world_position=world).chosen() is world
-    with pytest.raises(ValueError, match="found 0"):
+    with pytest.raises(ValueError, match=r"got 0; expected 1"):
         model.Position().chosen()
 
 
-def test_chosen_looks_at_the_choice_only() -> None:
+def test_chosen_considers_only_the_choice() -> None:
     reference = model.CatalogReference(catalog_name="Vehicles", entry_name="car")
     controller = model.ObjectController(catalog_reference=reference)
     entity = model.ScenarioObject(name="Ego", catalog_reference=reference, object_controller=(controller,))
     assert entity.chosen() is reference
 
 
-def test_walk_meets_every_element_once() -> None:
+def test_walk_yields_every_element_once() -> None:
     corners = tuple(
         model.Vertex(position=model.Position(world_position=model.WorldPosition(x=x, y=0.0))) for x in (0.0, 1.0)
     )
@@ -62,11 +62,12 @@ def test_every_class_has_rules_in_every_version(version: tuple[int, int]) -> Non
         ), cls
 
 
-def test_the_model_is_complete() -> None:
-    """The union of the types of 1.0, 1.1.1, 1.2 and 1.3.1; None is None_ in Python."""
+def test_model_has_every_schema_type() -> None:
+    """The expectation is the union of the types of 1.0, 1.1.1, 1.2 and 1.3.1; None is None_ in Python."""
     assert len(CLASSES) == 292
     assert "None_" in {cls.__name__ for cls in CLASSES}
 
 
-def test_every_class_says_what_it_is() -> None:
-    assert [cls.__name__ for cls in CLASSES if not cls.__doc__ or cls.__doc__.startswith(cls.__name__)] == []
+def test_every_class_has_a_docstring() -> None:
+    """A dataclass without a docstring gets its signature as one."""
+    assert [cls.__name__ for cls in CLASSES if not cls.__doc__ or cls.__doc__.startswith(f"{cls.__name__}(")] == []

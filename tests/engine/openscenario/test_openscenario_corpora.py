@@ -1,4 +1,4 @@
-"""Files written for other engines, from the folder EIDRIVE_CORPORA; ASAM's schemas judge them in tests/conformance."""
+"""Files for other engines in the folder EIDRIVE_CORPORA; tests/conformance validates them by the ASAM schemas."""
 
 import os
 from pathlib import Path
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA is not 
 
 EXCEPTIONS = {
     "esmini/xosc/Catalogs/Maneuvers/HWManeuvers.xosc": "an entry uses a parameter that it does not declare",
-    "esmini/xosc/auto_light.xosc": "its catalog's folder is not there",
+    "esmini/xosc/auto_light.xosc": "the folder of its catalog does not exist",
     "esmini/xosc/car_walk.xosc": "its catalogs lie outside the corpus",
     "scenario_runner/catalogs/EnvironmentCatalog.xosc": "written for 0.9",
     "scenario_runner/catalogs/ManeuverCatalog.xosc": "written for 0.9",
@@ -27,7 +27,7 @@ def files() -> list[Path]:
     return sorted(CORPORA.rglob("*.xosc")) if CORPORA else []
 
 
-def excused(path: Path) -> bool:
+def is_exempt(path: Path) -> bool:
     return CORPORA is not None and path.relative_to(CORPORA).as_posix() in EXCEPTIONS
 
 
@@ -39,7 +39,7 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("maps")
-def test_every_file_is_read() -> None:
+def test_corpora_files_are_read() -> None:
     refused = {}
     for path in files():
         try:
@@ -48,6 +48,6 @@ def test_every_file_is_read() -> None:
                 load_scenario(path)
         except ScenarioError as error:
             refused[path] = str(error)
-    assert {path: text for path, text in refused.items() if not excused(path)} == {}
+    assert {path: text for path, text in refused.items() if not is_exempt(path)} == {}
     assert len(refused) <= len(EXCEPTIONS)
     assert len(files()) > 150

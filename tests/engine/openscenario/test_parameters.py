@@ -16,14 +16,16 @@ def speed_of(scenario: Scenario) -> float:
 
 
 @pytest.mark.element("$parameter")
-def test_a_parameter_is_put_in(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+def test_parameter_reference_is_substituted(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "12.5")), story=story_xml(speed="$Speed"))
     assert speed_of(load_scenario(xml)) == 12.5
     assert load_scenario(xml).parameters == {"Speed": "12.5"}
 
 
 @pytest.mark.element("${expression}")
-def test_a_value_from_outside_comes_first(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+def test_assigned_value_takes_precedence_over_default(
+    scenario_xml: Build, story_xml: Text, parameters_xml: Text
+) -> None:
     declared = parameters_xml(Kmh=("double", "36"), Speed=("double", "${$Kmh / 3.6}"))
     xml = scenario_xml(declarations=declared, story=story_xml(speed="${$Speed + 1}"))
     assert speed_of(load_scenario(xml)) == pytest.approx(11)
@@ -31,18 +33,18 @@ def test_a_value_from_outside_comes_first(scenario_xml: Build, story_xml: Text, 
     assert load_scenario(xml, {"Kmh": "72"}).parameters["Kmh"] == "72"
 
 
-def test_unknown_or_unfit_values_from_outside_are_refused(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_invalid_assignments_are_errors(scenario_xml: Build, parameters_xml: Text) -> None:
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "10")))
     with pytest.raises(ScenarioError, match=r"unknown parameter 'Sped'; did you mean 'Speed'\?"):
         load_scenario(xml, {"Sped": "3"})
-    with pytest.raises(ScenarioError, match="the parameter 'Speed' is 'fast', which is not a number"):
+    with pytest.raises(ScenarioError, match="parameter 'Speed' is 'fast', which is not a number"):
         load_scenario(xml, {"Speed": "fast"})
     with pytest.raises(ScenarioError, match="unknown parameter 'Speed'"):
         load_scenario(scenario_xml(), {"Speed": "3"})
 
 
 @pytest.mark.element("$parameter")
-def test_an_inner_scope_hides_the_outer(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+def test_inner_scope_hides_outer_parameter(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
     inner = parameters_xml(Speed=("double", "${$Speed * 2}"))
     story = story_xml(speed="$Speed").replace('<Story name="story">', f'<Story name="story">{inner}')
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "4")), story=story)
@@ -60,7 +62,9 @@ def test_an_inner_scope_hides_the_outer(scenario_xml: Build, story_xml: Text, pa
         ("dateTime", "2026-01-31T12:00:00", "greaterThan", "2026-01-31T11:00:00Z", True),
     ],
 )
-def test_constraints(scenario_xml: Build, kind: str, value: str, rule: str, limit: str, fits: bool) -> None:
+def test_parameter_constraints_are_checked(
+    scenario_xml: Build, kind: str, value: str, rule: str, limit: str, fits: bool
+) -> None:
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="{kind}" value="{value}">
     <ConstraintGroup><ValueConstraint rule="{rule}" value="{limit}"/></ConstraintGroup>
     </ParameterDeclaration></ParameterDeclarations>"""
@@ -82,7 +86,7 @@ def test_constraints(scenario_xml: Build, kind: str, value: str, rule: str, limi
         ("-5.0", "equalTo", "5", False),
     ],
 )
-def test_whole_parameter_with_fraction_of_zero_meets_constraints_as_a_number(
+def test_integer_parameter_with_zero_fraction_satisfies_constraints(
     scenario_xml: Build, value: str, rule: str, limit: str, fits: bool
 ) -> None:
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="{{}}">
@@ -100,24 +104,24 @@ def test_whole_parameter_with_fraction_of_zero_meets_constraints_as_a_number(
                 load_scenario(text, values)
 
 
-def test_whole_parameter_with_a_true_fraction_is_refused(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_integer_parameter_with_nonzero_fraction_is_an_error(scenario_xml: Build, parameters_xml: Text) -> None:
     xml = scenario_xml(declarations=parameters_xml(Lane=("int", "-1")))
-    with pytest.raises(ScenarioError, match=r"the parameter 'Lane' is '-1\.5', which is not a whole number"):
+    with pytest.raises(ScenarioError, match=r"parameter 'Lane' is '-1\.5', which is not a whole number"):
         load_scenario(xml, {"Lane": "-1.5"})
 
 
 @pytest.mark.element("ConstraintGroup")
-def test_groups_of_constraints_are_alternatives(scenario_xml: Build) -> None:
+def test_constraint_groups_are_alternatives(scenario_xml: Build) -> None:
     group = '<ConstraintGroup><ValueConstraint rule="equalTo" value="{}"/></ConstraintGroup>'
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="2">
     {group.format(1)}{group.format(2)}</ParameterDeclaration></ParameterDeclarations>"""
     xml = scenario_xml(declarations=declared)
     assert load_scenario(xml).parameters == {"P": "2"}
-    with pytest.raises(ScenarioError, match="it has to be equalTo 1 or equalTo 2"):
+    with pytest.raises(ScenarioError, match="expected equalTo 1 or equalTo 2"):
         load_scenario(xml, {"P": "3"})
 
 
-def test_whole_numbers_stay_whole_in_text(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_integers_have_no_fraction_in_texts(scenario_xml: Build, parameters_xml: Text) -> None:
     position = '<LanePosition roadId="1" laneId="${$Lane - 1}" s="${$S * 2}"/>'
     teleport = f"<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"
     xml = scenario_xml(
@@ -128,7 +132,7 @@ def test_whole_numbers_stay_whole_in_text(scenario_xml: Build, parameters_xml: T
     assert (lane.lane_id, lane.s) == ("-2", 14.0)
 
 
-def test_a_wrong_declaration_is_reported_once(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+def test_invalid_declaration_is_reported_once(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "${1 / 0}")), story=story_xml(speed="$Speed"))
     with pytest.raises(ScenarioError) as caught:
         load_scenario(xml)
@@ -136,7 +140,7 @@ def test_a_wrong_declaration_is_reported_once(scenario_xml: Build, story_xml: Te
     assert "has no value" in str(caught.value)
 
 
-def test_a_parameter_may_name_another_where_a_name_is_meant(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_parameter_reference_attribute_may_be_a_parameter(scenario_xml: Build, parameters_xml: Text) -> None:
     condition = '<ParameterCondition parameterRef="$Speed" rule="equalTo" value="3"/>'
     stop = f"""<ConditionGroup><Condition name="c" delay="0" conditionEdge="none">
     <ByValueCondition>{condition}</ByValueCondition></Condition></ConditionGroup>"""
@@ -151,7 +155,7 @@ def test_a_parameter_may_name_another_where_a_name_is_meant(scenario_xml: Build,
     value=st.text(alphabet="0123456789.+-*/%(),$abePstruefalsi {}", max_size=30),
     speed=st.text(alphabet="0123456789.+-*/%(),$aPsqrtminmax {}", max_size=30),
 )
-def test_whatever_is_written_there_only_our_errors_come_out(
+def test_random_references_raise_only_scenario_errors(
     scenario_xml: Build, story_xml: Text, parameters_xml: Text, kind: str, value: str, speed: str
 ) -> None:
     declared = parameters_xml(P=(kind, value), a=("double", "1"))

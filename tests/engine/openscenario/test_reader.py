@@ -42,36 +42,36 @@ def test_values_have_the_types_of_the_model(scenario_xml: Build, story_xml: Call
     assert speed.speed_action_target.chosen() == model.AbsoluteTargetSpeed(value=12.0)
 
 
-def test_elements_know_their_line(scenario_xml: Build) -> None:
+def test_elements_have_lines(scenario_xml: Build) -> None:
     xml = scenario_xml()
     before, _, _ = xml.partition(b"<Vehicle name")
     ego = load_scenario(xml).entities["Ego"]
     assert (ego.source, ego.line) == ("<bytes>", 1 + before.count(b"\n"))
 
 
-def test_text_between_tags_is_kept(scenario_xml: Build) -> None:
+def test_element_text_is_read(scenario_xml: Build) -> None:
     command = '<CustomCommandAction type="x">{a: <!-- no --> 1}\n</CustomCommandAction>'
     xml = scenario_xml(init=f"<UserDefinedAction>{command}</UserDefinedAction>")
     action = load_scenario(xml).storyboard.init.actions.user_defined_action[0]
     assert action.custom_command_action.content == "{a:  1}\n"
 
 
-def test_text_where_none_belongs_is_refused(scenario_xml: Build) -> None:
-    assert diagnostics_of(scenario_xml(init="stray")) == ["Actions holds text, where only elements may stand"]
+def test_text_between_elements_is_an_error(scenario_xml: Build) -> None:
+    assert diagnostics_of(scenario_xml(init="stray")) == ["Actions contains text; only elements are allowed"]
 
 
-def test_what_a_later_version_made_optional_is_required_before(scenario_xml: Build) -> None:
+def test_optional_attribute_is_required_in_older_version(scenario_xml: Build) -> None:
     assert diagnostics_of(scenario_xml(minor=1)) == ["Storyboard lacks the element Story"]
     assert load_scenario(scenario_xml(minor=2)).version == (1, 2)
 
 
-def test_words_of_an_old_version_are_right_there_only(scenario_xml: Build, story_xml: Callable[..., str]) -> None:
+def test_literals_are_valid_only_in_their_versions(scenario_xml: Build, story_xml: Callable[..., str]) -> None:
     story = story_xml()
     old = story.replace('priority="parallel"', 'priority="overwrite"')
     assert load_scenario(scenario_xml(minor=1, story=old)).warnings == ()
     assert len(load_scenario(scenario_xml(minor=2, story=old)).warnings) == 1
     new = story.replace('priority="parallel"', 'priority="override"')
-    with pytest.raises(ScenarioError, match=r"OpenSCENARIO has it since 1\.2; the file says 1\.1"):
+    with pytest.raises(ScenarioError, match=r"part of OpenSCENARIO since 1\.2; the version of the file is 1\.1"):
         load_scenario(scenario_xml(minor=1, story=new))
 
 
@@ -88,27 +88,27 @@ def test_deprecated_use_is_a_warning(scenario_xml: Build) -> None:
     ("action", "message"),
     [
         ("", "PrivateAction lacks one of LongitudinalAction, LateralAction"),
-        ("<TeleportAction/><TeleportAction/>", "TeleportAction may not stand here again"),
-        ("<TeleportAction/><VisibilityAction/>", "VisibilityAction may not stand here"),
+        ("<TeleportAction/><TeleportAction/>", "TeleportAction is not allowed here again"),
+        ("<TeleportAction/><VisibilityAction/>", "VisibilityAction is not allowed here"),
         ("<TeleportAction/>", "TeleportAction lacks the element Position"),
     ],
 )
-def test_structure_is_checked(scenario_xml: Build, action: str, message: str) -> None:
+def test_invalid_structure_is_an_error(scenario_xml: Build, action: str, message: str) -> None:
     found = diagnostics_of(scenario_xml(init=private(f"<PrivateAction>{action}</PrivateAction>")))
     assert any(one.startswith(message) for one in found)
 
 
-def test_a_second_corner_is_missed(scenario_xml: Build) -> None:
+def test_missing_second_vertex_is_an_error(scenario_xml: Build) -> None:
     first, _, _ = CURVE.partition('<Vertex time="1">')
     xml = scenario_xml(init=private(TRAJECTORY.format(inside=f"{first}</Polyline></Shape></Trajectory>")))
     assert diagnostics_of(xml) == ["Polyline lacks another Vertex"]
 
 
-def test_an_attribute_of_a_newer_version_says_so(scenario_xml: Build) -> None:
+def test_attribute_of_newer_version_error_has_version(scenario_xml: Build) -> None:
     entity = '<ScenarioObject name="Ego"><Pedestrian name="p" mass="80" pedestrianCategory="pedestrian" role="police">'
     box = '<BoundingBox><Center x="0" y="0" z="1"/><Dimensions length="1" width="1" height="2"/></BoundingBox>'
     xml = scenario_xml(minor=2, entities=f"{entity}{box}<Properties/></Pedestrian></ScenarioObject>")
-    with pytest.raises(ScenarioError, match=r"no attribute 'role'; OpenSCENARIO has it since 1\.3; the file says 1\.2"):
+    with pytest.raises(ScenarioError, match=r"no attribute 'role'; part of OpenSCENARIO since 1\.3"):
         load_scenario(xml)
 
 
@@ -123,13 +123,13 @@ def test_an_empty_action_is_a_warning_and_an_empty_position_is_not(
     assert diagnostics_of(scenario_xml(minor=2, init=teleport)) == ["Position is empty"]
 
 
-def test_schema_location_may_be_given(scenario_xml: Build) -> None:
+def test_schema_location_is_ignored(scenario_xml: Build) -> None:
     root = etree.fromstring(scenario_xml())
     root.set("{http://www.w3.org/2001/XMLSchema-instance}noNamespaceSchemaLocation", "OpenSCENARIO.xsd")
     assert load_scenario(root).version == (1, 3)
 
 
-def test_a_byte_order_mark_and_another_encoding_are_read(scenario_xml: Build) -> None:
+def test_byte_order_mark_and_other_encodings_are_read(scenario_xml: Build) -> None:
     text = scenario_xml().decode()
     assert load_scenario(b"\xef\xbb\xbf" + text.encode()).version == (1, 3)
     assert load_scenario(('<?xml version="1.0" encoding="UTF-16"?>' + text).encode("utf-16")).version == (1, 3)
@@ -139,28 +139,28 @@ def test_a_byte_order_mark_and_another_encoding_are_read(scenario_xml: Build) ->
     ("xml", "message"),
     [
         (b"", "not well-formed XML: no element found"),
-        (b"<OpenDRIVE/>", "the root element is OpenDRIVE, not OpenSCENARIO"),
+        (b"<OpenDRIVE/>", "the root element is OpenDRIVE (expected OpenSCENARIO)"),
         (b"<OpenSCENARIO/>", "OpenSCENARIO lacks the element FileHeader"),
         (b"<OpenSCENARIO><FileHeader revMajor='1'/></OpenSCENARIO>", "FileHeader lacks the attribute 'revMinor'"),
-        (b"<OpenSCENARIO><FileHeader revMajor='2' revMinor='0'/></OpenSCENARIO>", "written for OpenSCENARIO 2.0"),
-        (b"<a>" * 150 + b"</a>" * 150, "nested more than 100 deep"),
+        (b"<OpenSCENARIO><FileHeader revMajor='2' revMinor='0'/></OpenSCENARIO>", "FileHeader has the version 2.0"),
+        (b"<a>" * 150 + b"</a>" * 150, "nested deeper than 100 levels"),
         ("<!DOCTYPE x><x/>".encode("utf-16"), "document type declaration"),
     ],
 )
-def test_other_files_are_refused(xml: bytes, message: str) -> None:
+def test_other_file_kinds_are_errors(xml: bytes, message: str) -> None:
     assert any(message in found for found in diagnostics_of(xml))
 
 
-def test_catalogs_are_documents_too() -> None:
+def test_read_document_accepts_catalogs() -> None:
     xml = b"""<OpenSCENARIO><FileHeader revMajor="1" revMinor="0" date="2026-01-31T12:00:00" description="" author=""/>
     <Catalog name="Routes"/></OpenSCENARIO>"""
     document = read_document(xml)
     assert document.catalog is not None
     assert document.catalog.name == "Routes"
-    assert diagnostics_of(xml) == ["this is a catalog, not a scenario"]
+    assert diagnostics_of(xml) == ["the file is a catalog, not a scenario"]
 
 
-def test_distributions_are_documents_too() -> None:
+def test_read_document_accepts_distributions() -> None:
     xml = b"""<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-31T12:00:00" description="" author=""/>
     <ParameterValueDistribution><ScenarioFile filepath="cut_in.xosc"/><Deterministic>
     <DeterministicSingleParameterDistribution parameterName="Speed"><DistributionRange stepWidth="5">

@@ -63,7 +63,7 @@ def test_reference_has_value_and_type_of_parameter(text: str, value: object) -> 
     assert type(found["seconds"]) is type(value)
 
 
-def test_text_that_looks_like_yaml_stays_one_text() -> None:
+def test_yaml_syntax_in_parameter_remains_text() -> None:
     assert resolved("{delay: {seconds: $Forged}}") == {
         "delay": {"seconds": "0.1}, loss: {kind: bernoulli, probability: 1.0"}
     }
@@ -85,13 +85,13 @@ def test_value_of_a_parameter_is_not_resolved_again() -> None:
         ("{a: ${2 ** 3}}", "a.xosc:1: setting 'a': "),
     ],
 )
-def test_wrong_reference_is_reported_with_line_and_key(text: str, diagnostic: str) -> None:
+def test_invalid_reference_error_has_line_and_key(text: str, diagnostic: str) -> None:
     with pytest.raises(SettingError) as caught:
         resolved(text)
     assert str(caught.value).startswith(diagnostic)
 
 
-def test_all_wrong_references_are_reported_together() -> None:
+def test_invalid_references_are_reported_together() -> None:
     with pytest.raises(SettingError) as caught:
         resolved("{a: $X, b: [$Y, $Latency]}")
     assert [diagnostic.message.split(":")[0] for diagnostic in caught.value.diagnostics] == [
@@ -100,7 +100,7 @@ def test_all_wrong_references_are_reported_together() -> None:
     ]
 
 
-def test_settings_without_scope_stay_as_they_are() -> None:
+def test_settings_without_scope_are_unchanged() -> None:
     assert resolved("{a: $X}", None) == {"a": "$X"}
 
 

@@ -35,7 +35,7 @@ from eidrive_scenario.openscenario.values.scalars import (
         (DATE_TIME, "2020-12-31T24:00:00+02:00", datetime(2021, 1, 1, tzinfo=timezone(timedelta(hours=2)))),
     ],
 )
-def test_value(scalar: Scalar, text: str, value: Any) -> None:
+def test_scalar_conversion_has_expected_value(scalar: Scalar, text: str, value: Any) -> None:
     assert scalar.convert(text) == value
 
 
@@ -59,18 +59,18 @@ def test_value(scalar: Scalar, text: str, value: Any) -> None:
         (DATE_TIME, "2020-10-01T24:00:01"),
     ],
 )
-def test_what_does_not_fit_is_refused(scalar: Scalar, text: str) -> None:
+def test_invalid_scalar_raises_value_error(scalar: Scalar, text: str) -> None:
     with pytest.raises(ValueError, match=r".+"):
         scalar.convert(text)
 
 
-def test_words_come_and_go_with_the_version() -> None:
+def test_enumeration_literals_depend_on_the_version() -> None:
     assert enumeration(Rule, (1, 1)).convert("greaterOrEqual") is Rule.GREATER_OR_EQUAL
-    with pytest.raises(ValueError, match=r"has it since 1\.1; the file says 1\.0"):
+    with pytest.raises(ValueError, match=r"since 1\.1; the version of the file is 1\.0"):
         enumeration(Rule, (1, 0)).convert("greaterOrEqual")
 
 
-def test_deprecated_words_are_known_but_marked() -> None:
+def test_deprecated_literals_are_accepted_and_marked() -> None:
     old, new = enumeration(Priority, (1, 1)), enumeration(Priority, (1, 2))
     assert old.convert("overwrite") is new.convert("overwrite") is Priority.OVERWRITE
     assert not old.is_deprecated(Priority.OVERWRITE)

@@ -21,7 +21,7 @@ def state_condition(reference: str, kind: str = "event") -> str:
     )
 
 
-def test_a_scenario_is_read_from_a_path_from_bytes_and_from_a_tree(tmp_path: Path, scenario_xml: Build) -> None:
+def test_load_scenario_accepts_path_bytes_and_tree(tmp_path: Path, scenario_xml: Build) -> None:
     path = tmp_path / "crossing.xosc"
     path.write_bytes(scenario_xml())
     scenario = load_scenario(path)
@@ -31,12 +31,12 @@ def test_a_scenario_is_read_from_a_path_from_bytes_and_from_a_tree(tmp_path: Pat
     assert load_scenario(scenario_xml()).name == "a test"
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"nowhere\.xosc: cannot be read: No such file or directory"):
+def test_load_scenario_missing_file_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"nowhere\.xosc: cannot read: No such file or directory"):
         load_scenario(tmp_path / "nowhere.xosc")
 
 
-def test_entities_and_their_controllers(scenario_xml: Build) -> None:
+def test_scenario_has_entities_and_controllers(scenario_xml: Build) -> None:
     walker = f"""<ScenarioObject name="Walker"><Pedestrian name="p" mass="80" pedestrianCategory="pedestrian">{BOX}
     </Pedestrian></ScenarioObject>"""
     mast = f"""<ScenarioObject name="RSU"><MiscObject name="mast" mass="99" miscObjectCategory="pole">{BOX}</MiscObject>
@@ -83,12 +83,12 @@ def test_storyboard_elements_are_found_by_name_and_by_path(
 @pytest.mark.parametrize(
     ("reference", "kind", "message"),
     [
-        ("evnet", "event", r"names the event 'evnet', which is not there; did you mean 'event'\?"),
-        ("other/event", "event", r"names the event 'other/event', which is not there; did you mean 'event'\?"),
+        ("evnet", "event", r"refers to event 'evnet', which does not exist; did you mean 'event'\?"),
+        ("other/event", "event", r"refers to event 'other/event', which does not exist; did you mean 'event'\?"),
         ("act", "event", r"'act' is of the kind act, not event; write storyboardElementType='act'"),
     ],
 )
-def test_storyboard_elements_that_are_not_there(
+def test_unknown_storyboard_references_are_errors(
     scenario_xml: Build, story_xml: Text, reference: str, kind: str, message: str
 ) -> None:
     with pytest.raises(ScenarioError, match=message):
@@ -98,34 +98,34 @@ def test_storyboard_elements_that_are_not_there(
 @pytest.mark.parametrize(
     ("condition", "message"),
     [
-        ('<VariableCondition variableRef="v" rule="equalTo" value="1"/>', "names the variable 'v'"),
-        ('<ParameterCondition parameterRef="p" rule="equalTo" value="1"/>', "names the parameter 'p'"),
+        ('<VariableCondition variableRef="v" rule="equalTo" value="1"/>', "refers to variable 'v'"),
+        ('<ParameterCondition parameterRef="p" rule="equalTo" value="1"/>', "refers to parameter 'p'"),
         (
             '<TrafficSignalControllerCondition trafficSignalControllerRef="c" phase="go"/>',
-            "names the signal controller 'c'",
+            "refers to signal controller 'c'",
         ),
     ],
 )
-def test_dangling_names(scenario_xml: Build, story_xml: Text, condition: str, message: str) -> None:
+def test_unknown_references_are_errors(scenario_xml: Build, story_xml: Text, condition: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load_scenario(scenario_xml(story=story_xml(condition=condition)))
 
 
-def test_criteria_of_scenario_runner_name_no_parameter(scenario_xml: Build) -> None:
+def test_scenario_runner_criteria_need_no_parameter(scenario_xml: Build) -> None:
     stop = """<ConditionGroup><Condition name="criteria_CollisionTest" delay="0" conditionEdge="rising">
     <ByValueCondition><ParameterCondition parameterRef="" value="" rule="lessThan"/></ByValueCondition>
     </Condition></ConditionGroup>"""
     assert load_scenario(scenario_xml(stop=stop)).warnings == ()
 
 
-def test_values_that_exclude_each_other(scenario_xml: Build, story_xml: Text) -> None:
+def test_contradictory_values_are_errors(scenario_xml: Build, story_xml: Text) -> None:
     keep = """<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" freespace="true" continuous="true"
     distance="10" timeGap="2"/></LongitudinalAction>"""
     with pytest.raises(ScenarioError, match="either distance or timeGap"):
         load_scenario(scenario_xml(story=story_xml(action=keep)))
 
 
-def test_a_name_side_by_side_with_its_double_is_a_warning(scenario_xml: Build, story_xml: Text) -> None:
+def test_duplicate_sibling_names_are_a_warning(scenario_xml: Build, story_xml: Text) -> None:
     scenario = load_scenario(scenario_xml(story=story_xml() + story_xml()))
     assert scenario.warnings[0].message == "two elements of the kind story are named 'story'"
 
@@ -133,7 +133,7 @@ def test_a_name_side_by_side_with_its_double_is_a_warning(scenario_xml: Build, s
 class TestRoadFile:
     LOGIC = '<LogicFile filepath="{}"/>'
 
-    def test_beside_the_scenario(self, tmp_path: Path, scenario_xml: Build) -> None:
+    def test_road_file_is_found_in_scenario_folder(self, tmp_path: Path, scenario_xml: Build) -> None:
         (tmp_path / "roads").mkdir()
         (tmp_path / "roads" / "town.xodr").touch()
         path = tmp_path / "scene.xosc"
@@ -141,35 +141,35 @@ class TestRoadFile:
         assert load_scenario(path).road_file == tmp_path / "roads" / "town.xodr"
 
     @pytest.mark.parametrize("name", ["Town01", "Town01.xodr", "../elsewhere/Town01.xodr", "C:\\maps\\Town01.xodr"])
-    def test_in_a_folder_of_maps(
+    def test_road_file_is_found_in_map_folders(
         self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch, name: str
     ) -> None:
         (tmp_path / "Town01.xodr").touch()
         monkeypatch.setenv("EIDRIVE_MAPS", f"/nonexistent:{tmp_path}")
         assert load_scenario(scenario_xml(road=self.LOGIC.format(name))).road_file == tmp_path / "Town01.xodr"
 
-    def test_the_nearest_name_is_shown(
+    def test_missing_road_file_error_suggests_similar_name(
         self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         (tmp_path / "Town01.xodr").touch()
         monkeypatch.setenv("EIDRIVE_MAPS", str(tmp_path))
-        with pytest.raises(ScenarioError, match=r"no road file 'Twon01\.xodr' .* did you mean 'Town01'\?"):
+        with pytest.raises(ScenarioError, match=r"road file 'Twon01\.xodr' is neither .* did you mean 'Town01'\?"):
             load_scenario(scenario_xml(road=self.LOGIC.format("Twon01.xodr")))
 
-    def test_a_common_suffix_makes_no_name_near(
+    def test_missing_road_file_suggestion_ignores_the_suffix(
         self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         (tmp_path / "offset.xodr").touch()
         monkeypatch.setenv("EIDRIVE_MAPS", str(tmp_path))
-        with pytest.raises(ScenarioError, match=r"no road file 'maps\\nowhere\.xodr' .* known: offset$"):
+        with pytest.raises(ScenarioError, match=r"road file 'maps\\nowhere\.xodr' is neither .* known: offset$"):
             load_scenario(scenario_xml(road=self.LOGIC.format("maps\\nowhere.xodr")))
 
-    def test_none_is_named(self, scenario_xml: Build) -> None:
+    def test_scenario_without_road_file_has_none(self, scenario_xml: Build) -> None:
         assert load_scenario(scenario_xml()).road_file is None
 
 
-def test_text_of_a_file_that_is_gone_is_an_error_of_the_input(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"gone\.xosc: cannot be read: No such file"):
+def test_text_of_missing_file_raises_scenario_error(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"gone\.xosc: cannot read: No such file"):
         text_of(tmp_path / "gone.xosc")
-    with pytest.raises(ScenarioError, match="cannot be read: the path leads to a folder"):
+    with pytest.raises(ScenarioError, match="cannot read: the path leads to a folder"):
         text_of(tmp_path)

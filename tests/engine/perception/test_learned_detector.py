@@ -186,7 +186,7 @@ def test_detect_with_onnx_weights_returns_configured_classes(readings: Readings)
             "another network (got 'ssd'; expected 'yolov5'); use the detector 'ssd'",
         ),
         ({"weights": str(SHIPPED / "lamps.npz")}, "do not fit"),
-        ({"classes": ["car"]}, "settings do not fit together"),
+        ({"classes": ["car"]}, "settings contradict each other"),
         ({"classes": ["car"]}, "apply to weights .onnx and .pt only"),
         ({"letterbox": True}, "apply to weights .onnx and .pt only"),
         ({"weights": str(ONNX), "classes": ["car"], "input_size": [96, 64]}, "fits no layout for 1 classes"),

@@ -104,7 +104,7 @@ def test_distribution_items_have_outcomes_and_properties(
         [
             "run 1 of passing_by failed with channel *, seed 1",
             "collision: Ego and Parked hit each other at 1.6* s at *",
-            f"SKIPPED * excluded by constraints: {path}:5: the parameter 'OtherY' is '9', outside its constraints;*",
+            f"SKIPPED * excluded by constraints: {path}:5: parameter 'OtherY' is '9', outside its constraints;*",
         ]
     )
     result.stdout.no_fnmatch_line("*Traceback*")
@@ -123,7 +123,7 @@ def test_invalid_distribution_is_reported_with_its_line(pytester: pytest.Pyteste
     path = vary('<DistributionRange stepWidth="0"><Range lowerLimit="0" upperLimit="8"/></DistributionRange>')
     result = pytester.runpytest_inprocess("vary.xosc", "-p", "no:cacheprovider")
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines([f"{path}:5: stepWidth is 0; give a number above zero"])
+    result.stdout.fnmatch_lines([f"{path}:5: stepWidth is 0; specify a number above zero"])
     result.stdout.no_fnmatch_line("*Traceback*")
 
 

@@ -114,7 +114,7 @@ def test_report_of_unusual_values_is_written(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("[" * 100_000 + "]" * 100_000, "nested"),
-        ('{"trace_hash": ' + "[" * 900 + "]" * 900 + "}", "nested more than 40 deep"),
+        ('{"trace_hash": ' + "[" * 900 + "]" * 900 + "}", "nested deeper than 40 levels"),
         ('{"trace_hash": ' + "9" * 5000 + "}", "not JSON"),
         ('{"trace_hash": [' + "0," * 10_000_001 + "0]}", "more than 10000000 values"),
         ("\xff", "not the result of a run|not JSON"),

@@ -105,7 +105,7 @@ def test_file_of_version_1_1_with_radians_loads() -> None:
       <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><GlobalAction><EntityAction entityRef="A">
       <AddEntityAction><Position>{frame}</Position></AddEntityAction></EntityAction></GlobalAction></Actions></Init>
       <StopTrigger/></Storyboard></OpenSCENARIO>"""
-    with pytest.raises(ScenarioError, match="entity 'A', which is not there"):
+    with pytest.raises(ScenarioError, match="entity 'A', which does not exist"):
         load_scenario(text.encode())
     with pytest.raises(ScenarioError, match="latitudeDeg"):
         load_scenario(text.replace("latitude=", "latitudeDeg=").encode())

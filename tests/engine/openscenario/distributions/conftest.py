@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 DISTRIBUTION = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="{minor}" date="2026-01-31T12:00:00" description="a test" author="nobody"/>
+<FileHeader revMajor="1" revMinor="{minor}" date="2026-01-31T12:00:00" description="a test" author="test"/>
 <ParameterValueDistribution>
 <ScenarioFile filepath="scenario.xosc"/>
 {body}
@@ -14,7 +14,7 @@ DISTRIBUTION = """<OpenSCENARIO>
 
 @pytest.fixture
 def distribution_file(tmp_path: Path) -> Callable[..., Path]:
-    """A distribution file with the given body from line 5 on, beside a scenario that is only named."""
+    """Return a function that writes a distribution file with the given body from line 5 on."""
 
     def write(body: str, *, minor: int = 3) -> Path:
         (tmp_path / "scenario.xosc").touch()
@@ -27,7 +27,7 @@ def distribution_file(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def stochastic(distribution_file: Callable[..., Path]) -> Callable[..., Path]:
-    """A distribution file that draws the parameter P."""
+    """Return a function that writes a distribution file that draws the parameter P."""
 
     def write(distribution: str, *, runs: int = 1000, seed: str = 'randomSeed="1"') -> Path:
         return distribution_file(

@@ -1,4 +1,4 @@
-"""Sets, ranges and value sets, and their combinations."""
+"""Deterministic distributions: sets, ranges, value sets and their combinations."""
 
 import tracemalloc
 from collections.abc import Callable
@@ -46,7 +46,7 @@ def texts(path: Path) -> list[str]:
 
 
 @pytest.mark.element("DistributionSet", "ValueSetDistribution")
-def test_all_combinations_in_the_order_of_the_file(distribution_file: Write, tmp_path: Path) -> None:
+def test_combinations_have_the_order_of_the_file(distribution_file: Write, tmp_path: Path) -> None:
     body = deterministic(values("A", "1", "2"), sets({"B": "x", "C": "u"}, {"B": "y", "C": "v"}), values("D", "on"))
     runs = load_distribution(distribution_file(body))
     assert len(runs) == 4
@@ -65,7 +65,7 @@ def test_all_combinations_in_the_order_of_the_file(distribution_file: Write, tmp
         runs[4]
 
 
-def test_a_value_knows_its_line(distribution_file: Write) -> None:
+def test_values_have_lines(distribution_file: Write) -> None:
     path = distribution_file(deterministic(values("A", "1"), steps("B", "0", "1", "1"), sets({"C": "x"})))
     origins = {name: given.origin for name, given in load_distribution(path)[0].assignments.items()}
     assert {name: str(origin) for name, origin in origins.items()} == {
@@ -90,17 +90,19 @@ def test_a_value_knows_its_line(distribution_file: Write) -> None:
         ("1e-7", "3e-7", "1e-7", ["1e-07", "2e-07", "3e-07"]),
     ],
 )
-def test_a_range(distribution_file: Write, lower: str, upper: str, step: str, expected: list[str]) -> None:
+def test_range_has_exact_decimal_steps(
+    distribution_file: Write, lower: str, upper: str, step: str, expected: list[str]
+) -> None:
     assert texts(distribution_file(deterministic(steps("P", lower, upper, step)))) == expected
 
 
-def test_no_distribution_is_one_run_as_the_scenario_stands(distribution_file: Write) -> None:
+def test_empty_deterministic_is_one_run_without_assignments(distribution_file: Write) -> None:
     runs = load_distribution(distribution_file("<Deterministic/>"))
     assert [run.parameters for run in runs] == [{}]
 
 
-def test_runs_are_made_one_by_one(distribution_file: Write) -> None:
-    """A thousand million runs: counted at once, any of them at hand, the memory of a walk through them constant."""
+def test_expansion_creates_runs_on_access(distribution_file: Write) -> None:
+    """For 10⁹ runs the count and any run are available immediately, and an iteration needs constant memory."""
     body = deterministic(*(steps(name, "1", "1000", "1") for name in "ABC"))
     runs = load_distribution(distribution_file(body))
     assert len(runs) == 10**9
@@ -116,7 +118,7 @@ def test_runs_are_made_one_by_one(distribution_file: Write) -> None:
     assert late < early + 20_000
 
 
-def test_some_of_many_runs_are_spread_over_all_values(distribution_file: Write) -> None:
+def test_spread_covers_all_values(distribution_file: Write) -> None:
     sizes = {"A": 5, "B": 4, "C": 7, "D": 6}
     runs = load_distribution(distribution_file(deterministic(*(steps(n, "1", str(m), "1") for n, m in sizes.items()))))
     assert len(runs) == 840
@@ -136,27 +138,26 @@ def test_some_of_many_runs_are_spread_over_all_values(distribution_file: Write) 
 @pytest.mark.parametrize(
     ("distributions", "line", "message"),
     [
-        ([steps("P", "2", "1", "1")], 6, "the range from 2 to 1 is empty; lowerLimit has to be at most upperLimit"),
+        ([steps("P", "2", "1", "1")], 6, "the range from 2 to 1 is empty; lowerLimit must be at most upperLimit"),
         ([steps("P", "NaN", "1", "1")], 6, "the range from nan to 1 is empty"),
-        ([steps("P", "0", "INF", "1")], 6, "the range from 0 to inf has no end; give finite limits"),
-        ([steps("P", "0", "1", "0")], 6, "stepWidth is 0; give a number above zero"),
-        ([steps("P", "0", "1", "-1")], 6, "stepWidth is -1; give a number above zero"),
+        ([steps("P", "0", "INF", "1")], 6, "the range from 0 to inf is infinite; specify finite limits"),
+        ([steps("P", "0", "1", "0")], 6, "stepWidth is 0; specify a number above zero"),
+        ([steps("P", "0", "1", "-1")], 6, "stepWidth is -1; specify a number above zero"),
         (
             [values("P", "1"), sets({"P": "2"})],
             7,
-            "the parameter 'P' is varied by another distribution too; see line 6",
+            "parameter 'P' is also varied by another distribution; see line 6",
         ),
         ([sets({"P": "$Other"})], 6, "value of ParameterAssignment: unknown parameter $Other"),
         ([steps("A", "0", "1", "1e-9"), steps("B", "0", "1", "1e-9"), steps("C", "0", "1", "1e-9")], 5, "1.0e+27 runs"),
         (
             [SINGLE.format("P", '<UserDefinedDistribution type="mine">x</UserDefinedDistribution>')],
             6,
-            "the values of 'P' come from a UserDefinedDistribution, whose meaning is left to a tool; "
-            "write DistributionSet or DistributionRange",
+            "UserDefinedDistribution of 'P' is specific to another tool; write DistributionSet or DistributionRange",
         ),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(
+def test_invalid_distribution_error_has_line(
     distribution_file: Write, distributions: list[str], line: int, message: str
 ) -> None:
     path = distribution_file(deterministic(*distributions))
@@ -166,29 +167,31 @@ def test_what_is_wrong_is_said_with_its_line(
     assert message in str(caught.value)
 
 
-def test_a_set_that_assigns_twice(distribution_file: Write) -> None:
+def test_duplicate_assignment_in_set_is_an_error(distribution_file: Write) -> None:
     body = deterministic(sets({"P": "1"})).replace(
         "</ParameterValueSet>", '<ParameterAssignment parameterRef="P" value="2"/></ParameterValueSet>'
     )
-    with pytest.raises(ScenarioError, match=r":6: the set assigns 'P' twice; remove one"):
+    with pytest.raises(ScenarioError, match=r":6: ParameterValueSet assigns 'P' twice; remove one"):
         load_distribution(distribution_file(body))
 
 
-def test_a_scenario_that_is_not_there(distribution_file: Write) -> None:
+def test_missing_scenario_file_is_an_error(distribution_file: Write) -> None:
     path = distribution_file(deterministic())
     path.write_text(path.read_text(encoding="utf-8").replace("scenario.xosc", "scenaro.xosc"), encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r":4: no scenario 'scenaro\.xosc'; did you mean 'scenario'\?"):
+    with pytest.raises(
+        ScenarioError, match=r":4: ScenarioFile: scenario 'scenaro\.xosc' does not exist; did you mean 'scenario'\?"
+    ):
         load_distribution(path)
 
 
-def test_a_scenario_and_a_distribution_are_told_apart(distribution_file: Write, scenario_xml: Write) -> None:
-    with pytest.raises(ScenarioError, match="this is a scenario, not a distribution of parameter values"):
+def test_scenario_and_distribution_are_distinguished(distribution_file: Write, scenario_xml: Write) -> None:
+    with pytest.raises(ScenarioError, match="the file is a scenario, not a parameter value distribution"):
         load_distribution(bytes(scenario_xml()))
-    with pytest.raises(ScenarioError, match="this is a distribution of parameter values, not a scenario"):
+    with pytest.raises(ScenarioError, match="the file is a parameter value distribution, not a scenario"):
         load_scenario(distribution_file(deterministic()))
 
 
-def test_the_oldest_version_has_no_distributions(distribution_file: Write) -> None:
-    with pytest.raises(ScenarioError, match=r"OpenSCENARIO has it since 1\.1; the file says 1\.0"):
+def test_distributions_require_version_1_1(distribution_file: Write) -> None:
+    with pytest.raises(ScenarioError, match=r"part of OpenSCENARIO since 1\.1; the version of the file is 1\.0"):
         load_distribution(distribution_file(deterministic(), minor=0))
     assert len(load_distribution(distribution_file(deterministic(), minor=1))) == 1

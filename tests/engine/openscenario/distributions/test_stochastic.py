@@ -1,4 +1,4 @@
-"""Draws: that they have the distribution which the file states, and depend on nothing else.
+"""Stochastic distributions: draws have the distribution of the file, and depend only on seed, parameter and run.
 
 The seed is fixed, so each test has one outcome. Its odds, over all seeds, of failing for a right implementation are
 the stated level of 1 in 1,000.
@@ -61,7 +61,7 @@ def weighted(*elements: tuple[str, str]) -> str:
             stats.truncnorm((15 - 22.222) / math.sqrt(10), (24 - 22.222) / math.sqrt(10), 22.222, math.sqrt(10)),
         ),
         (normal(0, 4, RANGE.format(3, "INF")), stats.truncnorm(1.5, math.inf, 0, 2)),
-        # 60 standard deviations off: there the distribution is an exponential one, of the rate 60 in this unit.
+        # 60 standard deviations from the mean the distribution is exponential with the rate 60 in this unit.
         (normal(0, 1, RANGE.format(60, 61)), stats.truncexpon(60, loc=60, scale=1 / 60)),
         (normal(0.5, 0.25, kind="LogNormalDistribution"), stats.lognorm(0.5, scale=math.exp(0.5))),
     ],
@@ -74,7 +74,7 @@ def test_draws_have_the_stated_distribution(stochastic: Write, distribution: str
 
 
 @pytest.mark.element("LogNormalDistribution")
-def test_a_log_normal_one_is_cut_off_at_its_range(stochastic: Write) -> None:
+def test_log_normal_is_truncated_at_its_range(stochastic: Write) -> None:
     values = drawn(stochastic(normal(0, 1, RANGE.format(0.5, 2), kind="LogNormalDistribution"), runs=RUNS))
     whole = stats.lognorm(1)
     below, above = whole.cdf(0.5), whole.cdf(2)
@@ -83,7 +83,7 @@ def test_a_log_normal_one_is_cut_off_at_its_range(stochastic: Write) -> None:
 
 
 @pytest.mark.element("Histogram")
-def test_a_histogram_is_uniform_in_its_bins(stochastic: Write) -> None:
+def test_histogram_is_uniform_in_its_bins(stochastic: Write) -> None:
     values = drawn(stochastic(histogram(("1", "0", "1"), ("3", "2", "4"), ("0", "4", "9")), runs=RUNS))
     assert stats.kstest(values, lambda x: np.interp(x, [0, 1, 2, 4], [0, 0.25, 0.25, 1])).pvalue > LEVEL
 
@@ -100,7 +100,7 @@ def test_a_histogram_is_uniform_in_its_bins(stochastic: Write) -> None:
     ],
 )
 def test_counts_have_the_stated_distribution(stochastic: Write, distribution: str, support: range) -> None:
-    """A chi-squared test over the counts that are expected at least five times, the rest taken together."""
+    """Chi-squared test over counts with an expectation of at least five; the others are combined."""
     path = stochastic(distribution, runs=RUNS)
     texts = [run.parameters["P"] for run in load_distribution(path)]
     mean = float(distribution.split('"')[1])
@@ -120,7 +120,7 @@ def test_counts_have_the_stated_distribution(stochastic: Write, distribution: st
 
 
 @pytest.mark.element("ProbabilityDistributionSet")
-def test_values_come_by_their_weights(stochastic: Write) -> None:
+def test_value_set_draws_follow_weights(stochastic: Write) -> None:
     texts = [
         run.parameters["P"]
         for run in load_distribution(
@@ -139,7 +139,7 @@ class TestReproducibility:
     def values(self, path: Path, name: str = "A", seed: float = 0) -> list[str]:
         return [run.parameters[name] for run in load_distribution(path, seed=seed)]
 
-    def test_a_run_does_not_depend_on_what_was_drawn_before(self, stochastic: Write) -> None:
+    def test_run_does_not_depend_on_earlier_draws(self, stochastic: Write) -> None:
         path = stochastic(normal(0, 1), runs=50)
         forwards = [run.parameters for run in load_distribution(path)]
         runs = load_distribution(path)
@@ -147,7 +147,7 @@ class TestReproducibility:
         assert backwards[::-1] == forwards
         assert runs[7].parameters == forwards[7]
 
-    def test_neither_on_other_parameters_nor_on_how_many_runs_there_are(self, distribution_file: Write) -> None:
+    def test_run_does_not_depend_on_other_parameters_or_run_count(self, distribution_file: Write) -> None:
         one = self.BODY.format(runs=5, seed='randomSeed="3"', inside=self.ONE.format("A"))
         two = self.BODY.format(runs=9, seed='randomSeed="3"', inside=self.ONE.format("B") + self.ONE.format("A"))
         alone = self.values(distribution_file(one))
@@ -163,24 +163,24 @@ class TestReproducibility:
             assert stats.pearsonr(left, right).pvalue > LEVEL
             assert stats.pearsonr(left[1:], right[:-1]).pvalue > LEVEL
 
-    def test_some_of_many_draws_are_the_first(self, stochastic: Write) -> None:
+    def test_spread_of_draws_returns_the_first(self, stochastic: Write) -> None:
         assert list(load_distribution(stochastic(normal(0, 1), runs=50)).spread(3)) == [0, 1, 2]
 
     @pytest.mark.parametrize("seed", ["0", "7", "7.25", "-1", "1e300"])
-    def test_the_seed_of_the_file_decides(self, distribution_file: Write, seed: str) -> None:
+    def test_random_seed_of_the_file_takes_precedence(self, distribution_file: Write, seed: str) -> None:
         given = distribution_file(self.BODY.format(runs=3, seed=f'randomSeed="{seed}"', inside=self.ONE.format("A")))
         assert self.values(given, seed=1) == self.values(given, seed=2)
         other = self.values(given)
         given = distribution_file(self.BODY.format(runs=3, seed='randomSeed="8"', inside=self.ONE.format("A")))
         assert self.values(given) != other
 
-    def test_without_one_the_callers_does(self, distribution_file: Write) -> None:
+    def test_file_without_random_seed_uses_given_seed(self, distribution_file: Write) -> None:
         path = distribution_file(self.BODY.format(runs=3, seed="", inside=self.ONE.format("A")))
         assert self.values(path, seed=1) == self.values(path, seed=1)
         assert self.values(path, seed=1) != self.values(path, seed=2)
 
-    def test_the_draws_of_a_seed_stay_what_they_are(self, stochastic: Write) -> None:
-        """Recorded once: results that were published with a seed have to come out again."""
+    def test_draws_of_a_seed_are_stable(self, stochastic: Write) -> None:
+        """Recorded values: published results with a seed must be reproducible."""
         path = stochastic(uniform("0", "1"), runs=2)
         assert drawn(path) == pytest.approx(RECORDED, abs=0)
 
@@ -192,21 +192,21 @@ RECORDED = [0.04999420891592776, 0.5056805047517539]
     ("distribution", "line", "message"),
     [
         (uniform("2", "1"), 7, "the range from 2 to 1 is empty"),
-        (uniform("-INF", "1"), 7, "the range from -inf to 1 has no end"),
-        (normal(0, 0), 7, "NormalDistribution has the variance 0; give a number above zero"),
+        (uniform("-INF", "1"), 7, "the range from -inf to 1 is infinite"),
+        (normal(0, 0), 7, "NormalDistribution has the variance 0; specify a number above zero"),
         (normal(0, -1), 7, "NormalDistribution has the variance -1"),
         ('<NormalDistribution expectedValue="INF" variance="1"/>', 7, "has the expected value inf"),
         (
             normal(0, 1, RANGE.format(0, 1), kind="LogNormalDistribution"),
             7,
-            "Range has the lower limit 0; that of LogNormalDistribution is above 0",
+            "Range has the lower limit 0; specify a limit above 0 for LogNormalDistribution",
         ),
-        (normal(1e4, 1, kind="LogNormalDistribution"), 7, "reaches beyond what a number can hold"),
+        (normal(1e4, 1, kind="LogNormalDistribution"), 7, "has values that are not finite"),
         (poisson(-1), 7, "PoissonDistribution has the expected value -1"),
         (poisson(5, RANGE.format(2.2, 2.8)), 7, "has a range without a whole number"),
-        (poisson(1, RANGE.format(10000, 10001)), 7, "has no probability left in its range"),
-        (histogram(("1", "0", "2"), ("1", "1", "3")), 9, "HistogramBin overlaps another"),
-        (histogram(("0", "0", "2")), 7, "Histogram has weights that add up to 0"),
+        (poisson(1, RANGE.format(10000, 10001)), 7, "has a probability of 0 in its range"),
+        (histogram(("1", "0", "2"), ("1", "1", "3")), 9, "HistogramBin overlaps another bin"),
+        (histogram(("0", "0", "2")), 7, "Histogram has weights with the sum 0"),
         (histogram(("-1", "0", "2"), ("2", "2", "3")), 8, "HistogramBin has the weight -1"),
         (weighted(("a", "NaN"), ("b", "1")), 7, "has the weight nan"),
         (
@@ -216,7 +216,7 @@ RECORDED = [0.04999420891592776, 0.5056805047517539]
         ),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(stochastic: Write, distribution: str, line: int, message: str) -> None:
+def test_invalid_distribution_error_has_line(stochastic: Write, distribution: str, line: int, message: str) -> None:
     path = stochastic(distribution)
     with pytest.raises(ScenarioError) as caught:
         load_distribution(path)
@@ -224,23 +224,23 @@ def test_what_is_wrong_is_said_with_its_line(stochastic: Write, distribution: st
     assert message in str(caught.value)
 
 
-def test_no_run_at_all(stochastic: Write) -> None:
-    with pytest.raises(ScenarioError, match=r":5: Stochastic asks for no test run; give a number above zero"):
+def test_zero_test_runs_is_an_error(stochastic: Write) -> None:
+    with pytest.raises(ScenarioError, match=r":5: Stochastic has numberOfTestRuns 0; specify a number above zero"):
         load_distribution(stochastic(uniform("0", "1"), runs=0))
 
 
-def test_a_parameter_that_is_drawn_twice(distribution_file: Write) -> None:
+def test_duplicate_parameter_is_an_error(distribution_file: Write) -> None:
     one = f'<StochasticDistribution parameterName="P">{uniform("0", "1")}</StochasticDistribution>\n'
     path = distribution_file(f'<Stochastic numberOfTestRuns="1">\n{one}{one}</Stochastic>')
-    with pytest.raises(ScenarioError, match=":7: the parameter 'P' is varied by another distribution too; see line 6"):
+    with pytest.raises(ScenarioError, match=":7: parameter 'P' is also varied by another distribution; see line 6"):
         load_distribution(path)
 
 
-def test_the_log_normal_distribution_is_new_in_1_3(distribution_file: Write) -> None:
+def test_log_normal_distribution_requires_version_1_3(distribution_file: Write) -> None:
     inside = normal(0, 1, kind="LogNormalDistribution")
     body = (
         '<Stochastic numberOfTestRuns="1"><StochasticDistribution parameterName="P">'
         f"{inside}</StochasticDistribution></Stochastic>"
     )
-    with pytest.raises(ScenarioError, match=r"OpenSCENARIO has it since 1\.3; the file says 1\.2"):
+    with pytest.raises(ScenarioError, match=r"part of OpenSCENARIO since 1\.3; the version of the file is 1\.2"):
         load_distribution(distribution_file(body, minor=2))

@@ -1,4 +1,4 @@
-"""Files as other people's editors and tools write them: encodings, names, numbers, and what they get wrong."""
+"""Files of third-party editors and tools: encodings, names, numbers and typical errors."""
 
 import codecs
 from collections.abc import Callable
@@ -45,7 +45,7 @@ SPLINE = """<ClothoidSpline timeEnd="3">
 
 
 def curve(order: int, points: int, knots: str, more: str = "") -> str:
-    """Follow a Nurbs."""
+    """Return a FollowTrajectoryAction with a Nurbs."""
     control = f"<ControlPoint {more}>{HERE}</ControlPoint>" * points
     knot = "".join(f'<Knot value="{value}"/>' for value in knots.split())
     return SHAPED.format(shape=f'<Nurbs order="{order}">{control}{knot}</Nurbs>')
@@ -61,13 +61,13 @@ def curve(order: int, points: int, knots: str, more: str = "") -> str:
         ("windows-1252", "cp1252", b""),
     ],
 )
-def test_encodings(scenario_xml: Build, declared: str, encoding: str, mark: bytes) -> None:
+def test_document_encodings_are_read(scenario_xml: Build, declared: str, encoding: str, mark: bytes) -> None:
     text = scenario_xml().decode().replace('name="Ego"', 'name="Mäuschen"')
     head = f'<?xml version="1.0" encoding="{declared}"?>\n' if declared else ""
     assert list(load_scenario(mark + (head + text).encode(encoding)).entities) == ["Mäuschen"]
 
 
-def test_comments_instructions_and_the_schema_s_location_change_nothing(scenario_xml: Build, story_xml: Text) -> None:
+def test_comments_and_processing_instructions_have_no_effect(scenario_xml: Build, story_xml: Text) -> None:
     plain = scenario_xml(story=story_xml())
     dressed = plain.replace(
         b"<OpenSCENARIO>",
@@ -78,13 +78,13 @@ def test_comments_instructions_and_the_schema_s_location_change_nothing(scenario
     assert load_scenario(dressed).storyboard == load_scenario(plain).storyboard
 
 
-def test_a_namespace_is_named_as_what_is_wrong(scenario_xml: Build) -> None:
+def test_document_namespace_is_an_error(scenario_xml: Build) -> None:
     xml = scenario_xml().replace(b"<OpenSCENARIO>", b'<OpenSCENARIO xmlns="urn:x">')
-    with pytest.raises(ScenarioError, match=r"take xmlns='urn:x' out"):
+    with pytest.raises(ScenarioError, match=r"remove xmlns='urn:x'"):
         load_scenario(xml)
 
 
-def test_names_in_any_script(scenario_xml: Build, story_xml: Text) -> None:
+def test_names_in_any_script_are_read(scenario_xml: Build, story_xml: Text) -> None:
     xml = (
         scenario_xml(story=story_xml()).decode().replace("Ego", "車 ①").replace('"event"', '"&lt;ブレーキ &amp; 2&gt;"')
     )
@@ -94,7 +94,7 @@ def test_names_in_any_script(scenario_xml: Build, story_xml: Text) -> None:
 
 
 @pytest.mark.parametrize(("written", "value"), [("1e1", 10.0), ("+5", 5.0), (" 2 ", 2.0), (".5", 0.5), ("1.E0", 1.0)])
-def test_numbers_as_the_schema_has_them(scenario_xml: Build, story_xml: Text, written: str, value: float) -> None:
+def test_numbers_in_schema_notation_are_read(scenario_xml: Build, story_xml: Text, written: str, value: float) -> None:
     action = load_scenario(scenario_xml(story=story_xml(speed=written))).storyboard.story[0].act[0].maneuver_group[0]
     private = action.maneuver[0].event[0].action[0].private_action
     assert private is not None
@@ -115,24 +115,36 @@ def test_numbers_as_the_schema_has_them(scenario_xml: Build, story_xml: Text, wr
         (PROFILE.format(dimension="time", extent=1, speed="INF"), "value of AbsoluteTargetSpeed is INF"),
         (PROFILE.format(dimension="time", extent=1, speed="-1e300"), "value of AbsoluteTargetSpeed is -1e\\+300"),
         (TELEPORT.format(x="-INF"), "x of WorldPosition is -INF"),
-        (LIMITED.format(limit="-1"), "maxAcceleration of DynamicConstraints is -1; give a number that is not negative"),
-        (SHAPED.format(shape=CLOTHOID.format(length=0, stop=5)), "length of Clothoid is 0; give a number above 0"),
-        (SHAPED.format(shape=CLOTHOID.format(length=9, stop=1)), "a trajectory goes back in time, from 2 s to 1 s"),
-        (SHAPED.format(shape=POLYLINE), "a trajectory goes back in time, from 3 s to 2 s"),
-        (SHAPED.format(shape=SPLINE), "a trajectory goes back in time, from 4 s to 3 s"),
-        (curve(1, 2, "0 1 2"), "Nurbs has the order 1; it has to be at least 2"),
-        (curve(2, 2, "0 0 1 0.5"), "Nurbs has knots that descend"),
+        (LIMITED.format(limit="-1"), "maxAcceleration of DynamicConstraints is -1; a number of at least 0 is expected"),
+        (
+            SHAPED.format(shape=CLOTHOID.format(length=0, stop=5)),
+            "length of Clothoid is 0; a number above 0 is expected",
+        ),
+        (SHAPED.format(shape=CLOTHOID.format(length=9, stop=1)), "times of the trajectory descend from 2 s to 1 s"),
+        (SHAPED.format(shape=POLYLINE), "times of the trajectory descend from 3 s to 2 s"),
+        (SHAPED.format(shape=SPLINE), "times of the trajectory descend from 4 s to 3 s"),
+        (curve(1, 2, "0 1 2"), "Nurbs has the order 1; it must be at least 2"),
+        (curve(2, 2, "0 0 1 0.5"), "Nurbs has descending knots"),
         (curve(2, 2, "0 1 1 1"), "Nurbs has no extent: its knots 2 to 3 are all 1"),
-        (curve(2, 2, "0 0 1 1", 'weight="0"'), "weight of ControlPoint is 0; give a number above 0"),
+        (curve(2, 2, "0 0 1 1", 'weight="0"'), "weight of ControlPoint is 0; a number above 0 is expected"),
         (TIMED.format(scale=0), "Timing has the scale 0"),
         (TIMED.format(scale=-2), "Timing has the scale -2"),
-        (FOG_LIGHTS.format(more='transitionTime="-1.2"', state=""), "transitionTime of LightStateAction is -1.2; give"),
-        (FOG_LIGHTS.format(more="", state='flashingOnDuration="-1"'), "flashingOnDuration of LightState is -1; give"),
-        (TOGETHER.format(more="", steady=-3), "distance of TargetDistanceSteadyState is -3; give"),
-        (TOGETHER.format(more='targetTolerance="-1"', steady=3), "targetTolerance of SynchronizeAction is -1; give"),
+        (
+            FOG_LIGHTS.format(more='transitionTime="-1.2"', state=""),
+            "transitionTime of LightStateAction is -1.2; a number",
+        ),
+        (
+            FOG_LIGHTS.format(more="", state='flashingOnDuration="-1"'),
+            "flashingOnDuration of LightState is -1; a number",
+        ),
+        (TOGETHER.format(more="", steady=-3), "distance of TargetDistanceSteadyState is -3; a number"),
+        (
+            TOGETHER.format(more='targetTolerance="-1"', steady=3),
+            "targetTolerance of SynchronizeAction is -1; a number",
+        ),
     ],
 )
-def test_numbers_that_mean_nothing_are_refused(
+def test_unusable_numbers_are_errors(
     tmp_path: Path, scenario_xml: Build, story_xml: Text, action: str, message: str
 ) -> None:
     path = tmp_path / "scene.xosc"
@@ -141,11 +153,11 @@ def test_numbers_that_mean_nothing_are_refused(
         load_scenario(path)
 
 
-def test_a_rate_and_a_limit_may_be_infinite(scenario_xml: Build, story_xml: Text) -> None:
+def test_infinite_rates_and_limits_are_accepted(scenario_xml: Build, story_xml: Text) -> None:
     for action in (PROFILE.format(dimension="rate", extent="INF", speed=5), LIMITED.format(limit="INF")):
         load_scenario(scenario_xml(story=story_xml(action=action)))
     load_scenario(scenario_xml(story=story_xml(condition=ENDLESS)))
 
 
-def test_the_sign_of_a_rate_does_not_matter(scenario_xml: Build, story_xml: Text) -> None:
+def test_negative_rates_are_accepted(scenario_xml: Build, story_xml: Text) -> None:
     load_scenario(scenario_xml(story=story_xml(action=PROFILE.format(dimension="rate", extent="-4", speed=5))))

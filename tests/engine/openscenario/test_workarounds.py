@@ -1,4 +1,4 @@
-"""What programs write that the schema refuses, and that can mean one thing only: read, with a warning."""
+"""Workarounds for schema deviations of authoring tools, which are read with a warning."""
 
 import math
 from collections.abc import Callable
@@ -53,40 +53,40 @@ def only(scenario: Scenario, kind: type[Kind]) -> Kind:
     return next(one for one in scenario.document.walk() if isinstance(one, kind))
 
 
-def test_a_light_may_stand_behind_its_state(scenario_xml: Build) -> None:
+def test_light_type_after_light_state_is_a_warning(scenario_xml: Build) -> None:
     scenario = load_scenario(scenario_xml(init=LIGHT))
     action = only(scenario, LightStateAction)
     assert action.light_state.mode is LightMode.ON
     assert action.light_type.vehicle_light is not None
     (warning,) = scenario.warnings
-    assert "LightState stands before LightType in LightStateAction; put LightType first" in str(warning)
+    assert "LightStateAction has LightState before LightType; put LightType first" in str(warning)
     assert action.line == warning.line
 
 
-def test_the_tree_that_was_given_stays_as_it_is(scenario_xml: Build) -> None:
+def test_workarounds_do_not_change_the_given_tree(scenario_xml: Build) -> None:
     root = etree.fromstring(scenario_xml(init=LIGHT))
     before = etree.tostring(root)
     load_scenario(root)
     assert etree.tostring(root) == before
 
 
-def test_the_misspelt_group_state_of_older_versions(scenario_xml: Build) -> None:
+def test_misspelled_signal_group_state_is_a_warning(scenario_xml: Build) -> None:
     scenario = load_scenario(scenario_xml(road=CONTROLLER))
     assert only(scenario, Phase).traffic_signal_group_state is not None
     assert "write TrafficSignalGroupState" in str(scenario.warnings[0])
     assert load_scenario(scenario_xml(minor=2, road=CONTROLLER)).warnings == ()
 
 
-def test_an_illuminance_before_it_was_called_so(scenario_xml: Build) -> None:
+def test_illuminance_before_1_3_is_a_warning(scenario_xml: Build) -> None:
     scenario = load_scenario(scenario_xml(minor=2, init=SUNNY.format(word="illuminance")))
     assert only(scenario, Sun).intensity == 1000.0
-    assert "raise revMinor to 3" in str(scenario.warnings[0])
+    assert "increase revMinor to 3" in str(scenario.warnings[0])
     both = SUNNY.format(word='intensity="1" illuminance')
-    with pytest.raises(ScenarioError, match="Sun has no attribute 'illuminance'; OpenSCENARIO has it"):
+    with pytest.raises(ScenarioError, match="Sun has no attribute 'illuminance'; part of OpenSCENARIO"):
         load_scenario(scenario_xml(minor=2, init=both))
 
 
-def test_a_catalog_too(scenario_xml: Build, tmp_path: Path) -> None:
+def test_workarounds_apply_to_catalogs(scenario_xml: Build, tmp_path: Path) -> None:
     (tmp_path / "skies.xosc").write_text(
         '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-31T12:00:00" description="" author=""/>\n'
         f'<Catalog name="skies">{ENVIRONMENT.format(word="illuminance")}</Catalog></OpenSCENARIO>'
@@ -101,7 +101,7 @@ def test_a_catalog_too(scenario_xml: Build, tmp_path: Path) -> None:
     assert (warning.source, warning.line) == (str(tmp_path / "skies.xosc"), 3)
 
 
-def test_a_maneuver_may_stand_before_one_of_a_catalog(scenario_xml: Build, tmp_path: Path) -> None:
+def test_maneuver_before_catalog_reference_is_a_warning(scenario_xml: Build, tmp_path: Path) -> None:
     (tmp_path / "ways.xosc").write_text(SHELF)
     place = f'<ManeuverCatalog><Directory path="{tmp_path}"/></ManeuverCatalog>'
     scenario = load_scenario(scenario_xml(catalogs=place, story=MIXED))
@@ -110,8 +110,8 @@ def test_a_maneuver_may_stand_before_one_of_a_catalog(scenario_xml: Build, tmp_p
     assert "put CatalogReferences first" in str(scenario.warnings[0])
 
 
-def test_a_command_may_stand_by_itself(scenario_xml: Build) -> None:
-    """So scenariogeneration writes the user-defined actions of Init, and takes them in events."""
+def test_command_without_user_defined_action_is_a_warning(scenario_xml: Build) -> None:
+    """scenariogeneration writes user-defined actions of Init in this form, and accepts them in events."""
     command = '<CustomCommandAction type="eidrive.channel">none</CustomCommandAction>'
     event = MIXED.replace("<UserDefinedAction>", "").replace("</UserDefinedAction>", "")
     story = event.replace('<CatalogReference catalogName="ways" entryName="from the shelf"/>', "")
@@ -125,7 +125,7 @@ def test_a_command_may_stand_by_itself(scenario_xml: Build) -> None:
     assert [str(one).count("put it into a UserDefinedAction") for one in scenario.warnings] == [1, 1]
 
 
-def test_the_misspelt_traffic_island(scenario_xml: Build) -> None:
+def test_misspelled_traffic_island_is_a_warning(scenario_xml: Build) -> None:
     island = """<ScenarioObject name="Island"><MiscObject name="i" mass="1" miscObjectCategory="grafficIsland">
     <BoundingBox><Center x="0" y="0" z="0"/><Dimensions length="1" width="1" height="1"/></BoundingBox>
     <Properties/></MiscObject></ScenarioObject>"""
@@ -134,29 +134,32 @@ def test_the_misspelt_traffic_island(scenario_xml: Build) -> None:
     assert "write trafficIsland" in str(scenario.warnings[0])
 
 
-def test_infinity_as_python_writes_it(scenario_xml: Build) -> None:
+def test_python_infinity_is_a_warning(scenario_xml: Build) -> None:
     scenario = load_scenario(scenario_xml(init=OFFSET.format(continuous="true", shape="step").replace("None", "inf")))
     assert only(scenario, LaneOffsetActionDynamics).max_lateral_acc == math.inf
-    assert "is 'inf', as Python writes infinity; it is taken so; write INF" in str(scenario.warnings[0])
+    assert "is 'inf', which is read as infinity; write INF" in str(scenario.warnings[0])
 
 
-def test_an_orientation_that_says_nothing_is_told(scenario_xml: Build) -> None:
-    """By the standard the type is absolute and the heading 0; scenariogeneration writes it where none was given."""
+def test_empty_orientation_is_a_warning(scenario_xml: Build) -> None:
+    """By the standard the type is absolute and the heading 0; scenariogeneration writes it by default."""
     relative = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation {}/></RelativeObjectPosition>'
     action = '<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>{}</Position></TeleportAction>{}'
     end = "</PrivateAction></Private>"
     (warning,) = load_scenario(scenario_xml(init=action.format(relative.format(""), end))).warnings
-    assert "the heading 0 of the world" in str(warning)
+    assert "heading 0 of the world frame" in str(warning)
     assert load_scenario(scenario_xml(init=action.format(relative.format('type="relative"'), end))).warnings == ()
 
 
-def test_none_is_what_is_missing_where_it_may_be_missing(scenario_xml: Build) -> None:
+def test_none_in_optional_attribute_is_a_warning(scenario_xml: Build) -> None:
     scenario = load_scenario(scenario_xml(init=OFFSET.format(continuous="true", shape="linear")))
-    assert "maxLateralAcc of LaneOffsetActionDynamics is 'None', as Python writes" in str(scenario.warnings[0])
+    (warning,) = scenario.warnings
+    assert warning.message == (
+        "maxLateralAcc of LaneOffsetActionDynamics is 'None', which is read as a missing attribute"
+    )
     with pytest.raises(ScenarioError, match="continuous of LaneOffsetAction is 'None', which is not"):
         load_scenario(scenario_xml(init=OFFSET.format(continuous="None", shape="linear")))
 
 
-def test_what_stands_one_level_too_high_is_told_where_it_belongs(scenario_xml: Build) -> None:
-    with pytest.raises(ScenarioError, match="Environment in GlobalAction; Environment stands in EnvironmentAction"):
+def test_element_one_level_too_high_error_has_correct_parent(scenario_xml: Build) -> None:
+    with pytest.raises(ScenarioError, match="Environment in GlobalAction; Environment belongs into EnvironmentAction"):
         load_scenario(scenario_xml(init=BARE))
