@@ -1,4 +1,4 @@
-"""All background traffic of a run: the fleet, the instances that make it, and what changes in each step."""
+"""Background traffic of a run: the fleet, its generators, and the changes of each step."""
 
 from __future__ import annotations
 
@@ -19,17 +19,20 @@ from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
 TRIES = 24
-"""So many places are looked at before it counts as none free."""
+"""Maximum number of sites that are tested for a spawn."""
 SPREAD, LEAST, MOST = 0.1, 0.8, 1.2
-"""Standard deviation of the share of the limit to which drivers keep, and its bounds; those of SUMO's passenger cars
-(`speedFactor` normc(1, 0.1, 0.2, 2)) with a narrower cut."""
+"""Standard deviation and bounds of the drivers' share of the speed limit. The distribution is that of passenger cars in
+SUMO (`speedFactor` normc(1, 0.1, 0.2, 2)) with narrower bounds.
+"""
 
 
 @dataclass
 class Changes:
-    """What one step of the traffic asks of the world.
+    """Changes of the world by one step of the traffic.
 
-    additions  who enters, with body and place;  removals  who leaves;  placements  where all stand after the step
+    additions   entering actors with specification and placement
+    removals    leaving actors
+    placements  placements of all cars after the step
     """
 
     additions: dict[str, tuple[ActorSpec, Placement]] = field(default_factory=dict)
@@ -38,13 +41,13 @@ class Changes:
 
 
 class BackgroundTraffic:
-    """Cars that no storyboard element names: made by instances, driven by the fleet.
+    """Background cars without storyboard entity: created by generators, driven by the fleet.
 
-    Cars are called after their traffic, `<name>.0001` and on; no name is used twice in a run.
+    Cars are named after their traffic, `<name>.0001` and so on. Each name is used once in a run.
 
-    center     where an entity is and moves, None while it is not in the world
-    taken      names that nobody else may have
-    must_stop  what the traffic lights say
+    center     returns position and motion of an entity, or None while it is absent
+    taken      names that are already in use
+    must_stop  whether a traffic light requires a stop
     """
 
     def __init__(
@@ -72,31 +75,31 @@ class BackgroundTraffic:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All cars."""
+        """Names of all cars."""
         return self.fleet.names
 
     def spec(self, name: str) -> ActorSpec:
-        """Return the body of a car."""
+        """Return the specification of a car."""
         return self.fleet.spec(name)
 
     def key(self, name: str) -> int:
-        """Return the number of the next instance of this traffic."""
+        """Return the number of the next generator of this traffic name."""
         self._started[name] = self._started.get(name, 0) + 1
         return self._started[name]
 
     def start(self, instance: TrafficGenerator) -> None:
-        """An instance begins; it works from the next step on."""
+        """Start a generator. It takes effect from the next step on."""
         self.instances.append(instance)
         self._begun = True
 
     def stop(self, name: str | None) -> None:
-        """End all instances of this name, or all: nothing comes and goes by them any more; their cars drive on."""
+        """Stop all generators of this name, or all generators. Their cars remain."""
         for instance in self.instances:
             if name is None or instance.name == name:
                 instance.active = False
 
     def step(self, view: WorldView, dt: float) -> Changes:
-        """Let the instances bring in and take out cars as often as drivers decide, and all cars drive on by dt."""
+        """Run the generators in each decision step, and move all cars by dt."""
         self.time, self.dt = view.time, self.fleet.interval(dt)
         changes = self._changes = Changes()
         if self.instances or len(self.fleet):
@@ -108,7 +111,7 @@ class BackgroundTraffic:
         return changes
 
     def _work(self, view: WorldView) -> None:
-        """Look where the others are; let the instances bring in and take out cars."""
+        """Observe the other actors and run the generators."""
         self._begun = False
         growing = any(instance.is_due(self) for instance in self.instances)
         self.fleet.observe(view, everywhere=growing)
@@ -124,11 +127,11 @@ class BackgroundTraffic:
         return self.fleet.positions(names)
 
     def sites(self, names: list[str]) -> SpawnSites:
-        """Return the places on lanes where cars are."""
+        """Return the sites on lanes at which cars are."""
         return SpawnSites.at(self.fleet.lanes, *self.fleet.places(names))
 
     def starting_speed(self, sites: SpawnSites, participant: Participant) -> Array:
-        """Return (K,) the speeds at which traffic usually passes places [m/s]."""
+        """Return the usual speeds of traffic at sites (K,) [m/s]."""
         if participant.walks:
             return np.full(len(sites), WALKING)
         lanes = self.fleet.lanes
@@ -146,9 +149,10 @@ class BackgroundTraffic:
         rng: np.random.Generator,
         given_speed: float | None,
     ) -> bool:
-        """Put a participant at the first free one of places in random order; False if none is free.
+        """Spawn a participant at the first free site in random order. Return False if no site is free.
 
-        speed  (K,) with which it would start at each;  given_speed  the one that the scenario states, if any
+        speed        (K,) initial speed at each site [m/s]
+        given_speed  initial speed that the scenario specifies, if any [m/s]
         """
         order = rng.permutation(len(sites))[:TRIES]
         some, speed = sites.subset(order), np.minimum(speed[order], participant.spec.max_speed)
@@ -174,7 +178,7 @@ class BackgroundTraffic:
         return True
 
     def despawn(self, name: str) -> None:
-        """A car disappears."""
+        """Remove a car."""
         self.fleet.remove(name)
         self._forget(name)
 

@@ -1,4 +1,4 @@
-"""The state of all cars of a fleet: a row for each, in the order in which they came."""
+"""State of all cars of a fleet: one row per car, in the order of addition."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eidrive_scenario.traffic.idm import Drivers, IntelligentDriver
 from eidrive_scenario.world.actor import ActorSpec
 
 PLANNED = 12
-"""Most lanes that a car knows beyond its own."""
+"""Maximum number of planned lanes beyond the current one."""
 
 
 def _floats() -> Array:
@@ -24,20 +24,24 @@ def _integers() -> Integers:
 
 @dataclass
 class Cars:
-    """Columns (N,) and (N, PLANNED + 1), all of one length.
+    """Columns (N,) and (N, PLANNED + 1) of one length.
 
     progress, speed, acceleration  along the lane [m], [m/s], [m/s²]
-    front, rear   from the reference point to the bumpers [m]
-    own_speed     desired speed, NaN for the limit [m/s];  factor  of the limit that the car keeps to
-    top_speed     what the vehicle can do [m/s]
-    fallback      desired speed where the map gives no limit [m/s]
-    offset        left of the lane's center [m];  slope  of the path against it, left positive
-    shift         offset at the start of a lane change [m];  shift_done, shift_length  of its way [m]
-    plan          rows of the lanes that the car takes, its own first, -1 beyond the end
-    granted       which of them, in junctions, it may enter
-    asked         since when it has been asking for a junction [s], NaN while it does not
-    turns         forks that it has decided;  number  running number, the same for its whole life
-    walks         True for who walks, on sidewalks
+    front, rear   distances from the reference point to the bumpers [m]
+    own_speed     desired speed, NaN for the limit [m/s]
+    factor        share of the speed limit that is the desired speed
+    top_speed     maximum speed of the vehicle [m/s]
+    fallback      desired speed on lanes without a limit [m/s]
+    offset        distance to the left of the lane center [m]
+    slope         slope of the path against the lane, left positive
+    shift         offset at the start of a lane change [m]
+    shift_done, shift_length  covered and total length of the lane change [m]
+    plan          rows of the lanes ahead, the current one first, -1 beyond the end
+    granted       whether the car may enter each of these lanes in junctions
+    asked         time since which it has requested a junction [s], NaN if it has not
+    turns         number of branches selected so far
+    number        running number, constant for the lifetime of the car
+    walks         True for pedestrians, which use sidewalks
     """
 
     progress: Array = field(default_factory=_floats)
@@ -64,7 +68,7 @@ class Cars:
     specs: list[ActorSpec] = field(default_factory=list)
 
     def append(self, spec: ActorSpec, driver: IntelligentDriver, **values: float | bool) -> int:
-        """Return a new row; what is not given is 0, no, or no lane at all. Its index."""
+        """Append a row and return its index. Values that are not given are 0, False or no lane."""
         for entry in fields(self):
             column = getattr(self, entry.name)
             if isinstance(column, np.ndarray):
@@ -76,7 +80,7 @@ class Cars:
         return len(self.specs) - 1
 
     def delete(self, index: int) -> None:
-        """Take a row out."""
+        """Delete a row."""
         for entry in fields(self):
             column = getattr(self, entry.name)
             if isinstance(column, np.ndarray):
@@ -89,10 +93,10 @@ class Cars:
 
     @property
     def row(self) -> Integers:
-        """(N,) the lanes on which the cars are."""
+        """Lanes of the cars (N,)."""
         return self.plan[:, 0]
 
     @property
     def changing(self) -> Bools:
-        """(N,) who is on the way from one lane to another."""
+        """Whether each car is changing lanes (N,)."""
         return np.asarray(self.shift != 0.0)

@@ -1,9 +1,8 @@
-"""Who may enter a junction: first come, first served, one at a time on lanes that meet.
+"""Right of way in junctions: first come, first served, one car at a time on conflicting lanes.
 
-The first car of a queue asks for its passage, all of its lanes through the junction, when it comes within its braking
-distance, provided that there is room behind the junction. It gets them once nobody holds a lane that crosses, joins or
-begins with one of them. Who holds a lane keeps it until it has left it, and against lanes that only begin together
-until it has cleared the fork.
+The first car of a queue requests all lanes of its passage through the junction within its braking distance, if there is
+space behind the junction. They are granted when no car holds a lane that crosses, merges or diverges. A car holds a
+lane until it has left it, and against diverging lanes until it has cleared the fork.
 """
 
 from __future__ import annotations
@@ -17,15 +16,17 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.traffic.lanes import TrafficLanes
 
 CLEARANCE = 3.2
-"""Two lanes meet where their center lines come closer than this: less than lanes side by side have, more than two cars
-need whose ends swing out in bends [m]."""
+"""Minimum distance of the center lines of lanes without a conflict [m].
+
+It is less than that of adjacent lanes, and more than two cars need whose ends swing out in bends.
+"""
 FORK = 9.0
-"""From here on two lanes that begin together lie apart [m]."""
+"""Distance from the start at which diverging lanes are separate [m]."""
 SAMPLE = 0.75
 
 
 class Crossings:
-    """Which lanes through junctions meet, and who holds them."""
+    """Conflicting lanes of junctions and the cars that hold them."""
 
     def __init__(self, lanes: TrafficLanes) -> None:
         self._lanes = lanes
@@ -36,15 +37,15 @@ class Crossings:
             if junction is not None and lanes.tables.lane_drivable[row]:
                 self._by_junction.setdefault(junction, []).append(row)
         self.holders: dict[int, dict[str, float]] = {}
-        """For each lane in a junction, who holds it and how far its rear has come on it [m]."""
+        """Cars that hold each lane of a junction, with the progress of their rear on it [m]."""
 
     def junction_lanes(self, row: int) -> list[int]:
-        """Return all lanes of the junction in which a lane lies."""
+        """Return all lanes of the junction that contains a lane."""
         junction = self._lanes.roads.roads[self._lanes.keys[row].road].junction_id
         return [] if junction is None else self._by_junction.get(junction, [])
 
     def meeting(self, row: int) -> dict[int, bool]:
-        """Return the lanes that a lane through a junction meets; True if they only begin together."""
+        """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
         known = self._meeting.get(row)
         if known is not None:
             return known
@@ -66,7 +67,7 @@ class Crossings:
 
     @cached_property
     def _lines(self) -> tuple[dict[int, Array], Array, Array]:
-        """The center lines (K, 2) of all lanes in junctions, and the corners of the boxes around those of all lanes."""
+        """Center lines (K, 2) of all lanes in junctions, and the corners of their bounding boxes."""
         lanes = self._lanes
         inside = np.array([row for group in self._by_junction.values() for row in group], dtype=np.int64)
         counts = np.maximum((lanes.length[inside] / SAMPLE).astype(np.int64), 1) + 1
@@ -82,7 +83,7 @@ class Crossings:
         return dict(zip(inside.tolist(), pieces, strict=True)), low, high
 
     def free(self, row: int, name: str, blocked: set[int]) -> bool:
-        """Return True if `name` may have a lane: nobody holds, and nothing stands on, a lane that it meets."""
+        """Return True if `name` may hold a lane: no car holds and nothing blocks a lane in conflict with it."""
         for other, only_fork in self.meeting(row).items():
             if other in blocked:
                 return False
@@ -92,7 +93,7 @@ class Crossings:
         return True
 
     def take(self, row: int, name: str) -> None:
-        """`name` holds a lane from now on."""
+        """Let `name` hold a lane."""
         self.holders.setdefault(row, {})[name] = -np.inf
 
     def holds(self, name: str, row: int) -> bool:
@@ -100,10 +101,10 @@ class Crossings:
         return name in self.holders.get(row, ())
 
     def release(self, name: str, row: int) -> None:
-        """`name` has left a lane."""
+        """Release a lane that `name` has left."""
         self.holders.get(row, {}).pop(name, None)
 
     def forget(self, name: str) -> None:
-        """`name` holds nothing any more."""
+        """Release all lanes that `name` holds."""
         for held in self.holders.values():
             held.pop(name, None)

@@ -1,4 +1,4 @@
-"""Background traffic: cars that follow lanes and each other, change lanes, and stop for what stands in their way."""
+"""Fleet of background cars, which follow lanes and leaders, change lanes, and stop for obstacles."""
 
 from __future__ import annotations
 
@@ -32,16 +32,17 @@ from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
 REACT_EACH = 0.05
-"""Drivers look and decide as often; in shorter steps they keep their acceleration in between [s]."""
+"""Interval between decisions of drivers [s]. In shorter time steps the acceleration is constant in between."""
 
 
 class Fleet:
     """Cars on the lanes of a road network.
 
-    Each follows the lane's center with the Intelligent Driver Model, slows down for bends, takes a branch at a fork by
-    its own stream of random numbers (seed, name), and enters a junction only when the lanes that it meets are free and
-    its light, if any, lets it. Lanes are changed by MOBIL. A car that reaches the end of the lanes leaves: `departed`
-    names it.
+    Each car follows the center of its lane with the Intelligent Driver Model and slows down for bends. It selects
+    branches
+    by a separate stream of random numbers (seed, name). It enters a junction only if the lanes in conflict are free and
+    its traffic light permits it. Lanes are changed by MOBIL. A car at the end of the lanes leaves and is listed in
+    `departed`.
     """
 
     def __init__(
@@ -72,16 +73,16 @@ class Fleet:
 
     @property
     def decides(self) -> bool:
-        """Whether the drivers look around in the next step."""
+        """Whether drivers decide in the next step."""
         return self._until < 1e-9
 
     def interval(self, dt: float) -> float:
-        """Return the time between two decisions in steps of dt [s]."""
+        """Return the time between two decisions for steps of dt [s]."""
         return max(round(REACT_EACH / dt), 1) * dt
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The cars, in the order in which they were added."""
+        """Names of the cars in the order of addition."""
         return tuple(self._index)
 
     @property
@@ -91,17 +92,17 @@ class Fleet:
 
     @property
     def specs(self) -> list[ActorSpec]:
-        """The bodies of the cars."""
+        """Specifications of the cars."""
         return self._cars.specs
 
     @property
     def drivers(self) -> Drivers:
-        """The parameters of the cars' drivers."""
+        """Driver parameters of the cars."""
         return self._cars.drivers
 
     @property
     def boxes(self) -> Array:
-        """(N, 7) x y z l w h yaw of the cars' bounding boxes now [m, rad]."""
+        """Bounding boxes x y z l w h yaw of the cars (N, 7) [m, rad]."""
         poses, body = self.poses, np.array([(*spec.offset, *spec.size) for spec in self.specs]).reshape(-1, 6)
         cos, sin = np.cos(poses[:, 3]), np.sin(poses[:, 3])
         x = poses[:, 0] + cos * body[:, 0] - sin * body[:, 1]
@@ -109,7 +110,7 @@ class Fleet:
         return np.column_stack([x, y, poses[:, 2] + body[:, 2], body[:, 3:], poses[:, 3]])
 
     def spec(self, name: str) -> ActorSpec:
-        """Return the body of a car."""
+        """Return the specification of a car."""
         return self._cars.specs[self._index[name]]
 
     def positions(self, names: Sequence[str]) -> tuple[Array, Array]:
@@ -137,9 +138,9 @@ class Fleet:
         desired_speed: float | None = None,
         driver: IntelligentDriver | None = None,
     ) -> Placement:
-        """Bring a car in at a lane's center line; without a desired speed it drives at the limit.
+        """Add a car at the center line of a lane. Without a desired speed it uses the speed limit.
 
-        Raise PositionError for a lane that does not exist, ValueError for a name that is taken.
+        Raise PositionError if the lane does not exist, ValueError if the name is in use.
         """
         row, progress = self.lanes.of(location)
         return self.add_at(spec, row, progress, speed=speed, desired_speed=desired_speed, driver=driver)
@@ -156,9 +157,10 @@ class Fleet:
         factor: float = 1.0,
         fallback: float = FREE,
     ) -> Placement:
-        """Return `add`, by the lane's row and the progress along it.
+        """Add a car by lane row and progress.
 
-        factor    of the speed limit that the car keeps to;  fallback  its desired speed where there is no limit [m/s]
+        factor    share of the speed limit that is the desired speed
+        fallback  desired speed on lanes without a limit [m/s]
         """
         if spec.name in self._index:
             raise ValueError(f"car {spec.name!r} is in the fleet already")
@@ -188,7 +190,7 @@ class Fleet:
         return self._placement(index, teleport=True)
 
     def remove(self, name: str) -> None:
-        """Take a car out."""
+        """Remove a car."""
         index = self._index[name]
         self._right_of_way.forget(name)
         self._cars.delete(index)
@@ -197,7 +199,7 @@ class Fleet:
 
     @property
     def poses(self) -> Array:
-        """(N, 6) x y z yaw pitch roll of the reference points now [m, rad]."""
+        """Poses x y z yaw pitch roll of the reference points (N, 6) [m, rad]."""
         if self._poses is None:
             cars, lanes = self._cars, self.lanes
             sign = lanes.direction[cars.row]
@@ -207,7 +209,7 @@ class Fleet:
         return self._poses
 
     def placements(self) -> dict[str, Placement]:
-        """Where the cars are now."""
+        """Return the current placements of the cars."""
         rows = zip(self._index, self.poses.tolist(), self._cars.speed.tolist(), strict=True)
         return {name: Placement(x, y, z, h, p, r, speed) for name, (x, y, z, h, p, r), speed in rows}
 
@@ -216,15 +218,16 @@ class Fleet:
         return Placement(x, y, z, h, p, r, float(self._cars.speed[index]), teleport)
 
     def observe(self, view: WorldView, *, everywhere: bool = True) -> None:
-        """Look where all others are; with `everywhere` False only near the cars of the fleet."""
+        """Observe the other actors; with `everywhere` False only those near the cars of the fleet."""
         near = None if everywhere else self.poses[:, :2]
         self._foreign, self._moving = obstacles(self.lanes, view, frozenset(self._index), near)
 
     def step(self, view: WorldView | None, dt: float) -> dict[str, Placement]:
-        """Drive on by dt; whatever in `view` is not of the fleet is an obstacle. Returns where the cars are then.
+        """Move by dt and return the placements. Actors in `view` outside the fleet are obstacles.
 
-        Without a view the others are where `observe` saw them last. Cars that left in this step are in `departed` and
-        no more in the result.
+        Without a view the positions of the last `observe` are used. Cars that left in this step are in `departed` and
+        not in
+        the result.
         """
         self.departed = frozenset()
         self._ticks += 1
@@ -245,7 +248,7 @@ class Fleet:
         return self.placements()
 
     def _decide(self, dt: float) -> None:
-        """Look ahead: who accelerates how, enters which junction, changes which lane."""
+        """Decide on accelerations, junction entries and lane changes."""
         cars = self._cars
         self._decisions += 1
         row_lengths = np.where(cars.plan >= 0, self.lanes.length[cars.plan], 0.0)
@@ -262,13 +265,13 @@ class Fleet:
         self._change_lanes(self.interval(dt), leaders, desired, occupants, begins)
 
     def occupants(self) -> Occupants:
-        """Everything on the lanes: the fleet, also on the lanes that its cars are leaving, others, lanes' ends."""
+        """Return all occupants: cars (also on lanes that they are leaving), other actors, lane ends."""
         cars = self._cars
         own = np.arange(len(cars))
         still, lane = self._changes.still_left(cars)
-        who, row = np.concatenate([own, still]), np.concatenate([cars.row, lane])
-        key = cars.progress[who]
-        mine = Occupants(row, key, key + cars.rear[who], key + cars.front[who], cars.speed[who], who)
+        indices, row = np.concatenate([own, still]), np.concatenate([cars.row, lane])
+        key = cars.progress[indices]
+        mine = Occupants(row, key, key + cars.rear[indices], key + cars.front[indices], cars.speed[indices], indices)
         return concatenate_occupants(mine, self._foreign, self._ends)
 
     def _ends_of_lanes(self) -> Occupants:
@@ -277,9 +280,9 @@ class Fleet:
         return Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
 
     def _leaders(self, occupants: Occupants) -> Leaders:
-        """Return the leaders of all cars; of those that change lanes, the nearer one of both lanes.
+        """Return the leaders of all cars. During a lane change it is the nearer one of both lanes.
 
-        The end of a lane does not stop a car that is leaving it: only by driving on it gets out of that lane.
+        The end of a lane does not stop a car that is leaving this lane, as it leaves only while moving.
         """
         cars = self._cars
         leaders = find_leaders(self.lanes, cars.plan, cars.progress, cars.front, occupants)
@@ -297,15 +300,15 @@ class Fleet:
     def _change_lanes(
         self, interval: float, leaders: Leaders, desired: Array, occupants: Occupants, begins: Array
     ) -> None:
-        """Let the drivers whose turn it is think of another lane."""
+        """Let drivers whose turn it is consider a lane change."""
         cars = self._cars
         every = max(round(DECIDE_EACH / interval), 1)
-        who = np.flatnonzero(cars.number % every == self._decisions % every)
-        if not who.size:
+        indices = np.flatnonzero(cars.number % every == self._decisions % every)
+        if not indices.size:
             return
         junction = (cars.plan >= 0) & self.lanes.in_junction[cars.plan]
         to_junction = np.where(junction, begins, np.inf).min(axis=1)
-        for index, target in self._changes.decide(cars, who, leaders, desired, occupants, to_junction):
+        for index, target in self._changes.decide(cars, indices, leaders, desired, occupants, to_junction):
             self._changes.begin(cars, index, target)
             cars.plan[index] = -1
             cars.plan[index, 0] = target
@@ -313,7 +316,7 @@ class Fleet:
             self._plans.extend(cars, index)
 
     def _pass_ends(self) -> None:
-        """Cars that have come to the end of their lane go on in the next one, or leave."""
+        """Move cars at the end of their lane to the next one, or remove them."""
         gone = self._plans.pass_ends(self._cars)
         for name in gone:
             self.remove(name)

@@ -10,21 +10,24 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array
 
 ABOVE_DESIRED = 2.0
-"""A car that is only too fast brakes no harder than so many times its comfortable deceleration, whereas the model's own
-term grows without a bound (Treiber and Kesting, 2013, chapter 11, on the improved acceleration function)."""
+"""Maximum braking above the desired speed in units of the comfortable deceleration.
+
+The term of the model grows without a bound (Treiber and Kesting, 2013, chapter 11, on the improved acceleration
+function).
+"""
 
 
 @dataclass(frozen=True)
 class IntelligentDriver:
-    """Parameters of the model; the values are those of the city traffic of Treiber and Kesting (2013), table 11.2.
+    """Parameters of the model; the defaults are for city traffic by Treiber and Kesting (2013), table 11.2.
 
-    time_gap          T, to the leader in equilibrium [s]
-    standstill_gap    s0, bumper to bumper [m]
-    acceleration      a, the largest in normal driving [m/s²]
-    deceleration      b, comfortable braking [m/s²]
-    exponent          δ of the approach to the desired speed
-    emergency         the brakes' limit, which the model alone does not have [m/s²]
-    lateral_acceleration  in curves; slows the car down ahead of them [m/s²]
+    time_gap              T, time gap to the leader in equilibrium [s]
+    standstill_gap        s0, gap between bumpers at standstill [m]
+    acceleration          a, maximum acceleration in normal driving [m/s²]
+    deceleration          b, comfortable deceleration [m/s²]
+    exponent              δ, exponent of the approach to the desired speed
+    emergency             maximum deceleration of the brakes, which the model does not limit [m/s²]
+    lateral_acceleration  maximum lateral acceleration in curves, ahead of which the car slows down [m/s²]
     """
 
     time_gap: float = 1.0
@@ -36,15 +39,16 @@ class IntelligentDriver:
     lateral_acceleration: float = 2.0
 
     def response(self, speed: Array, desired_speed: Array, gap: Array, approach: Array) -> Array:
-        """Accelerations (N,) [m/s²].
+        """Return the accelerations (N,) [m/s²].
 
-        speed, desired_speed  (N,) [m/s];  gap  bumper to bumper, inf without a leader (N,) [m]
-        approach  own speed less the leader's (N,) [m/s]
+        speed, desired_speed  (N,) [m/s]
+        gap                   (N,) distance between bumpers, inf without a leader [m]
+        approach              (N,) own speed minus the speed of the leader [m/s]
         """
         return Drivers.of([self]).response(speed, desired_speed, gap, approach)
 
     def equilibrium_gap(self, speed: float, desired_speed: float) -> float:
-        """Return the gap at which a string of cars keeps one speed (equation 5 of the paper) [m]."""
+        """Return the gap at which a string of cars has constant speed (equation 5 of the paper) [m]."""
         free: float = 1.0 - (speed / desired_speed) ** self.exponent
         return (self.standstill_gap + speed * self.time_gap) / float(np.sqrt(free))
 
@@ -54,50 +58,50 @@ COLUMNS = tuple(entry.name for entry in fields(IntelligentDriver))
 
 @dataclass(frozen=True)
 class Drivers:
-    """The parameters of many drivers: one row for each, one column for each field of IntelligentDriver."""
+    """Parameters of many drivers: one row per driver, one column per field of IntelligentDriver."""
 
     table: Array
 
     @classmethod
     def of(cls, drivers: list[IntelligentDriver]) -> Drivers:
-        """Drivers as a table."""
+        """Return drivers as a table."""
         rows = [[getattr(driver, name) for name in COLUMNS] for driver in drivers]
         return cls(np.array(rows, dtype=np.float64).reshape(-1, len(COLUMNS)))
 
     def of_rows(self, rows: NDArray[np.int64]) -> Drivers:
-        """Some of them."""
+        """Return some of the drivers."""
         return Drivers(self.table[rows])
 
     def response(self, speed: Array, desired_speed: Array, gap: Array, approach: Array) -> Array:
-        """As `IntelligentDriver.response`, each driver by its own parameters."""
+        """Return `IntelligentDriver.response` with the parameters of each driver."""
         time_gap, standstill_gap, acceleration, deceleration, exponent, emergency, _ = self.table.T
         braking = speed * approach / (2.0 * np.sqrt(acceleration * deceleration))
-        wanted = standstill_gap + np.maximum(0.0, speed * time_gap + braking)
+        desired_gap = standstill_gap + np.maximum(0.0, speed * time_gap + braking)
         free = acceleration * (1.0 - (speed / np.maximum(desired_speed, 1e-3)) ** exponent)
         free = np.maximum(free, -ABOVE_DESIRED * deceleration)
-        found = free - acceleration * (wanted / np.maximum(gap, 1e-3)) ** 2
+        found = free - acceleration * (desired_gap / np.maximum(gap, 1e-3)) ** 2
         return np.asarray(np.maximum(found, -emergency))
 
     @property
     def standstill_gap(self) -> Array:
-        """s0 of each [m]."""
+        """s0 of each driver [m]."""
         return self.table[:, 1]
 
     @property
     def deceleration(self) -> Array:
-        """b of each [m/s²]."""
+        """b of each driver [m/s²]."""
         return self.table[:, 3]
 
     @property
     def lateral_acceleration(self) -> Array:
-        """In curves, of each [m/s²]."""
+        """Maximum lateral acceleration of each driver in curves [m/s²]."""
         return self.table[:, 6]
 
 
 def ballistic(speed: Array, acceleration: Array, dt: float) -> tuple[Array, Array]:
-    """Return distance covered in dt and the speed after it; a car that brakes stands still and does not back up.
+    """Return the distance covered in dt and the speed after it. A braking car stops and does not move backwards.
 
-    The second-order step of Treiber and Kanagaraj, Physica A 419 (2015) 183.
+    Second-order step of Treiber and Kanagaraj, Physica A 419 (2015) 183.
     """
     after = speed + acceleration * dt
     stops = after < 0.0

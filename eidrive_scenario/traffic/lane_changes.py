@@ -1,4 +1,4 @@
-"""Which cars change lanes, and how they move sideways."""
+"""Lane changes of cars: decision and lateral motion."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, Occupants, find_f
 from eidrive_scenario.traffic.mobil import LaneChanger, Prospect, incentive, safe
 
 DURATION = 4.0
-"""A lane change takes so long at an even speed [s]; Toledo and Zohar, TRR 1999 (2007) 71, found a mean of 4.6 s."""
+"""Duration of a lane change at constant speed [s]. Toledo and Zohar, TRR 1999 (2007) 71, found a mean of 4.6 s."""
 SHORTEST = 12.0
-"""Less way than this does not suffice for a lane change [m]."""
+"""Minimum length of a lane change [m]."""
 SLOWEST = 2.0
-"""Slower cars stay in their lane, unless it ends ahead of them [m/s]."""
+"""Minimum speed for a lane change, unless the lane ends [m/s]."""
 LAST_CHANCE = 50.0
-"""Within this distance from its lane's end a car changes however slow it is [m]."""
+"""Distance to the end of a lane within which a car changes at any speed [m]."""
 DECIDE_EACH = 0.5
-"""A driver thinks of changing lanes as often [s]."""
+"""Interval between lane change decisions of a driver [s]."""
 SETTLED = 0.3
-"""This near the center of its lane a car may think of the next change [m]."""
+"""Maximum distance from the lane center for a new lane change [m]."""
 ROOM = 60.0
-"""Of two cars that would change into the same lane at once, this near each other, only one does [m]."""
+"""Minimum distance between two cars that change to the same lane at the same time [m]."""
 
 
 class LaneChanges:
-    """Lane changes by MOBIL with the cars' own car-following model."""
+    """Lane changes by MOBIL with the car-following models of the cars."""
 
     def __init__(self, lanes: TrafficLanes, changer: LaneChanger, driver: IntelligentDriver) -> None:
         self._lanes = lanes
@@ -36,29 +36,30 @@ class LaneChanges:
         self._others = Drivers.of([driver])
 
     def decide(
-        self, cars: Cars, who: Integers, leaders: Leaders, desired: Array, occupants: Occupants, to_junction: Array
+        self, cars: Cars, indices: Integers, leaders: Leaders, desired: Array, occupants: Occupants, to_junction: Array
     ) -> list[tuple[int, int]]:
-        """Cars among `who` that change lanes now, and to which lane; the most eager first.
+        """Return the cars of `indices` that change lanes now with their target lanes, ordered by descending incentive.
 
-        leaders, desired  of all cars;  to_junction  (N,) meters to the next junction, inf if there is none in sight
+        leaders, desired  of all cars
+        to_junction       (N,) distance to the next junction, inf if there is none within sight [m]
         """
-        lanes, row = self._lanes, cars.row[who]
+        lanes, row = self._lanes, cars.row[indices]
         found: list[tuple[float, int, int]] = []
-        ends_in = lanes.ends_at[row] - cars.progress[who]
-        room = self.length(cars.speed[who])
+        ends_in = lanes.ends_at[row] - cars.progress[indices]
+        room = self.length(cars.speed[indices])
         able = (
-            (np.abs(cars.offset[who]) < SETTLED)
-            & ~cars.walks[who]
+            (np.abs(cars.offset[indices]) < SETTLED)
+            & ~cars.walks[indices]
             & ~lanes.in_junction[row]
-            & ~cars.granted[who].any(axis=1)
+            & ~cars.granted[indices].any(axis=1)
         )
-        able &= to_junction[who] > room + cars.front[who]
-        able &= (cars.speed[who] > SLOWEST) | (ends_in < LAST_CHANCE)
+        able &= to_junction[indices] > room + cars.front[indices]
+        able &= (cars.speed[indices] > SLOWEST) | (ends_in < LAST_CHANCE)
         for to_left, beside in ((True, lanes.left), (False, lanes.right)):
             target = beside[row]
             possible = able & (target >= 0)
-            possible[possible] = lanes.ends_at[target[possible]] - cars.progress[who[possible]] > room[possible]
-            some, lane = who[possible], target[possible]
+            possible[possible] = lanes.ends_at[target[possible]] - cars.progress[indices[possible]] > room[possible]
+            some, lane = indices[possible], target[possible]
             if some.size:
                 prospect = self._prospect(cars, some, lane, leaders, desired, occupants)
                 slow_side = to_left == lanes.left_hand[cars.row[some]]
@@ -83,18 +84,23 @@ class LaneChanges:
         return taken
 
     def _prospect(
-        self, cars: Cars, who: Integers, target: Integers, leaders: Leaders, desired: Array, occupants: Occupants
+        self, cars: Cars, indices: Integers, target: Integers, leaders: Leaders, desired: Array, occupants: Occupants
     ) -> Prospect:
         lanes = self._lanes
-        progress, front, rear, speed = cars.progress[who], cars.front[who], cars.rear[who], cars.speed[who]
-        drivers, wish, length = cars.drivers.of_rows(who), desired[who], front - rear
-        after = find_leaders(lanes, lanes.chain(target, PLANNED + 1), progress, front, occupants, own=who)
-        new = find_followers(lanes, target, progress, rear, occupants, who)
-        old = find_followers(lanes, cars.row[who], progress, rear, occupants, who)
-        gap, ahead = leaders.gap[who], leaders.speed[who]
+        progress, front, rear, speed = (
+            cars.progress[indices],
+            cars.front[indices],
+            cars.rear[indices],
+            cars.speed[indices],
+        )
+        drivers, wish, length = cars.drivers.of_rows(indices), desired[indices], front - rear
+        after = find_leaders(lanes, lanes.chain(target, PLANNED + 1), progress, front, occupants, own=indices)
+        new = find_followers(lanes, target, progress, rear, occupants, indices)
+        old = find_followers(lanes, cars.row[indices], progress, rear, occupants, indices)
+        gap, ahead = leaders.gap[indices], leaders.speed[indices]
 
         def follower(number: Integers, behind: Array, leader: Array) -> Array:
-            """Acceleration of followers at a gap behind a leader of that speed; 0 where there is no follower."""
+            """Return the accelerations of followers at a gap behind a leader of this speed; 0 without a follower."""
             owner = np.where(number >= 0, occupants.owner[number], FOREIGN)
             own = owner >= 0
             table = np.repeat(self._others.table, len(owner), axis=0)
@@ -115,11 +121,11 @@ class LaneChanges:
 
     @staticmethod
     def length(speed: Array) -> Array:
-        """Return meters that a lane change takes at speeds (N,) [m/s]."""
+        """Return the length of a lane change at speeds (N,) [m]."""
         return np.maximum(speed * DURATION, SHORTEST)
 
     def begin(self, cars: Cars, index: int, target: int) -> None:
-        """Let a car begin its change: it belongs to the new lane from now on, still beside its center."""
+        """Start the change of a car. It belongs to the new lane from now on, still beside its center."""
         rows, progress = cars.row[[index]], cars.progress[[index]]
         apart = float(self._lanes.apart(rows, np.array([target]), progress)[0])
         cars.offset[index] -= apart
@@ -128,24 +134,24 @@ class LaneChanges:
         cars.shift_length[index] = float(self.length(cars.speed[[index]])[0])
 
     def advance(self, cars: Cars, covered: Array) -> None:
-        """Move those who change sideways while they cover meters (N,): a path of least jerk, as a quintic has it."""
-        who = np.flatnonzero(cars.changing)
-        if not who.size:
+        """Move changing cars laterally on a quintic path of minimum jerk while they cover distances (N,) [m]."""
+        indices = np.flatnonzero(cars.changing)
+        if not indices.size:
             return
-        cars.shift_done[who] += covered[who]
-        part = np.minimum(cars.shift_done[who] / cars.shift_length[who], 1.0)
-        cars.offset[who] = cars.shift[who] * (1.0 - part**3 * (10.0 + part * (6.0 * part - 15.0)))
-        cars.slope[who] = -cars.shift[who] / cars.shift_length[who] * 30.0 * (part * (1.0 - part)) ** 2
-        cars.shift[who[part >= 1.0]] = 0.0
+        cars.shift_done[indices] += covered[indices]
+        part = np.minimum(cars.shift_done[indices] / cars.shift_length[indices], 1.0)
+        cars.offset[indices] = cars.shift[indices] * (1.0 - part**3 * (10.0 + part * (6.0 * part - 15.0)))
+        cars.slope[indices] = -cars.shift[indices] / cars.shift_length[indices] * 30.0 * (part * (1.0 - part)) ** 2
+        cars.shift[indices[part >= 1.0]] = 0.0
 
     def still_left(self, cars: Cars) -> tuple[Integers, Integers]:
-        """Cars whose body still covers a part of the lane that they leave, and that lane."""
-        who = np.flatnonzero(cars.changing)
-        if not who.size:
-            return who, who
-        row = cars.row[who]
-        half = 0.5 * self._lanes.width(row, cars.progress[who])
-        body = np.array([0.5 * cars.specs[n].size[1] for n in who])
-        lane = np.where(cars.offset[who] > 0.0, self._lanes.beside_left[row], self._lanes.beside_right[row])
-        covers = (np.abs(cars.offset[who]) + body > half) & (lane >= 0)
-        return who[covers], lane[covers]
+        """Return the cars whose bodies still overlap the lane that they leave, and these lanes."""
+        indices = np.flatnonzero(cars.changing)
+        if not indices.size:
+            return indices, indices
+        row = cars.row[indices]
+        half = 0.5 * self._lanes.width(row, cars.progress[indices])
+        body = np.array([0.5 * cars.specs[n].size[1] for n in indices])
+        lane = np.where(cars.offset[indices] > 0.0, self._lanes.beside_left[row], self._lanes.beside_right[row])
+        covers = (np.abs(cars.offset[indices]) + body > half) & (lane >= 0)
+        return indices[covers], lane[covers]

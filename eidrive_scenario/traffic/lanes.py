@@ -1,4 +1,4 @@
-"""The lanes of a road network as traffic sees them: rows with a length, a direction, ways on and a speed for bends."""
+"""Lanes of a road network for traffic: rows with length, direction, successors and speed in bends."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
 
 FREE = 13.9
-"""Desired speed where the map gives no limit [m/s]."""
+"""Default desired speed on lanes without a limit [m/s]."""
 SAMPLE = 5.0
-"""Distance between the places at which a lane's curvature is looked at [m]."""
+"""Distance between the samples of the curvature of a lane [m]."""
 NARROWEST = 2.2
-"""A lane is no way for cars where it is narrower [m]."""
+"""Minimum width of a lane for cars [m]."""
 WALKABLE = frozenset(("sidewalk", "walking"))
-"""Lane types on which people walk."""
+"""Lane types for pedestrians."""
 
 
 class TrafficLanes:
     """Lanes by the running numbers of `RoadNetwork.tables`; progress u runs from 0 to `length` in driving direction.
 
-    left, right   the neighbor of the same direction to which the marking lets cars change, -1 if there is none
-    beside_left, beside_right  the same, whatever the marking
-    onward, backward  the first lane that a lane leads to, and that leads to it, -1 if there is none
-    ends_at       progress at which a lane comes to an end while one beside it goes on, inf for all others
+    left, right                neighbor of the same direction to which the marking permits a change, -1 if there is none
+    beside_left, beside_right  neighbor of the same direction with any marking
+    onward, backward           first successor and first predecessor, -1 if there is none
+    ends_at                    progress at which a lane ends while an adjacent lane continues, else inf
     """
 
     def __init__(self, roads: RoadNetwork) -> None:
@@ -61,7 +61,7 @@ class TrafficLanes:
             self._varying[row] = len(road.types) > 1 or len(tables.lanes[row].speeds) > 1
 
     def _link(self) -> None:
-        """Ways on from the graph: driving lanes lead to driving lanes, sidewalks to sidewalks."""
+        """Store successors by the graph: driving lanes lead to driving lanes, sidewalks to sidewalks."""
         graph, drivable = self.roads.graph, self.tables.lane_drivable
         for row, key in enumerate(self.keys):
             ways = graph[key].items() if key in graph else ()
@@ -98,9 +98,9 @@ class TrafficLanes:
                         self.left[one], self.right[two] = (two if outward else -1), (one if inward else -1)
 
     def _may_cross(self, one: int, two: int) -> tuple[bool, bool]:
-        """Whether the marking between neighbors, `one` left of `two` along s, lets cars from one to two, and back.
+        """Return whether the marking permits changes from lane `one` to lane `two` at its right, and back.
 
-        It is the marking on the outer edge of the lane nearer to lane 0. `increase` lets cars change to the higher id.
+        It is the marking on the outer edge of the lane nearer to lane 0. `increase` permits changes to the higher id.
         """
         numbers = self.keys[one].lane, self.keys[two].lane
         between = self.tables.roads[self.road[one]].sections[self.keys[one].section].lanes
@@ -110,7 +110,9 @@ class TrafficLanes:
         return rule not in ("increase", "none"), rule not in ("decrease", "none")
 
     def _find_ends(self) -> None:
-        """Lanes that lead nowhere beside one that goes on; cars have to have left them before they get too narrow."""
+        """Store the ends of lanes without a successor beside continuing lanes. Cars leave them before they are too
+        narrow.
+        """
         for row in np.flatnonzero(self.tables.lane_drivable & ~self.in_junction & (self.onward < 0)):
             beside = [int(other) for other in (self.beside_left[row], self.beside_right[row]) if other >= 0]
             if any(self.onward[other] >= 0 for other in beside):
@@ -120,7 +122,7 @@ class TrafficLanes:
                 self.ends_at[row] = progress[first[0]] if first.size else self.length[row]
 
     def s(self, row: Integers, progress: Array) -> Array:
-        """s of the road at a progress along lanes."""
+        """Return s of the road at a progress along lanes."""
         return self._origin[row] + self.direction[row] * progress
 
     def progress(self, row: Integers, s: Array) -> Array:
@@ -133,19 +135,22 @@ class TrafficLanes:
         return self.tables.width.value(row, ds)
 
     def apart(self, row: Integers, other: Integers, progress: Array) -> Array:
-        """How far left of the driving direction the center of `other` lies from that of `row`, of one section [m]."""
+        """Return the distance of the center of `other` from that of `row` [m], left of the driving direction positive.
+
+        Both are lanes of one section.
+        """
         s = self.s(row, progress)
         return (self.tables.lane_t(other, s)[0] - self.tables.lane_t(row, s)[0]) * self.direction[row]
 
     def of(self, location: LaneLocation) -> tuple[int, float]:
-        """Row and progress of a place."""
+        """Return row and progress of a location."""
         index = np.array([self.tables.index[location.road]])
         s = np.array([location.s])
         row = self.tables.lane_row(index, s, np.array([location.lane]))
         return int(row[0]), float(self.progress(row, s)[0])
 
     def chain(self, row: Integers, depth: int) -> Integers:
-        """(N, depth) lanes that follow each other from rows (N,) on, the first way at each fork; -1 beyond an end."""
+        """Return consecutive lanes (N, depth) from rows (N,) on along first branches; -1 beyond an end."""
         chain = np.full((len(row), depth), -1)
         chain[:, 0] = row
         for d in range(1, depth):
@@ -154,15 +159,15 @@ class TrafficLanes:
         return chain
 
     def following(self, row: int) -> list[int]:
-        """Return the lanes of the same kind that traffic may enter at the end of a lane, in the order of the map."""
+        """Return the successors of a lane with the same kind of users in the order of the map."""
         return self._ways[row]
 
     def stretch(self, row: Integers, progress: Array) -> Array:
-        """Return meters of path per meter of progress, at the lanes' center lines."""
+        """Return the path length per meter of progress at the center lines of lanes."""
         return self.tables.stretch(row, self.s(row, progress))
 
     def tightest(self, row: Integers) -> Array:
-        """Return the largest curvature of lanes [1/m], of any shape of rows."""
+        """Return the maximum curvature of lanes [1/m] for rows of any shape."""
         found = self._tightest[row]
         if np.isnan(found).any():
             for fresh in np.unique(row[np.isnan(found)]).tolist():
@@ -176,7 +181,7 @@ class TrafficLanes:
         return found
 
     def limits(self, row: Integers, progress: Array) -> Array:
-        """Return the speed limits at places (N,) [m/s]; NaN where the map gives none, inf where it gives `no limit`."""
+        """Return the speed limits at positions (N,) [m/s]; NaN if the map gives none, inf for `no limit`."""
         found = self._limit[row]
         fresh = np.isnan(found) | self._varying[row]
         for n in np.flatnonzero(fresh):
@@ -187,7 +192,7 @@ class TrafficLanes:
         return np.where(found < 0.0, np.nan, found)
 
     def _limit_at(self, row: int, progress: float) -> float:
-        """Return the limit at one place, -1 if the map gives none."""
+        """Return the limit at one position, -1 if the map gives none."""
         key = self.keys[row]
         s = float(self.s(np.array([row]), np.array([progress]))[0])
         limit = self.roads.speed_limit(key.road, min(max(s, 0.0), self.roads.roads[key.road].length), key.lane)

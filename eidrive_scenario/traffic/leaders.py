@@ -1,4 +1,4 @@
-"""Who drives or stands ahead of whom, and behind: per lane, over the lanes that each car will take."""
+"""Leaders and followers of cars per lane and along planned lanes."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.world.view import WorldView
 
 BIG = 1e5
-"""Longer than any lane [m]: rows times BIG plus progress puts all lanes on one axis."""
+"""Offset between lanes on a common axis, more than the length of any lane [m]."""
 LOOK_AHEAD = 120.0
-"""How far ahead a leader counts [m]."""
+"""Maximum distance of a leader [m]."""
 LOOK_BACK = 3
-"""Over how many lanes a follower is looked for behind the own one."""
+"""Maximum number of preceding lanes in which a follower is searched."""
 STANDING = 0.5
-"""Slower than this counts as standing [m/s]."""
+"""Maximum speed of a standing actor [m/s]."""
 FOREIGN, FIXED = -1, -2
-"""Owners of what does not belong to the fleet: other actors, and the ends of lanes."""
+"""Owners of occupants outside the fleet: other actors, and the ends of lanes."""
 OUTLINE = np.array(
     [(0.5, 0.5), (0.5, 0.0), (0.5, -0.5), (0.0, 0.5), (0.0, -0.5), (-0.5, 0.5), (-0.5, 0.0), (-0.5, -0.5)]
 )
@@ -28,11 +28,13 @@ OUTLINE = np.array(
 
 @dataclass(frozen=True)
 class Occupants:
-    """What stands or drives on lanes.
+    """Occupants of lanes.
 
-    row    (M,) the lane;  key  (M,) progress of what places it in the queue [m]
-    rear, front  (M,) progress of its ends [m];  speed  (M,) along the lane [m/s]
-    owner  (M,) the car's index in the fleet, below 0 for what does not belong to it
+    row          (M,) lane
+    key          (M,) progress that determines the order [m]
+    rear, front  (M,) progress of the ends [m]
+    speed        (M,) along the lane [m/s]
+    owner        (M,) index of the car in the fleet, negative for others
     """
 
     row: Integers
@@ -44,13 +46,13 @@ class Occupants:
 
     @cached_property
     def order(self) -> tuple[Integers, Array]:
-        """Their numbers in the order along the axis of all lanes, and their places on it."""
+        """Indices in the order along the axis of all lanes, and the positions on this axis."""
         place = self.row * BIG + self.key
         order = np.argsort(place, kind="stable")
         return order, place[order]
 
     def without(self, owner: int) -> Occupants:
-        """Return those that belong to somebody else."""
+        """Return the occupants of other owners."""
         kept = self.owner != owner
         return Occupants(
             self.row[kept], self.key[kept], self.rear[kept], self.front[kept], self.speed[kept], self.owner[kept]
@@ -59,26 +61,30 @@ class Occupants:
 
 @dataclass(frozen=True)
 class Leaders:
-    """Gap from the front bumper to the leader's rear (N,) [m], inf for none, and the leaders' speeds (N,) [m/s]."""
+    """Gap from the front bumper to the rear of the leader (N,) [m], inf without a leader; speeds of the leaders (N,)
+    [m/s].
+    """
 
     gap: Array
     speed: Array
 
     @classmethod
     def none(cls, count: int) -> Leaders:
-        """Nobody ahead of anybody."""
+        """Return leaders of cars without a leader."""
         return cls(np.full(count, np.inf), np.zeros(count))
 
     def or_nearer(self, other: Leaders) -> Leaders:
-        """Return the nearer one of two, for each car."""
+        """Return the nearer leader of two for each car."""
         nearer = other.gap < self.gap
         return Leaders(np.where(nearer, other.gap, self.gap), np.where(nearer, other.speed, self.speed))
 
 
 @dataclass(frozen=True)
 class Followers:
-    """Gap from a car's rear to its follower's front (N,) [m], inf for none; the followers' numbers among the occupants
-    (N,), -1 for none."""
+    """Gap from the rear of a car to the front of its follower (N,) [m], inf without a follower.
+
+    The followers are indices (N,) of the occupants, -1 without a follower.
+    """
 
     gap: Array
     number: Integers
@@ -94,9 +100,10 @@ def find_leaders(
 ) -> Leaders:
     """Return the next occupant ahead of each car on its plan.
 
-    plans     (N, D) rows of the lanes that each car takes, its own first, -1 if the plan ends
-    progress  (N,) of the cars' reference points; front  (N,) distance from there to the front bumper [m]
-    own       (N,) the cars' numbers in the fleet, 0, 1, 2, … where not given
+    plans     (N, D) rows of the planned lanes, the current one first, -1 beyond the end
+    progress  (N,) of the reference points
+    front     (N,) distance from the reference point to the front bumper [m]
+    own       (N,) indices of the cars in the fleet, by default 0, 1, 2, …
     """
     count, depth = plans.shape
     gap, speed = np.full(count, np.inf), np.zeros(count)
@@ -128,10 +135,11 @@ def find_leaders(
 def find_followers(
     lanes: TrafficLanes, row: Integers, progress: Array, rear: Array, occupants: Occupants, own: Integers
 ) -> Followers:
-    """Return the next occupant that moves behind places on lanes, on the lane itself and those that lead to it.
+    """Return the next moving occupant behind positions on lanes, on the lane itself and its predecessors.
 
-    row, progress  (N,) of the reference points; rear  (N,) distance from there to the rear bumper, negative [m]
-    own  (N,) numbers in the fleet of those who ask
+    row, progress  (N,) of the reference points
+    rear           (N,) distance from the reference point to the rear bumper, negative [m]
+    own            (N,) indices of the requesting cars in the fleet
     """
     count = len(row)
     gap, number = np.full(count, np.inf), np.full(count, -1)
@@ -160,7 +168,7 @@ def find_followers(
 
 
 def no_occupants() -> Occupants:
-    """No occupants."""
+    """Return empty occupants."""
     none = np.empty(0)
     return Occupants(np.empty(0, dtype=np.int64), none, none, none, none, np.empty(0, dtype=np.int64))
 
@@ -168,10 +176,10 @@ def no_occupants() -> Occupants:
 def obstacles(
     lanes: TrafficLanes, view: WorldView, own: frozenset[str], near: Array | None = None
 ) -> tuple[Occupants, set[int]]:
-    """Return the outlines of all actors not in `own`, on every lane that they touch, and the lanes of those that move.
+    """Return the outlines of all actors not in `own` on every lane that they overlap, and the lanes of moving ones.
 
-    In a junction, where roads lie over each other, an actor stands on all the lanes that pass beneath it.
-    near  (K, 2) places [m]: actors further away from all of them than anybody looks do not count
+    In a junction with overlapping roads an actor occupies all lanes below it.
+    near  (K, 2) positions [m]; actors beyond the range of sight from all of them are ignored
     """
     rows = np.array([row for row, name in enumerate(view.names) if name not in own], dtype=np.int64)
     if near is not None and rows.size:
@@ -198,6 +206,6 @@ def obstacles(
 
 
 def concatenate_occupants(*parts: Occupants) -> Occupants:
-    """Return all of them, as one."""
+    """Return the union of occupants."""
     names = ("row", "key", "rear", "front", "speed", "owner")
     return Occupants(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

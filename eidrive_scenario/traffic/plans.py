@@ -1,4 +1,4 @@
-"""The lanes that cars will take: planned ahead, with forks decided by each car's own random numbers."""
+"""Planned lanes of cars, with branches selected by random numbers of each car."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from eidrive_scenario.traffic.leaders import LOOK_AHEAD
 
 
 class Plans:
-    """Keeps the plans of all cars as long as a leader counts."""
+    """Plans of all cars up to the distance of a leader."""
 
     def __init__(self, lanes: TrafficLanes, crossings: Crossings, seed: int) -> None:
         self._lanes = lanes
@@ -21,7 +21,7 @@ class Plans:
         self._seed = seed
 
     def extend(self, cars: Cars, index: int) -> None:
-        """Plan further lanes for a car; what it holds of a junction already, it may enter."""
+        """Extend the plan of a car. Lanes of a junction that it holds already are granted."""
         lengths, name = self._lanes.lengths, cars.specs[index].name
         plan = [row for row in cars.plan[index].tolist() if row >= 0]
         ahead = sum(lengths[row] for row in plan[1:])
@@ -40,7 +40,7 @@ class Plans:
             ahead += lengths[choices[pick]]
 
     def pass_ends(self, cars: Cars) -> list[str]:
-        """Let cars that have come to the end of their lane go on in the next one; who has none to go on in."""
+        """Move cars at the end of their lane to the next one. Return the cars without a next lane."""
         lanes = self._lanes
         gone = []
         for index in np.flatnonzero(cars.progress >= lanes.length[cars.row]).tolist():
@@ -61,18 +61,18 @@ class Plans:
         return gone
 
     def desired_speeds(self, cars: Cars, begins: Array) -> Array:
-        """Return each car's own speed or the limit, less before bends so that comfortable braking suffices (N,) [m/s].
+        """Return the desired speeds (N,) [m/s], reduced ahead of bends for comfortable braking.
 
-        begins  (N, D) how far ahead of each car the lanes of its plan begin [m]
+        begins  (N, D) distances from each car to the starts of its planned lanes [m]
         """
         limit = self._lanes.limits(cars.row, cars.progress) * cars.factor
-        wanted = np.where(
+        desired = np.where(
             np.isfinite(limit), limit, np.where(np.isinf(limit), np.maximum(FREE, cars.fallback), cars.fallback)
         )
-        wanted = np.minimum(np.where(np.isnan(cars.own_speed), wanted, cars.own_speed), cars.top_speed)
+        desired = np.minimum(np.where(np.isnan(cars.own_speed), desired, cars.own_speed), cars.top_speed)
         seen = (cars.plan >= 0) & (begins <= LOOK_AHEAD)
         bend = self._lanes.tightest(np.where(seen, cars.plan, cars.row[:, None]))
         square = cars.drivers.lateral_acceleration[:, None] / np.maximum(bend, 1e-6)
         square = square + 2.0 * cars.drivers.deceleration[:, None] * np.maximum(begins, 0.0)
         slowest = np.sqrt(np.where(seen, square, np.inf).min(axis=1))
-        return np.asarray(np.minimum(wanted, slowest))
+        return np.asarray(np.minimum(desired, slowest))

@@ -1,4 +1,4 @@
-"""Passages through junctions: which cars ask for one, and who gets it first."""
+"""Requests for passages through junctions, and the order in which they are granted."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from eidrive_scenario.traffic.leaders import LOOK_AHEAD, Leaders
 from eidrive_scenario.traffic.stop_lines import STOP_LINE
 
 PATIENCE = 20.0
-"""A car that has waited so long before a junction is not overtaken by others any more [s]."""
+"""Waiting time after which a car has priority over others at a junction [s]."""
 
 
 class RightOfWay:
-    """First come, first served; `begins` (N, D) says how far ahead of each car the lanes of its plan begin [m]."""
+    """First come, first served; `begins` (N, D) are the distances from each car to its planned lanes [m]."""
 
     def __init__(self, lanes: TrafficLanes, crossings: Crossings) -> None:
         self._lanes = lanes
         self._crossings = crossings
 
     def take(self, cars: Cars, index: int) -> None:
-        """A car stands in a junction already: its lane is its own."""
+        """Let a car that is in a junction hold its lane."""
         self._crossings.take(int(cars.plan[index, 0]), cars.specs[index].name)
         cars.granted[index, 0] = True
 
     def forget(self, name: str) -> None:
-        """A car is gone."""
+        """Remove a car."""
         self._crossings.forget(name)
 
     def waits(self, cars: Cars, begins: Array) -> Leaders:
@@ -39,11 +39,13 @@ class RightOfWay:
     def grant_right_of_way(
         self, cars: Cars, leaders: Leaders, lights: Leaders, begins: Array, moving: set[int], time: float
     ) -> None:
-        """Hand passages through junctions to the cars that come near and may have them.
+        """Grant passages through junctions to approaching cars.
 
-        There must be room behind the junction. Lanes that meet one of `moving`, beneath foreign actors on the move, are
-        not handed out, nor what would hold up a car that has lost its patience. Who is stopped by a light before the
-        junction gives back what it got.
+        There must be space behind the junction. Lanes in conflict with one of `moving`, which moving foreign actors
+        overlap,
+        are not granted, nor are lanes that delay a car with priority. A car that a traffic light stops before the
+        junction
+        loses its passage.
         """
         self._follow(cars, lights, begins)
         distance = self._distances(cars, begins)
@@ -71,7 +73,7 @@ class RightOfWay:
                 kept_free.update(passage)
 
     def _follow(self, cars: Cars, lights: Leaders, begins: Array) -> None:
-        """Note how far those in junctions have come, and take back what a light keeps from being used."""
+        """Update the progress of cars in junctions, and revoke passages that a traffic light blocks."""
         for index in np.flatnonzero(cars.granted[:, 0]).tolist():
             held = self._crossings.holders[int(cars.plan[index, 0])]
             held[cars.specs[index].name] = float(cars.progress[index] + cars.rear[index])
@@ -82,14 +84,14 @@ class RightOfWay:
                 cars.granted[index] = False
 
     def _distances(self, cars: Cars, begins: Array) -> Array:
-        """(N,) meters to the first junction lane ahead that a car may not enter yet, inf if there is none in sight."""
+        """Return the distances (N,) to the first junction lane that a car may not enter yet [m], else inf."""
         barred = (cars.plan >= 0) & self._lanes.in_junction[cars.plan] & ~cars.granted & ~cars.walks[:, None]
         barred[:, 0] = False
         distance = np.where(barred, begins, np.inf).min(axis=1)
         return np.where(distance > LOOK_AHEAD, np.inf, distance)
 
     def _passage(self, cars: Cars, index: int) -> list[int]:
-        """The lanes through the next junction that a car may not enter yet, to the end of its last connecting road."""
+        """Return the lanes of the next junction that a car may not enter yet, up to its last connecting road."""
         lanes = self._lanes
         found: list[int] = []
         for row, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):

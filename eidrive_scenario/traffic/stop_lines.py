@@ -1,4 +1,4 @@
-"""Stop lines: where cars wait while a traffic light tells them to."""
+"""Stop lines of traffic lights."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FIXED, Leaders, Occupants, find_leaders, no_occupants
 
 STOP_LINE = 1.0
-"""Cars wait this far before a line [m]."""
+"""Distance of waiting cars from the stop line [m]."""
 TOO_LATE = 4.0
-"""A car that would have to brake harder than this passes a light that has just turned [m/s²]."""
+"""Deceleration above which a car passes a light that has just changed [m/s²]."""
 MustStop = Callable[[str], bool]
-"""Whether the traffic light of this id tells traffic to stop now."""
+"""Whether the traffic light of this id requires a stop now."""
 
 
 class StopLines:
-    """The lights of a map on the lanes for which they are valid.
+    """Traffic lights of a map on the lanes for which they are valid.
 
-    Cars wait at the light's s; a light on a connecting road holds them before the junction.
+    The stop line is at s of the light. For a light on a connecting road it is before the junction.
     """
 
     def __init__(self, lanes: TrafficLanes, must_stop: MustStop) -> None:
@@ -60,7 +60,7 @@ class StopLines:
         return found
 
     def closed(self) -> Occupants:
-        """Return the lines at which traffic has to stop now, as things that stand there."""
+        """Return the stop lines at which traffic has to stop now as occupants."""
         shown = tuple(self._must_stop(signal) for signal in self._signals)
         if shown != self._shown:
             self._shown = shown
@@ -71,7 +71,7 @@ class StopLines:
         return self._closed
 
     def ahead(self, cars: Cars) -> Leaders:
-        """Return the lines at which cars have to stop, those left out that would have to brake too hard."""
+        """Return the stop lines at which cars have to stop, without those that require too hard braking."""
         none = np.zeros(len(cars))
         lines = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, none, self.closed())
         late = cars.speed**2 > 2.0 * TOO_LATE * np.maximum(lines.gap, 0.0)

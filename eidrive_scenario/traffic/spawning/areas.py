@@ -1,4 +1,4 @@
-"""Areas in which traffic is kept: polygons, and ranges of roads from cursor to cursor."""
+"""Areas of traffic: polygons, and ranges of roads between cursors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ START, END = "start", "end"
 
 
 class RoadTerminal(NamedTuple):
-    """One end of a road."""
+    """End of a road."""
 
     road: str
     end: str
@@ -30,7 +30,7 @@ class RoadTerminal(NamedTuple):
 
 @dataclass(frozen=True)
 class Cursor:
-    """A cross-section of a road; s is None for the road's start or end [m], lanes () for all of them."""
+    """Cross section of a road at s [m]; s is None for the start or end of the road; lanes () for all lanes."""
 
     road: str
     s: float | None = None
@@ -39,7 +39,7 @@ class Cursor:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a road from `low` to `high` [m]; lanes () for all of them."""
+    """Part of a road from `low` to `high` [m]; lanes () for all lanes."""
 
     road: str
     low: float
@@ -48,13 +48,13 @@ class Stretch:
 
 
 def polygon(corners: Sequence[tuple[float, float]]) -> Covers:
-    """Which places lie in a polygon."""
+    """Return a test whether sites are inside a polygon."""
     outline = np.array(corners)
     return lambda sites: points_in_polygon(np.column_stack([sites.x, sites.y]), outline)
 
 
 def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers:
-    """Which places lie on one of several stretches of road."""
+    """Return a test whether sites are on one of several parts of roads."""
 
     def covers(sites: SpawnSites) -> Bools:
         found = np.zeros(len(sites), dtype=bool)
@@ -68,11 +68,12 @@ def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers
 
 
 def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | None = None) -> list[Stretch]:
-    """Return the stretches of a range from its first cursor over the others to its last one.
+    """Return the parts of roads from the first cursor over the others to the last one.
 
-    A cursor's lanes count up to the next cursor. Between cursors on different roads the range follows the shortest
-    chain of linked roads, with all their lanes. `length` cuts the range off, counted from the first cursor [m].
-    Raise PositionError for roads that do not exist or are not linked.
+    The lanes of a cursor are valid up to the next cursor. Between cursors on different roads the range follows the
+    shortest
+    chain of linked roads with all their lanes. `length` truncates the range from the first cursor on [m].
+    Raise PositionError if a road does not exist or the roads are not linked.
     """
     ends = _links(roads)
     parts: list[tuple[Stretch, bool]] = []
@@ -110,7 +111,7 @@ def _cut(parts: Sequence[tuple[Stretch, bool]], length: float | None) -> list[St
 
 
 def _links(roads: RoadNetwork) -> Mapping[RoadTerminal, list[RoadTerminal]]:
-    """Which ends of roads meet, as the lanes are linked."""
+    """Return the connected ends of roads by the links of lanes."""
     found: dict[RoadTerminal, list[RoadTerminal]] = {}
     for one, two, edge in roads.graph.edges(data=True):
         if edge["kind"] == "successor" and one.road != two.road:
@@ -123,7 +124,7 @@ def _links(roads: RoadNetwork) -> Mapping[RoadTerminal, list[RoadTerminal]]:
 
 
 def _chain(ends: Mapping[RoadTerminal, list[RoadTerminal]], start: str, goal: str) -> list[RoadTerminal]:
-    """Ends of roads from where `start` is left to where `goal` is entered; roads between come in pairs of ends."""
+    """Return the road ends from the exit of `start` to the entry of `goal`; roads between have two consecutive ends."""
     queue = deque([[RoadTerminal(start, END)], [RoadTerminal(start, START)]])
     seen = {RoadTerminal(start, END), RoadTerminal(start, START)}
     while queue:
@@ -135,4 +136,6 @@ def _chain(ends: Mapping[RoadTerminal, list[RoadTerminal]], start: str, goal: st
                 other = RoadTerminal(entry.road, START if entry.end == END else END)
                 seen |= {entry, other}
                 queue.append([*chain, entry, other])
-    raise PositionError(Diagnostic(f"no roads lead from road {start!r} to road {goal!r}", "correct the road cursors"))
+    raise PositionError(
+        Diagnostic(f"no chain of roads leads from road {start!r} to road {goal!r}", "correct the road cursors")
+    )

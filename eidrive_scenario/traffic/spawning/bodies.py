@@ -1,4 +1,4 @@
-"""Who background traffic is made of: bodies and drivers, drawn by the shares that a scenario states."""
+"""Participants of background traffic: bodies and drivers, drawn by the weights of the scenario."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from eidrive_scenario.world.specs import actor_spec
 T = TypeVar("T")
 
 MODULE = "eidrive.traffic"
-"""A controller with this `module` states the parameters of the drivers of background traffic."""
+"""Value of `module` of a controller with driver parameters of background traffic."""
 
 CATEGORY_FALLBACKS = {
     VehicleCategory.SEMITRAILER: VehicleCategory.TRUCK,
@@ -30,18 +30,18 @@ CATEGORY_FALLBACKS = {
     VehicleCategory.TRAIN: VehicleCategory.BUS,
     VehicleCategory.TRAM: VehicleCategory.BUS,
 }
-"""What drives on the road in place of what cannot drive there by itself."""
+"""Replacements of vehicle categories that cannot drive alone."""
 
 ON_FOOT = IntelligentDriver(time_gap=0.5, standstill_gap=0.5, acceleration=0.6, deceleration=1.0)
-"""The same model for people who walk one behind the other."""
+"""Parameters of the model for pedestrians that walk in a row."""
 WALKING = 1.34
 """Mean free speed of pedestrians [m/s]; Weidmann, Transporttechnik der Fussgänger, ETH Zürich (1993)."""
 
 
 class DriverSettings(Settings):
-    """What a controller of module `eidrive.traffic` may say in its properties; units as in IntelligentDriver.
+    """Properties of a controller with module `eidrive.traffic`; units as in IntelligentDriver.
 
-    speed_factor  mean of the share of the limit to which these drivers keep
+    speed_factor  mean share of the speed limit that is the desired speed
     """
 
     module: str = MODULE
@@ -52,14 +52,14 @@ class DriverSettings(Settings):
     speed_factor: PositiveFloat = 1.0
 
     def driver(self, usual: IntelligentDriver) -> IntelligentDriver:
-        """Return the usual driver with these parameters."""
+        """Return the default driver with these parameters."""
         names = ("time_gap", "standstill_gap", "acceleration", "deceleration")
         return replace(usual, **{name: value for name in names if (value := getattr(self, name)) is not None})
 
 
 @dataclass(frozen=True)
 class Participant:
-    """A body, still without a name of its own, and how it is driven."""
+    """Body without a name, and its driver."""
 
     spec: ActorSpec
     driver: IntelligentDriver
@@ -73,21 +73,21 @@ class Participant:
 
 @dataclass(frozen=True)
 class WeightedChoice(Generic[T]):
-    """Things with shares."""
+    """Items with weights."""
 
     things: Sequence[T]
     weights: Sequence[float]
 
     def draw(self, rng: np.random.Generator) -> T:
-        """Return one of them."""
+        """Return a random item."""
         shares = np.cumsum(self.weights)
         return self.things[int(np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))]
 
 
 class TrafficMix:
-    """What a TrafficDefinition or a TrafficDistribution describes; without either, the library's cars.
+    """Participants of a TrafficDefinition or a TrafficDistribution; without either, the cars of the library.
 
-    Raises ScenarioError for shares that are negative or all 0, and for entities that neither drive nor walk.
+    Raise ScenarioError if weights are negative or all 0, or if an entity neither drives nor walks.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class TrafficMix:
             self._drivers = self._weighted([self._settings(entry) for entry in controllers], controllers)
 
     def draw(self, rng: np.random.Generator) -> Participant:
-        """Return one participant."""
+        """Return a random participant."""
         if self._groups is not None:
             return self._groups.draw(rng).draw(rng)
         category, role, settings = self._categories.draw(rng), self._roles.draw(rng), self._drivers.draw(rng)
@@ -127,11 +127,11 @@ class TrafficMix:
 
     @property
     def categories(self) -> frozenset[str]:
-        """The categories of all bodies that it can draw."""
+        """Categories of all bodies that can be drawn."""
         if self._groups is None:
             pairs = zip(self._categories.things, self._categories.weights, strict=True)
-            wanted = [CATEGORY_FALLBACKS.get(category, category) for category, weight in pairs if weight > 0.0]
-            return frozenset(body.category for category in wanted for body, _ in library_bodies(category))
+            categories = [CATEGORY_FALLBACKS.get(category, category) for category, weight in pairs if weight > 0.0]
+            return frozenset(body.category for category in categories for body, _ in library_bodies(category))
         return frozenset(member.spec.category for group in self._groups.things for member in group.things)
 
     def _group(self, entry: model.TrafficDistributionEntry) -> WeightedChoice[Participant]:
@@ -143,13 +143,13 @@ class TrafficMix:
         if isinstance(entity, model.CatalogReference):
             entity = self._scenario.resolved(entity)
         if not isinstance(entity, model.Vehicle | model.Pedestrian):
-            what = f"traffic cannot be made of a {type(entity).__name__}"
+            what = f"background traffic cannot contain a  {type(entity).__name__}"
             raise ScenarioError(Diagnostic(what, "give a Vehicle or a Pedestrian", template.source, template.line))
         settings = next((self._settings(one) for one in template.object_controller), DriverSettings())
         return _participant(actor_spec(entity.name, entity), settings)
 
     def _settings(self, holder: model.ControllerDistributionEntry | model.ObjectController) -> DriverSettings:
-        """Return the driver that a controller of ours describes, the usual one for a controller of others."""
+        """Return the driver of a controller with module `eidrive.traffic`, else the default driver."""
         controller: model.Element | None = holder.controller
         if holder.catalog_reference is not None:
             controller = self._scenario.resolved(holder.catalog_reference)
@@ -165,7 +165,7 @@ class TrafficMix:
         weights = [float(getattr(entry, "weight")) for entry in entries]  # noqa: B009
         if min(weights) < 0.0 or not sum(weights) > 0.0:
             where = entries[0]
-            what = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are no shares"
+            what = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are not valid weights"
             raise ScenarioError(Diagnostic(what, "give weights of at least 0, not all 0", where.source, where.line))
         return WeightedChoice(things, weights)
 
@@ -176,14 +176,14 @@ def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:
 
 
 def _driver_of(spec: ActorSpec) -> IntelligentDriver:
-    """Return the usual driver, with no more acceleration than the vehicle has."""
+    """Return the default driver with the acceleration limited to that of the vehicle."""
     usual = IntelligentDriver()
     return replace(usual, acceleration=min(usual.acceleration, spec.max_acceleration))
 
 
 @cache
 def library_bodies(category: VehicleCategory) -> tuple[tuple[ActorSpec, Role], ...]:
-    """Return the vehicles of a category in the library's catalog, each with its role (NONE for everyday vehicles)."""
+    """Return the library vehicles of a category with their roles (NONE for everyday vehicles)."""
     document = read_document(library_path() / "catalogs" / "vehicles.xosc")
     vehicles = document.catalog.vehicle if document.catalog is not None else ()
     return tuple(

@@ -1,4 +1,4 @@
-"""The instances of background traffic that a scenario starts: swarms, sources, sinks and areas."""
+"""Generators of background traffic: swarms, sources, sinks and areas."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from eidrive_scenario.traffic.spawning.sites import Covers, SpawnAreas, SpawnSit
 from eidrive_scenario.world.actor import ActorSpec
 
 RETRY = 0.5
-"""Where no place was free, the next attempt is made so much later [s]."""
+"""Delay of the next attempt if no site was free [s]."""
 RIM = 0.8
-"""From this share of the ellipse's axes outwards a swarm is replenished."""
+"""Share of the axes of the ellipse from which on a swarm is replenished."""
 
 
 @dataclass(frozen=True)
 class CentralObject:
-    """The entity around which a swarm is: place [m], heading [rad] and speed along it [m/s]."""
+    """Entity at the center of a swarm: position [m], heading [rad] and speed along it [m/s]."""
 
     x: float
     y: float
@@ -88,40 +88,41 @@ class GeneratorContext(Protocol):
 class TrafficGenerator(ABC):
     """Traffic of one name, from the start of its action until it is stopped.
 
-    name    trafficName, or what stands for it;  key  tells it from others of that name
+    name  trafficName or its substitute
+    key   distinguishes generators of the same name
     """
 
     name: str
     key: int
     active: bool = field(default=True, init=False)
     members: dict[str, None] = field(default_factory=dict, init=False)
-    """The cars that it made and that are still there, in the order in which they came."""
+    """Cars of this generator that exist, in the order of creation."""
     _draws: int = field(default=0, init=False)
 
     @abstractmethod
     def step(self, traffic: GeneratorContext) -> None:
-        """Bring in and take out cars at this instant."""
+        """Spawn and despawn cars in this step."""
 
     @abstractmethod
     def is_due(self, traffic: GeneratorContext) -> bool:
-        """Return whether it may bring in a car now."""
+        """Return whether a car may be spawned now."""
 
     def rng(self, traffic: GeneratorContext) -> np.random.Generator:
-        """Return the random numbers of the next attempt to bring in a car."""
+        """Return the random generator of the next attempt to spawn a car."""
         self._draws += 1
         return generator(traffic.seed, "traffic", self.name, self.key, self._draws)
 
 
 @dataclass
 class Swarm(TrafficGenerator):
-    """Traffic around an entity, between a circle and an ellipse, both `offset` ahead of it along its x axis [m].
+    """Traffic around an entity, between a circle and an ellipse, both `offset` [m] ahead of it along its x axis.
 
-    The whole ring is filled once; what leaves the ellipse is taken out and replaced near its rim, where cars drive
-    inwards as seen from the entity.
+    The whole ring is filled once. Cars outside the ellipse are removed and replaced near its edge, at sites from which
+    they drive inwards relative to the entity.
 
-    speeds      range of the speeds at the start [m/s], None for the speed limit
-    same, opposite  shares of the directions of travel relative to the entity, None for any
-    front, rear, left, right  shares of the sectors around the entity, None for any
+    speeds                    range of the initial speeds [m/s], None for the speed limit
+    same, opposite            weights of the directions of travel relative to the entity, None for any
+    front, rear, left, right  weights of the sectors around the entity, None for any
     """
 
     center: str
@@ -138,11 +139,11 @@ class Swarm(TrafficGenerator):
     _again: float = field(default=0.0, init=False)
 
     def is_due(self, traffic: GeneratorContext) -> bool:
-        """While cars are missing."""
+        """Return whether cars are missing."""
         return len(self.members) < self.count and traffic.time >= self._again - TIME_TOLERANCE
 
     def step(self, traffic: GeneratorContext) -> None:
-        """Take out who has left, fill up."""
+        """Remove cars outside the ellipse and spawn missing ones."""
         center = traffic.center(self.center)
         if center is None:
             return
@@ -161,7 +162,7 @@ class Swarm(TrafficGenerator):
         self._filled = True
 
     def _place(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return distance from the middle [m], and the share of the ellipse's axes at which places lie."""
+        """Return the distances from the center [m] and the shares of the axes of the ellipse."""
         cos, sin = math.cos(center.heading), math.sin(center.heading)
         dx, dy = x - center.x - self.offset * cos, y - center.y - self.offset * sin
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
@@ -199,7 +200,7 @@ class Swarm(TrafficGenerator):
         return with_it if rng.uniform(0.0, same + opposite) < same else ~with_it
 
     def _sector(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Bools:
-        """Quarters of the plane around the entity, 90° each."""
+        """Select one of the four sectors of 90° around the entity."""
         if self.sectors is None:
             return np.ones(len(sites), dtype=bool)
         bearing = np.arctan2(sites.y - center.y, sites.x - center.x) - center.heading
@@ -211,9 +212,9 @@ class Swarm(TrafficGenerator):
 
 @dataclass
 class Source(TrafficGenerator):
-    """Cars appear at an even rate [1/s] at one of the places around a position; who finds none free waits.
+    """Source of cars at a constant rate [1/s] at sites around a position. If none is free, the next car waits.
 
-    speed  at the start [m/s], None for the speed limit
+    speed  initial speed [m/s], None for the speed limit
     """
 
     place: tuple[float, float]
@@ -226,11 +227,11 @@ class Source(TrafficGenerator):
     _waiting: Participant | None = field(default=None, init=False)
 
     def is_due(self, traffic: GeneratorContext) -> bool:
-        """When the next one is due."""
+        """Return whether the next car is due."""
         return self.rate > 0.0 and traffic.time - self.started >= self._made / self.rate - TIME_TOLERANCE
 
     def step(self, traffic: GeneratorContext) -> None:
-        """Bring in who is due; the same one tries again as long as there is no place."""
+        """Spawn cars that are due. A car without a free site is retried."""
         while self.is_due(traffic):
             rng = self.rng(traffic)
             participant = self._waiting or self.mixture.draw(rng)
@@ -247,9 +248,9 @@ class Source(TrafficGenerator):
 
 @dataclass
 class Sink(TrafficGenerator):
-    """Cars of background traffic disappear within a radius [m] around a position, at most at a rate [1/s].
+    """Sink that removes background cars within a radius [m] around a position at a maximum rate [1/s].
 
-    categories  whom it takes, None for all
+    categories  categories of the removed cars, None for all
     """
 
     place: tuple[float, float]
@@ -259,11 +260,11 @@ class Sink(TrafficGenerator):
     _next: float = field(default=-math.inf, init=False)
 
     def is_due(self, traffic: GeneratorContext) -> bool:
-        """It never brings in anybody."""
+        """Return False, as a sink never spawns cars."""
         return False
 
     def step(self, traffic: GeneratorContext) -> None:
-        """Take out who is there, the nearest first, as many as the rate allows by now."""
+        """Remove the nearest cars within the radius as far as the rate permits."""
         if self.rate <= 0.0:
             return
         names = [name for name in traffic.names if self._takes(traffic, name)]
@@ -275,7 +276,7 @@ class Sink(TrafficGenerator):
             if distance[n] > self.radius or self._next > traffic.time + TIME_TOLERANCE:
                 return
             traffic.despawn(names[n])
-            # What was not used while nobody came is not saved up.
+            # Unused capacity is not accumulated.
             self._next = max(self._next, traffic.time - traffic.dt) + 1.0 / self.rate
 
     def _takes(self, traffic: GeneratorContext, name: str) -> bool:
@@ -284,9 +285,9 @@ class Sink(TrafficGenerator):
 
 @dataclass
 class Area(TrafficGenerator):
-    """A number of participants in an area: brought in once, or kept there.
+    """Number of participants in an area: spawned once, or maintained.
 
-    covers  which of some places lie in the area
+    covers  whether sites are inside the area
     """
 
     count: int
@@ -296,11 +297,11 @@ class Area(TrafficGenerator):
     _again: float = field(default=0.0, init=False)
 
     def is_due(self, traffic: GeneratorContext) -> bool:
-        """While participants are missing."""
+        """Return whether participants are missing."""
         return len(self.members) < self.count and traffic.time >= self._again - TIME_TOLERANCE
 
     def step(self, traffic: GeneratorContext) -> None:
-        """Take out who has left, fill up; done with it where it is not continuous."""
+        """Remove participants outside the area and spawn missing ones. Finish if the area is not continuous."""
         if self.members:
             names = list(self.members)
             outside = ~self.covers(traffic.sites(names))

@@ -1,4 +1,4 @@
-"""Where traffic may appear: places along lanes, and whether they are free."""
+"""Sites along lanes at which traffic can be spawned, and the test whether they are free."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from eidrive_scenario.traffic.leaders import FOREIGN, find_followers, find_leade
 from eidrive_scenario.traffic.spawning.bodies import Participant
 
 SPACING = 5.0
-"""Distance between the places along a lane [m]."""
+"""Distance between the sites along a lane [m]."""
 WIDEST = 2.55
-"""No more than the widest vehicle that roads are made for needs to fit into a lane [m]; Directive 96/53/EC."""
+"""Maximum vehicle width for which a lane is required to be wide enough [m]; Directive 96/53/EC."""
 REACH = 30.0
-"""A position further away from every lane than this is the position of no traffic [m]."""
+"""Maximum distance of a traffic position from a lane [m]."""
 AIR = 0.5
-"""Between the box of who appears and all others [m]."""
+"""Minimum gap between the box of a new participant and all others [m]."""
 
 
 @dataclass(frozen=True)
 class SpawnSites:
-    """Places (K,) along lanes: row and progress, x, y [m], heading of the traffic [rad], width of the lane [m]."""
+    """Sites (K,) along lanes: row and progress, x, y [m], heading of the traffic [rad], width of the lane [m]."""
 
     row: Integers
     progress: Array
@@ -41,7 +41,7 @@ class SpawnSites:
 
     @classmethod
     def along(cls, lanes: TrafficLanes, rows: Integers) -> SpawnSites:
-        """Places at an even distance along lanes."""
+        """Return equidistant sites along lanes."""
         counts = np.maximum(np.floor(lanes.length[rows] / SPACING).astype(np.int64), 1)
         row = np.repeat(rows, counts)
         number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -49,7 +49,7 @@ class SpawnSites:
 
     @classmethod
     def at(cls, lanes: TrafficLanes, row: Integers, progress: Array) -> SpawnSites:
-        """Given places (K,)."""
+        """Return sites (K,) at given rows and progress."""
         poses = lanes.tables.lane_poses(row, lanes.s(row, progress), np.zeros(len(row)))
         heading = poses.h + np.where(lanes.direction[row] > 0, 0.0, np.pi)
         return cls(row, progress, poses.x, poses.y, heading, lanes.width(row, progress))
@@ -58,7 +58,7 @@ class SpawnSites:
         return len(self.row)
 
     def subset(self, which: Integers | Bools) -> SpawnSites:
-        """Return a part of them."""
+        """Return a subset of the sites."""
         return SpawnSites(
             self.row[which],
             self.progress[which],
@@ -69,7 +69,7 @@ class SpawnSites:
         )
 
     def concatenate(self, other: SpawnSites) -> SpawnSites:
-        """These and others."""
+        """Return the union of the sites."""
         return SpawnSites(
             np.concatenate([self.row, other.row]),
             np.concatenate([self.progress, other.progress]),
@@ -81,38 +81,38 @@ class SpawnSites:
 
 
 Covers = Callable[[SpawnSites], Bools]
-"""Which of some places belong to an area."""
+"""Test whether each site is inside an area."""
 
 
 class SpawnAreas:
-    """The places of one road network, for those who drive and those who walk."""
+    """Sites of one road network for vehicles and pedestrians."""
 
     def __init__(self, lanes: TrafficLanes) -> None:
         self._lanes = lanes
 
     @cached_property
     def driving(self) -> SpawnSites:
-        """For vehicles; none on lanes that end."""
+        """Sites for vehicles, without lanes that end."""
         lanes = self._lanes
         fit = lanes.tables.lane_drivable & ~lanes.in_junction & np.isinf(lanes.ends_at)
         return SpawnSites.along(lanes, np.flatnonzero(fit))
 
     @cached_property
     def walking(self) -> SpawnSites:
-        """For pedestrians."""
+        """Sites for pedestrians."""
         return SpawnSites.along(self._lanes, np.flatnonzero(self._lanes.walkable & ~self._lanes.in_junction))
 
     def for_body(self, participant: Participant) -> SpawnSites:
-        """Return the places where this one fits."""
+        """Return the sites at which a participant fits."""
         return self.walking if participant.walks else self.driving
 
 
 def sites_within_radius(
     lanes: TrafficLanes, sites: SpawnSites, x: float, y: float, radius: float, location: LaneLocation | None
 ) -> SpawnSites:
-    """The places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
+    """Return the sites within a radius of a point [m], and the position of the point on its lane if it is a site lane.
 
-    Where that is none at all, the nearest place that is no further away than a point may lie from its road.
+    If there is none, return the nearest site within `REACH`.
     """
     distance = np.hypot(sites.x - x, sites.y - y)
     found = sites.subset(distance <= radius)
@@ -127,10 +127,10 @@ def sites_within_radius(
 
 
 def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Bools:
-    """Return (K,) where a participant can appear with a speed (K,) [m/s].
+    """Return whether a participant can be spawned at each site with speeds (K,) [m/s].
 
-    It touches nobody, has a gap ahead in which it need not brake harder than is comfortable, and leaves its follower as
-    much.  foreign  (M, 7) boxes of all that is not of the fleet
+    It must not overlap others, must need at most comfortable braking for its leader, and its follower likewise.
+    foreign  (M, 7) boxes of all actors outside the fleet
     """
     lanes, spec, driver = fleet.lanes, participant.spec, participant.driver
     count = len(sites)
@@ -138,9 +138,9 @@ def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, spe
     half = 0.5 * spec.size[0]
     front, rear = np.full(count, spec.offset[0] + half), np.full(count, spec.offset[0] - half)
     occupants = fleet.occupants()
-    nobody = np.full(count, -9)
-    leaders = find_leaders(lanes, lanes.chain(sites.row, PLANNED + 1), sites.progress, front, occupants, own=nobody)
-    followers = find_followers(lanes, sites.row, sites.progress, rear, occupants, nobody)
+    no_owner = np.full(count, -9)
+    leaders = find_leaders(lanes, lanes.chain(sites.row, PLANNED + 1), sites.progress, front, occupants, own=no_owner)
+    followers = find_followers(lanes, sites.row, sites.progress, rear, occupants, no_owner)
     own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))
     braking = own.response(speed, np.maximum(speed, 1.0), leaders.gap, speed - leaders.speed)
     behind = followers.number

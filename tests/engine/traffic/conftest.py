@@ -1,4 +1,4 @@
-"""Streets for traffic, and views of what drives there."""
+"""Fixtures of traffic: straight streets and views of vehicles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def lane_text(number: int, mark: str, kind: str = "driving", width: str = "3.5",
 def street_text(
     left: int = 0, right: int = 2, *, length: float = 1000.0, mark: str = "both", rule: str = "RHT", extra: str = ""
 ) -> str:
-    """One straight road along x from 0, with lanes of 3.5 m on both sides."""
+    """Return one straight road along x from 0 with lanes of 3.5 m on both sides."""
     lefts = "".join(lane_text(n, mark) for n in range(left, 0, -1))
     rights = "".join(lane_text(-n, mark) for n in range(1, right + 1))
     return (
@@ -38,7 +38,7 @@ def street_text(
 
 @pytest.fixture
 def street() -> Callable[..., RoadNetwork]:
-    """A straight street: `street(left, right, length=…, mark=…)`."""
+    """Straight street: `street(left, right, length=…, mark=…)`."""
     return lambda *lanes, **options: RoadNetwork.parse(street_text(*lanes, **options))
 
 
@@ -51,7 +51,7 @@ def car() -> Callable[[str], ActorSpec]:
 
 @pytest.fixture
 def view_of() -> Callable[..., WorldView]:
-    """What the world shows: placements by name, all of them cars, at a time."""
+    """View of cars at a time, by placements with names."""
 
     def view(placements: Mapping[str, Placement], time: float = 0.0, tick: int = 0) -> WorldView:
         rows = list(placements.values())
@@ -79,5 +79,5 @@ def view_of() -> Callable[..., WorldView]:
 
 @pytest.fixture(scope="session")
 def library_roads() -> RoadNetwork:
-    """The crossing of scenario 2: a street of 2+2 lanes, a street of 1+1, and four lights."""
+    """Crossing of scenario 2: a street of 2+2 lanes, a street of 1+1, and four lights."""
     return RoadNetwork.load(Path(__file__).parents[3] / "xosc" / "roads" / "coop_2.xodr")

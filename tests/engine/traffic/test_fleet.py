@@ -1,4 +1,4 @@
-"""Cars that follow lanes and each other."""
+"""Tests of cars that follow lanes and leaders."""
 
 import math
 from pathlib import Path
@@ -45,7 +45,7 @@ def view(placements: dict[str, Placement], time: float = 0.0) -> WorldView:
 
 @pytest.fixture(scope="module")
 def loop() -> RoadNetwork:
-    """A circle of radius 100 m in two roads; lane -1 runs counter-clockwise at 102 m from the middle."""
+    """Circle of radius 100 m in two roads; lane -1 runs counter-clockwise at 102 m from the center."""
     length = math.pi * RADIUS
     roads = []
     for number, other, x, h in (("a", "b", RADIUS, math.pi / 2), ("b", "a", -RADIUS, -math.pi / 2)):
@@ -67,13 +67,13 @@ def crossing() -> RoadNetwork:
 
 
 def gaps(placements: dict[str, Placement]) -> list[float]:
-    """Bumper to bumper along the circle, from each car to the next."""
+    """Return the gaps between bumpers along the circle from each car to the next."""
     angles = np.sort([math.atan2(p.y, p.x) for p in placements.values()])
     between = np.diff(np.append(angles, angles[0] + 2 * math.pi))
     return [float(angle) * (RADIUS + 2.0) - LENGTH for angle in between]
 
 
-def test_a_ring_of_cars_settles_at_the_equilibrium_of_the_model(loop: RoadNetwork) -> None:
+def test_ring_of_cars_converges_to_equilibrium_gap(loop: RoadNetwork) -> None:
     driver = IntelligentDriver(lateral_acceleration=9.0)
     fleet = Fleet(loop, driver=driver)
     rng = np.random.default_rng(5)
@@ -92,8 +92,8 @@ def test_a_ring_of_cars_settles_at_the_equilibrium_of_the_model(loop: RoadNetwor
     assert driver.equilibrium_gap(float(speeds.mean()), 15.0) == pytest.approx(mean_gap, rel=0.02)
 
 
-def test_shorter_steps_are_the_same_drive_in_finer_grain(loop: RoadNetwork) -> None:
-    """Drivers decide each 0.05 s, and a circle's stretch is the same everywhere: so are the places, step by step."""
+def test_shorter_time_steps_give_the_same_positions(loop: RoadNetwork) -> None:
+    """Drivers decide every 0.05 s and the curvature is constant, so that positions are equal in each step."""
     places = {}
     for dt in (0.05, 0.01):
         fleet = Fleet(loop)
@@ -106,8 +106,8 @@ def test_shorter_steps_are_the_same_drive_in_finer_grain(loop: RoadNetwork) -> N
             assert (fine[name].x, fine[name].y, fine[name].speed) == pytest.approx((there.x, there.y, there.speed))
 
 
-def test_who_comes_in_between_two_decisions_looks_at_once(loop: RoadNetwork) -> None:
-    """A car that stands 8 m ahead of another's bumper, which drives 10 m/s: that one brakes in the next step."""
+def test_car_added_between_decisions_reacts_in_the_next_step(loop: RoadNetwork) -> None:
+    """A car is added 8 m ahead of a car that drives 10 m/s. The follower brakes in the next step."""
     fleet = Fleet(loop)
     fleet.add(spec("first"), loop.location("a", -1, 20.0), speed=10.0, desired_speed=13.0)
     fleet.step(None, 0.01)
@@ -117,7 +117,7 @@ def test_who_comes_in_between_two_decisions_looks_at_once(loop: RoadNetwork) -> 
     assert fleet.speeds["first"] < before - 0.05
 
 
-def test_a_string_of_cars_stops_behind_an_obstacle_and_goes_on_when_it_leaves(loop: RoadNetwork) -> None:
+def test_string_of_cars_stops_for_obstacle_and_restarts_after_its_removal(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     for k in range(5):
         fleet.add(spec(f"car{k}"), loop.location("a", -1, 100.0 - 20.0 * k), speed=10.0, desired_speed=13.0)
@@ -136,7 +136,7 @@ def test_a_string_of_cars_stops_behind_an_obstacle_and_goes_on_when_it_leaves(lo
     assert min(fleet.speeds.values()) > 5.0
 
 
-def test_a_car_beside_the_lane_is_no_obstacle(loop: RoadNetwork) -> None:
+def test_car_beside_the_lane_is_ignored(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     fleet.add(spec("car"), loop.location("a", -1, 50.0), speed=10.0, desired_speed=10.0)
     pose = loop.lane_pose_at("a", -1, 90.0, -4.0)
@@ -145,7 +145,7 @@ def test_a_car_beside_the_lane_is_no_obstacle(loop: RoadNetwork) -> None:
     assert fleet.speeds["car"] > 9.9
 
 
-def test_steps_are_as_long_as_the_speed_says(loop: RoadNetwork) -> None:
+def test_step_length_equals_speed_times_dt(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     before = fleet.add(spec("car"), loop.location("a", -1, 300.0), speed=12.0, desired_speed=12.0)
     assert before.teleport
@@ -156,7 +156,7 @@ def test_steps_are_as_long_as_the_speed_says(loop: RoadNetwork) -> None:
         before = after
 
 
-def test_cars_slow_down_before_a_bend(crossing: RoadNetwork) -> None:
+def test_cars_slow_down_ahead_of_a_bend(crossing: RoadNetwork) -> None:
     fleet = Fleet(crossing, seed=1, driver=IntelligentDriver(lateral_acceleration=2.0))
     for k in range(6):
         fleet.add(spec(f"car{k}"), crossing.location("3", 1, 80.0 - 14.0 * k), desired_speed=13.0)
@@ -186,7 +186,7 @@ def crossing_fleet(crossing: RoadNetwork, seed: int) -> Fleet:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_nobody_touches_anybody_on_a_crossing_and_all_get_through(crossing: RoadNetwork, seed: int) -> None:
+def test_cars_pass_a_crossing_without_contact(crossing: RoadNetwork, seed: int) -> None:
     fleet = crossing_fleet(crossing, seed)
     gone: set[str] = set()
     for tick in range(4000):
@@ -202,7 +202,7 @@ def test_nobody_touches_anybody_on_a_crossing_and_all_get_through(crossing: Road
     assert len(gone) == 24
 
 
-def test_a_crossing_is_left_to_a_foreign_car_that_moves_through_it(crossing: RoadNetwork) -> None:
+def test_cars_wait_for_foreign_car_in_crossing(crossing: RoadNetwork) -> None:
     fleet = Fleet(crossing)
     fleet.add(spec("car"), crossing.location("3", 1, 8.0), speed=8.0)
     route = crossing.route(crossing.location("1", -1, 90.0), crossing.location("2", -1, 40.0))
@@ -214,7 +214,7 @@ def test_a_crossing_is_left_to_a_foreign_car_that_moves_through_it(crossing: Roa
         assert len(boxes) == 1 or not overlap(boxes[0], boxes[1])
 
 
-def test_the_seed_decides_about_the_branches(crossing: RoadNetwork) -> None:
+def test_branches_depend_on_the_seed(crossing: RoadNetwork) -> None:
     def traces(seed: int) -> list[Placement]:
         fleet = crossing_fleet(crossing, seed)
         for _ in range(300):
@@ -226,7 +226,7 @@ def test_the_seed_decides_about_the_branches(crossing: RoadNetwork) -> None:
     assert same != other
 
 
-def test_names_are_unique_and_can_be_used_again(loop: RoadNetwork) -> None:
+def test_add_with_used_name_is_an_error_until_removal(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     fleet.add(spec("car"), loop.location("a", -1, 10.0))
     with pytest.raises(ValueError, match="'car' is in the fleet already"):
@@ -237,7 +237,7 @@ def test_names_are_unique_and_can_be_used_again(loop: RoadNetwork) -> None:
     assert fleet.names == ("car",)
 
 
-def test_neighbors_stay_in_order_over_a_long_run(loop: RoadNetwork) -> None:
+def test_cars_keep_their_order_over_a_long_run(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     wishes = (6.0, 14.0, 9.0, 12.0)
     for k, wish in enumerate(wishes):

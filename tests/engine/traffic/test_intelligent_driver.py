@@ -1,4 +1,4 @@
-"""The car-following model against its closed forms."""
+"""Tests of the car-following model against its closed forms."""
 
 import math
 
@@ -15,19 +15,19 @@ def response(speed: float, desired: float, gap: float = math.inf, approach: floa
     return float(DRIVER.response(*(np.array([value]) for value in (speed, desired, gap, approach)))[0])
 
 
-def test_on_a_free_road_it_speeds_up_to_the_desired_speed() -> None:
+def test_free_car_accelerates_to_desired_speed() -> None:
     assert response(0.0, 20.0) == pytest.approx(1.2)
     assert response(10.0, 20.0) == pytest.approx(1.2 * (1 - 0.5**4))
     assert response(20.0, 20.0) == pytest.approx(0.0)
 
 
-def test_a_car_that_is_only_too_fast_does_not_brake_to_its_limit() -> None:
-    """At twice the desired speed the model alone asks for 1.2·(2⁴ - 1) = 18 m/s²."""
+def test_braking_above_desired_speed_is_limited() -> None:
+    """At twice the desired speed the model alone gives a deceleration of 1.2·(2⁴ - 1) = 18 m/s²."""
     assert response(22.0, 20.0) == pytest.approx(1.2 * (1 - 1.1**4))
     assert response(40.0, 20.0) == pytest.approx(-2.0 * 2.0)
 
 
-def test_many_drivers_each_have_their_own_parameters() -> None:
+def test_drivers_use_individual_parameters() -> None:
     other = IntelligentDriver(time_gap=0.8, standstill_gap=3.0, acceleration=2.0)
     speed, desired, gap, approach = np.array([[8.0, 8.0], [15.0, 15.0], [20.0, 20.0], [1.0, 1.0]])
     both = Drivers.of([DRIVER, other]).response(speed, desired, gap, approach)
@@ -36,24 +36,24 @@ def test_many_drivers_each_have_their_own_parameters() -> None:
     assert both[0] != both[1]
 
 
-def test_a_standing_queue_stands_at_the_standstill_gap() -> None:
+def test_equilibrium_gap_at_standstill_is_the_standstill_gap() -> None:
     assert response(0.0, 20.0, gap=2.0) == pytest.approx(0.0)
 
 
-def test_in_equilibrium_nobody_accelerates() -> None:
+def test_acceleration_in_equilibrium_is_zero() -> None:
     for speed in (1.0, 8.0, 15.0):
         gap = DRIVER.equilibrium_gap(speed, 20.0)
         assert gap == pytest.approx((2.0 + 1.5 * speed) / math.sqrt(1.0 - (speed / 20.0) ** 4))
         assert response(speed, 20.0, gap) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_gap_wanted_grows_with_the_approach_and_braking_has_a_limit() -> None:
+def test_response_to_approach_rate_is_limited_by_the_brakes() -> None:
     wanted = 2.0 + 10.0 * 1.5 + 10.0 * 4.0 / (2.0 * math.sqrt(1.2 * 2.0))
     assert response(10.0, 20.0, 40.0, 4.0) == pytest.approx(1.2 * (1 - 0.5**4 - (wanted / 40.0) ** 2))
     assert response(10.0, 20.0, 0.0, 10.0) == -DRIVER.emergency
 
 
-def test_a_braking_car_stops_and_does_not_back_up() -> None:
+def test_ballistic_step_of_braking_car_ends_at_standstill() -> None:
     covered, after = ballistic(np.array([10.0, 1.0]), np.array([-2.0, -2.0]), 1.0)
     assert covered == pytest.approx([9.0, 0.25])
     assert after == pytest.approx([8.0, 0.0])

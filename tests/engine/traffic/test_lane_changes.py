@@ -1,4 +1,4 @@
-"""Lane changes: MOBIL's two criteria by numbers, and cars that follow them."""
+"""Tests of lane changes: the two criteria of MOBIL by numbers, and cars that apply them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Street = Callable[..., RoadNetwork]
 Car = Callable[[str], ActorSpec]
 
 BUMPERS = 4.6
-"""Distance of two cars' reference points that touch [m]."""
+"""Distance between the reference points of two cars in contact [m]."""
 
 
 def prospect(**given: float) -> Prospect:
@@ -26,7 +26,7 @@ def prospect(**given: float) -> Prospect:
     return Prospect(*(np.array([given.get(name, 0.0)]) for name in names))
 
 
-def test_the_incentive_is_the_own_gain_and_a_part_of_the_others() -> None:
+def test_incentive_weights_own_gain_and_loss_of_followers() -> None:
     """(0.4 + 1.0) + 0.5·(-0.6 - 0.2 + 0.1 + 0.3) - 0.1 = 1.1, and 0.3 more towards the slow side."""
     case = prospect(
         own=-1.0,
@@ -42,7 +42,7 @@ def test_the_incentive_is_the_own_gain_and_a_part_of_the_others() -> None:
     assert incentive(biased, case, False) == pytest.approx(0.8)
 
 
-def test_nobody_may_have_to_brake_harder_than_is_safe() -> None:
+def test_safety_criterion_limits_braking_of_both_cars() -> None:
     changer = LaneChanger(safe_deceleration=4.0)
     assert safe(changer, prospect(new_follower_after=-4.0)).tolist() == [True]
     assert safe(changer, prospect(new_follower_after=-4.1)).tolist() == [False]
@@ -50,7 +50,7 @@ def test_nobody_may_have_to_brake_harder_than_is_safe() -> None:
 
 
 def lane_after_one_step(fleet: Fleet, name: str = "me") -> int:
-    """The lane in which a car is after every driver has thought once."""
+    """Return the lane of a car after one decision of every driver."""
     fleet.step(None, 0.5)
     return fleet.lanes.keys[int(fleet.places([name])[0][0])].lane
 
@@ -58,7 +58,12 @@ def lane_after_one_step(fleet: Fleet, name: str = "me") -> int:
 def queue(
     roads: RoadNetwork, car: Car, changer: LaneChanger, *, leader_gap: float, follower_gap: float | None = None
 ) -> Fleet:
-    """A car at 20 m/s in the right lane of two that wants 25 m/s, a leader at 10 m/s, a follower in the other lane."""
+    """Return a fleet with a car, a leader and a follower.
+
+    The car drives 20 m/s in the right of two lanes with a desired speed of 25 m/s. The leader drives 10 m/s. The
+    follower
+    is in the other lane.
+    """
     fleet = Fleet(roads, changer=changer)
     fleet.add(car("me"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)
     fleet.add(car("leader"), roads.location("1", -2, 400.0 + BUMPERS + leader_gap), speed=10.0, desired_speed=10.0)
@@ -68,34 +73,37 @@ def queue(
     return fleet
 
 
-def test_a_car_overtakes_a_slow_leader(street: Street, car: Car) -> None:
-    """Gap 100 m: wanted 2 + 20 + 20·10/(2·√1.5) = 103.65 m, so a = 1 - 0.8⁴ - 1.0365² = -0.484; free it is +0.590."""
+def test_car_changes_lane_behind_a_slow_leader(street: Street, car: Car) -> None:
+    """At a gap of 100 m the desired gap is 2 + 20 + 20·10/(2·√1.5) = 103.65 m.
+
+    So a = 1 - 0.8⁴ - 1.0365² = -0.484 behind the leader, and +0.590 on the free lane.
+    """
     assert lane_after_one_step(queue(street(), car, LaneChanger(), leader_gap=100.0)) == -1
 
 
-def test_a_gain_below_the_threshold_is_not_worth_it(street: Street, car: Car) -> None:
+def test_gain_below_the_threshold_prevents_lane_change(street: Street, car: Car) -> None:
     """The gain is (103.65 / gap)²: 1.074 at 100 m."""
     assert lane_after_one_step(queue(street(), car, LaneChanger(threshold=1.07), leader_gap=100.0)) == -1
     assert lane_after_one_step(queue(street(), car, LaneChanger(threshold=1.08), leader_gap=100.0)) == -2
 
 
-def test_a_follower_too_near_in_the_other_lane_forbids_it(street: Street, car: Car) -> None:
-    """It would brake by (22 / gap)² - 0.590: 4.0 m/s² at 10.27 m."""
+def test_near_follower_in_target_lane_prevents_lane_change(street: Street, car: Car) -> None:
+    """The follower would brake by (22 / gap)² - 0.590: 4.0 m/s² at 10.27 m."""
     egoistic = LaneChanger(politeness=0.0)
     assert lane_after_one_step(queue(street(), car, egoistic, leader_gap=100.0, follower_gap=10.4)) == -1
     assert lane_after_one_step(queue(street(), car, egoistic, leader_gap=100.0, follower_gap=10.1)) == -2
 
 
-def test_a_polite_driver_does_not_push_in(street: Street, car: Car) -> None:
-    """At 20 m the follower loses (22/20)² = 1.21; the gain is worth it while 1.074 - 1.21·p > 0.1, for p < 0.805."""
+def test_polite_driver_does_not_change_ahead_of_near_follower(street: Street, car: Car) -> None:
+    """At 20 m the follower loses (22/20)² = 1.21. The incentive is positive if 1.074 - 1.21·p > 0.1, for p < 0.805."""
     for politeness, lane in ((0.80, -1), (0.81, -2)):
         polite = LaneChanger(politeness=politeness)
         fleet = queue(street(), car, polite, leader_gap=100.0, follower_gap=20.0)
         assert lane_after_one_step(fleet) == lane
 
 
-def test_a_polite_leader_makes_way(street: Street, car: Car) -> None:
-    """It loses nothing, and its follower gains 1.074 by its change: p·1.074 > 0.1 for p > 0.093."""
+def test_polite_leader_changes_lane_for_faster_follower(street: Street, car: Car) -> None:
+    """The leader loses nothing, and its follower gains 1.074: p·1.074 > 0.1 for p > 0.093."""
     for politeness, lane in ((0.09, -2), (0.10, -1)):
         roads = street()
         fleet = Fleet(roads, changer=LaneChanger(politeness=politeness))
@@ -104,12 +112,12 @@ def test_a_polite_leader_makes_way(street: Street, car: Car) -> None:
         assert lane_after_one_step(fleet) == lane
 
 
-def test_the_marking_may_forbid_it(street: Street, car: Car) -> None:
+def test_solid_marking_prevents_lane_change(street: Street, car: Car) -> None:
     for mark, lane in (("none", -2), ("decrease", -2), ("increase", -1)):
         assert lane_after_one_step(queue(street(mark=mark), car, LaneChanger(), leader_gap=100.0)) == lane
 
 
-def test_nobody_changes_into_oncoming_traffic(street: Street, car: Car) -> None:
+def test_car_does_not_change_to_oncoming_lane(street: Street, car: Car) -> None:
     roads = street(1, 1)
     fleet = Fleet(roads)
     fleet.add(car("me"), roads.location("1", -1, 400.0), speed=20.0, desired_speed=25.0)
@@ -117,7 +125,7 @@ def test_nobody_changes_into_oncoming_traffic(street: Street, car: Car) -> None:
     assert lane_after_one_step(fleet) == -1
 
 
-def test_a_free_car_returns_to_the_slow_side_only_with_a_bias(street: Street, car: Car) -> None:
+def test_free_car_returns_to_slow_lane_with_bias_only(street: Street, car: Car) -> None:
     # In left-hand traffic lane -1 of a one-way road drives against s, and its left neighbor is lane -2.
     for rule, bias, lane, after in (
         ("RHT", 0.0, -1, -1),
@@ -131,7 +139,7 @@ def test_a_free_car_returns_to_the_slow_side_only_with_a_bias(street: Street, ca
         assert lane_after_one_step(fleet) == after
 
 
-def test_of_two_that_want_the_same_gap_one_changes(street: Street, car: Car) -> None:
+def test_one_of_two_cars_changes_into_the_same_gap(street: Street, car: Car) -> None:
     roads = street(right=3)
     fleet = Fleet(roads)
     for lane in (-1, -3):
@@ -142,8 +150,8 @@ def test_of_two_that_want_the_same_gap_one_changes(street: Street, car: Car) -> 
     assert sorted(fleet.lanes.keys[int(row)].lane for row in rows) in ([-2, -1], [-3, -2])
 
 
-def test_the_way_sideways_is_smooth_and_takes_as_long_as_stated(street: Street, car: Car) -> None:
-    """3.5 m along a quintic over v·4 s: steepest 1.875·3.5/80 at its middle."""
+def test_lateral_path_is_a_quintic_of_stated_duration(street: Street, car: Car) -> None:
+    """The path is 3.5 m along a quintic over v·4 s, with a maximum slope of 1.875·3.5/80 in the middle."""
     fleet = queue(street(), car, LaneChanger(politeness=0.0), leader_gap=100.0)
     path = [(place.x, place.y, place.yaw) for _ in range(160) if (place := fleet.step(None, 0.05)["me"])]
     x, y, yaw = np.array(path).T
@@ -155,7 +163,7 @@ def test_the_way_sideways_is_smooth_and_takes_as_long_as_stated(street: Street, 
     assert np.arctan2(np.diff(y), np.diff(x)) == pytest.approx(0.5 * (yaw[1:] + yaw[:-1]), abs=2e-3)
 
 
-def test_dense_traffic_on_three_lanes_changes_lanes_and_never_touches(street: Street, car: Car) -> None:
+def test_dense_traffic_changes_lanes_without_contact(street: Street, car: Car) -> None:
     roads = street(right=3, length=3000.0)
     rng = np.random.default_rng(3)
     fleet = Fleet(roads, seed=2)
@@ -175,7 +183,7 @@ def test_dense_traffic_on_three_lanes_changes_lanes_and_never_touches(street: St
 
 
 def ending_lane() -> RoadNetwork:
-    """Two lanes, of which the right one tapers off to nothing from s = 250 to 300 m, with a road beyond."""
+    """Return two lanes, of which the right one tapers off from s = 250 to 300 m, and a following road."""
 
     def road(number: str, x: float, lanes: str, link: str) -> str:
         return (
@@ -205,8 +213,8 @@ def ending_lane() -> RoadNetwork:
     return RoadNetwork.parse(f"<OpenDRIVE>{first}{second}</OpenDRIVE>")
 
 
-def test_cars_leave_a_lane_that_ends(car: Car) -> None:
-    """It is too narrow, below 2.2 m, from s = 250 + 1.3/0.07 = 268.6 m on; the next place looked at is 270 m."""
+def test_cars_leave_ending_lane(car: Car) -> None:
+    """The lane is narrower than 2.2 m from s = 250 + 1.3/0.07 = 268.6 m on; the next sample is at 270 m."""
     roads = ending_lane()
     fleet = Fleet(roads)
     assert fleet.lanes.ends_at[np.isfinite(fleet.lanes.ends_at)] == pytest.approx([270.0])

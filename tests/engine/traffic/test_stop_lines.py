@@ -1,4 +1,4 @@
-"""Traffic lights: cars wait at stop lines while they must."""
+"""Tests of traffic lights and stop lines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Street = Callable[..., RoadNetwork]
 Car = Callable[[str], ActorSpec]
 
 FRONT = 1.4 + 0.5 * 4.6
-"""From the reference point to the front bumper [m]."""
+"""Distance from the reference point to the front bumper [m]."""
 
 
 def light(s: float = 200.0, orientation: str = "+", validity: str = "", dynamic: str = "yes") -> str:
@@ -25,7 +25,7 @@ def light(s: float = 200.0, orientation: str = "+", validity: str = "", dynamic:
 
 
 class Lights:
-    """The state of all lights, and who was asked for."""
+    """State of all lights, and the lights that were requested."""
 
     def __init__(self, red: bool = True) -> None:
         self.red = red
@@ -42,8 +42,8 @@ def approaching(roads: RoadNetwork, car: Car, lights: Lights, *, lane: int = -1,
     return fleet
 
 
-def test_a_car_waits_at_a_red_light_and_goes_on_when_it_turns(street: Street, car: Car) -> None:
-    """It stands where its gap to the line is the standstill gap of 2 m, after 1 m of air."""
+def test_car_waits_at_red_light_until_green(street: Street, car: Car) -> None:
+    """The car stops 1 m before the line plus the standstill gap of 2 m."""
     lights = Lights()
     fleet = approaching(street(right=1, extra=light()), car, lights)
     for _ in range(800):
@@ -57,7 +57,7 @@ def test_a_car_waits_at_a_red_light_and_goes_on_when_it_turns(street: Street, ca
     assert place.x > 250.0
 
 
-def test_the_car_behind_waits_behind(street: Street, car: Car) -> None:
+def test_following_car_stops_behind_waiting_car(street: Street, car: Car) -> None:
     roads = street(right=1, extra=light())
     fleet = approaching(roads, car, Lights())
     fleet.add(car("next"), roads.location("1", -1, 30.0), speed=14.0, desired_speed=14.0)
@@ -78,7 +78,7 @@ def test_the_car_behind_waits_behind(street: Street, car: Car) -> None:
         ("+", '<validity fromLane="-2" toLane="-1"/>', -1, True),
     ],
 )
-def test_a_light_is_for_the_lanes_that_the_map_says(
+def test_light_stops_cars_on_its_valid_lanes_only(
     street: Street, car: Car, orientation: str, validity: str, lane: int, stops: bool
 ) -> None:
     roads = street(1, 2, extra=light(500.0, orientation, validity), mark="none")
@@ -88,7 +88,7 @@ def test_a_light_is_for_the_lanes_that_the_map_says(
     assert (place.speed < 0.05) is stops
 
 
-def test_a_sign_is_no_light(street: Street, car: Car) -> None:
+def test_static_signal_does_not_stop_cars(street: Street, car: Car) -> None:
     lights = Lights()
     fleet = approaching(street(right=1, extra=light(dynamic="no")), car, lights)
     for _ in range(300):
@@ -98,16 +98,18 @@ def test_a_sign_is_no_light(street: Street, car: Car) -> None:
 
 
 @pytest.mark.parametrize(("distance", "stops"), [(25.5, True), (23.5, False)])
-def test_who_would_have_to_brake_too_hard_passes(street: Street, car: Car, distance: float, stops: bool) -> None:
-    """From 14 m/s, 4 m/s² take 24.5 m."""
+def test_car_that_cannot_brake_comfortably_passes_red_light(
+    street: Street, car: Car, distance: float, stops: bool
+) -> None:
+    """From 14 m/s, braking with 4 m/s² takes 24.5 m."""
     fleet = approaching(street(right=1, extra=light()), car, Lights(), at=200.0 - FRONT - distance)
     for _ in range(300):
         place = fleet.step(None, 0.05)["me"]
     assert (place.x < 200.0 - FRONT) is stops
 
 
-def test_a_car_that_stands_on_the_line_is_not_held_by_it(car: Car) -> None:
-    """The line lies half a meter into the second road; the car stands before that one, its front beyond the line."""
+def test_car_standing_on_stop_line_continues(car: Car) -> None:
+    """The line is 0.5 m into the second road. The car stands on the first road with its front beyond the line."""
     lane = (
         '<lane id="-1" type="driving"><link><{kind} id="-1"/></link>'
         '<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
@@ -130,7 +132,7 @@ def test_a_car_that_stands_on_the_line_is_not_held_by_it(car: Car) -> None:
     assert place.x > 102.0
 
 
-def test_red_lights_hold_a_car_before_the_junction_until_they_are_green(library_roads: RoadNetwork, car: Car) -> None:
+def test_red_light_holds_car_before_junction_until_green(library_roads: RoadNetwork, car: Car) -> None:
     lights = Lights()
     fleet = Fleet(library_roads, must_stop=lights)
     start = library_roads.location("3", 1, 70.0)

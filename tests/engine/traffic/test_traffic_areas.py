@@ -1,4 +1,4 @@
-"""Areas of traffic: ranges of roads from cursor to cursor, and polygons."""
+"""Tests of traffic areas: ranges of roads between cursors, and polygons."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Street = Callable[..., RoadNetwork]
 
 
 def three_in_a_row(turned: bool = False) -> RoadNetwork:
-    """Roads a, b, c of 100 m each one behind the other; with `turned` the middle one runs the other way."""
+    """Return three consecutive roads a, b, c of 100 m; with `turned` the middle one has the opposite direction."""
     lane = '<lane id="-1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
     left = '<lane id="1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
 
@@ -56,29 +56,29 @@ def three_in_a_row(turned: bool = False) -> RoadNetwork:
     return RoadNetwork.parse(f"<OpenDRIVE>{''.join(roads)}</OpenDRIVE>")
 
 
-def test_a_range_on_one_road(street: Street) -> None:
+def test_range_on_one_road(street: Street) -> None:
     roads = street()
     assert road_range(roads, [Cursor("1", 100.0, (-1,)), Cursor("1", 300.0)]) == [Stretch("1", 100.0, 300.0, (-1,))]
     assert road_range(roads, [Cursor("1", 300.0), Cursor("1", 100.0)]) == [Stretch("1", 100.0, 300.0)]
 
 
-def test_missing_s_is_the_start_of_the_first_and_the_end_of_the_last_road(street: Street) -> None:
+def test_cursor_without_s_is_start_or_end_of_its_road(street: Street) -> None:
     assert road_range(street(), [Cursor("1"), Cursor("1")]) == [Stretch("1", 0.0, 1000.0)]
 
 
-def test_lanes_count_up_to_the_next_cursor(street: Street) -> None:
+def test_lanes_of_cursor_are_valid_up_to_the_next_cursor(street: Street) -> None:
     cursors = [Cursor("1", 100.0, (-1,)), Cursor("1", 200.0, (-2,)), Cursor("1", 300.0)]
     assert road_range(street(), cursors) == [Stretch("1", 100.0, 200.0, (-1,)), Stretch("1", 200.0, 300.0, (-2,))]
 
 
-def test_the_length_cuts_it_off(street: Street) -> None:
+def test_length_truncates_the_range(street: Street) -> None:
     roads = street()
     assert road_range(roads, [Cursor("1", 100.0), Cursor("1", 300.0)], 50.0) == [Stretch("1", 100.0, 150.0)]
     backwards = [Cursor("1", 300.0), Cursor("1", 100.0)]
     assert road_range(roads, backwards, 50.0) == [Stretch("1", 250.0, 300.0)]
 
 
-def test_a_range_over_several_roads_follows_their_links() -> None:
+def test_range_over_several_roads_follows_their_links() -> None:
     cursors = [Cursor("a", 60.0), Cursor("c", 30.0)]
     assert road_range(three_in_a_row(), cursors) == [
         Stretch("a", 60.0, 100.0),
@@ -98,7 +98,7 @@ def test_a_range_over_several_roads_follows_their_links() -> None:
     ]
 
 
-def test_roads_must_exist_and_be_linked(street: Street) -> None:
+def test_range_over_unknown_or_unlinked_roads_is_an_error(street: Street) -> None:
     with pytest.raises(InputError, match="road '2' does not exist"):
         road_range(street(), [Cursor("1"), Cursor("2")])
     lane = '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
@@ -112,11 +112,11 @@ def test_roads_must_exist_and_be_linked(street: Street) -> None:
         )
         + "</OpenDRIVE>"
     )
-    with pytest.raises(InputError, match="no roads lead from road '1' to road '2'"):
+    with pytest.raises(InputError, match="no chain of roads leads from road '1' to road '2'"):
         road_range(apart, [Cursor("1"), Cursor("2")])
 
 
-def test_places_in_a_stretch_and_in_a_polygon(street: Street) -> None:
+def test_areas_cover_sites_in_range_and_polygon(street: Street) -> None:
     lanes = TrafficLanes(street(1, 1))
     sites = SpawnAreas(lanes).driving
     inside = sites.subset(stretches_cover(lanes, [Stretch("1", 100.0, 200.0, (-1,))])(sites))

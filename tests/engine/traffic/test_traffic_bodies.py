@@ -1,4 +1,4 @@
-"""Who background traffic is made of."""
+"""Tests of the participants of background traffic."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def drawn(mixture: TrafficMix, count: int = 400) -> Counter[str]:
     return Counter(mixture.draw(generator(5, "bodies", n)).spec.name for n in range(count))
 
 
-def test_without_a_definition_there_are_the_cars_of_the_library() -> None:
+def test_mix_without_definition_contains_library_cars() -> None:
     found = drawn(TrafficMix(SimpleNamespace(), None, None))  # type: ignore[arg-type]
     assert set(found) == {spec.name for spec, role in library_bodies(VehicleCategory.CAR) if role is Role.NONE}
     assert len(found) >= 3
 
 
-def test_categories_have_their_shares() -> None:
-    """Of 400 draws with 3 : 1, 100 vans in the mean, 8.7 the standard deviation."""
+def test_mix_draws_categories_by_weight() -> None:
+    """Of 400 draws with weights 3 : 1, the mean is 100 vans and the standard deviation 8.7."""
     found = drawn(definition({VehicleCategory.CAR: 3.0, VehicleCategory.VAN: 1.0}))
     assert 65 <= found["van"] <= 135
     assert "truck" not in found
@@ -59,7 +59,7 @@ def test_categories_have_their_shares() -> None:
 @pytest.mark.parametrize(
     ("name", "value"), [("acceleration", "0"), ("deceleration", "-2"), ("time_gap", "nan"), ("speed_factor", "0")]
 )
-def test_drivers_that_cannot_be_are_told_by_line(name: str, value: str) -> None:
+def test_invalid_driver_settings_are_errors_with_line(name: str, value: str) -> None:
     entries = (("module", "eidrive.traffic", 3), (name, value, 4))
     properties = tuple(model.Property(name=key, value=text, line=line) for key, text, line in entries)
     controller = model.Controller(
@@ -80,7 +80,7 @@ def test_drivers_that_cannot_be_are_told_by_line(name: str, value: str) -> None:
         TrafficMix(SimpleNamespace(), element, None)  # type: ignore[arg-type]
 
 
-def test_dimensions_are_those_of_the_catalog() -> None:
+def test_bodies_have_dimensions_of_the_catalog() -> None:
     truck = definition({VehicleCategory.TRUCK: 1.0}).draw(generator(1, "one"))
     assert truck.spec.size == (8.3, 2.5, 3.55)
     assert truck.driver.acceleration == 1.0
@@ -100,10 +100,10 @@ def test_dimensions_are_those_of_the_catalog() -> None:
         (VehicleCategory.SEMITRAILER, Role.NONE, {"truck"}),
     ],
 )
-def test_roles_choose_among_the_vehicles_of_a_category(category: VehicleCategory, role: Role, names: set[str]) -> None:
+def test_roles_select_vehicles_of_a_category(category: VehicleCategory, role: Role, names: set[str]) -> None:
     assert set(drawn(definition({category: 1.0}, {role: 2.0}), 20)) == names
 
 
-def test_a_mixture_knows_the_categories_that_it_draws() -> None:
+def test_categories_of_mix_are_those_it_draws() -> None:
     mixture = definition({VehicleCategory.CAR: 1.0, VehicleCategory.BUS: 0.0, VehicleCategory.VAN: 2.0})
     assert mixture.categories == {"car", "van"}
