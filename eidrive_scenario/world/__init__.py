@@ -1,6 +1,6 @@
-"""The world: bodies, motion, contacts, rays and pictures. The only room that imports pybullet.
+"""World of a run: bodies, motion, contacts, rays and images. The only package that imports pybullet.
 
-`World` is imported when it is first asked for, so that the types of this room can be had without loading pybullet.
+`World` is imported on first access, so that the types of this package are available without loading pybullet.
 """
 
 from __future__ import annotations

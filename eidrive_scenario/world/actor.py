@@ -1,4 +1,4 @@
-"""What an actor is, and the two ways in which it can move: placed exactly, or driven by pedals and steering."""
+"""Specification of actors, and inputs of scripted and driven actors."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ Vector3 = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class ExtraAxle:
-    """An axle beside the front and the rear one; of a trailer without a front axle, any of its axles."""
+    """Axle in addition to the front and rear axle; any axle of a trailer without a front axle."""
 
     x: float
-    """Ahead of the rear axle [m]; of a trailer, ahead of its reference point."""
+    """Distance ahead of the rear axle, or of the reference point of a trailer [m]."""
     track: float
-    """Between the middles of its wheels [m]; 0 for as wide as the body."""
+    """Distance between the centers of its wheels [m]; 0 for the width of the body."""
     wheel_radius: float
     max_steering: float = 0.0
-    """Largest angle of its wheels [rad]; 0 where they do not steer."""
+    """Maximum angle of its wheels [rad]; 0 if they do not steer."""
 
 
 @dataclass(frozen=True)
 class ActorSpec:
-    """The body of an actor, as its Vehicle, Pedestrian or MiscObject says.
+    """Body of an actor by its Vehicle, Pedestrian or MiscObject.
 
-    shape   which mesh shows it: car, firetruck, ambulance, bus, van, truck, motorbike, bicycle, pedestrian, rsu, box
+    shape     mesh of the actor: car, firetruck, ambulance, bus, van, truck, motorbike, bicycle, pedestrian, rsu, box
     category  one of eidrive_scenario.detections.CLASSES
-    size    length, width, height [m];  offset  box center in the actor's frame [m]
+    size      length, width, height [m]
+    offset    box center in the frame of the actor [m]
     """
 
     name: str
@@ -38,25 +39,25 @@ class ActorSpec:
     size: Vector3
     offset: Vector3
     wheelbase: float = 0.0
-    """Distance between the axles [m]; 0 where there are none."""
+    """Distance between the axles [m]; 0 if there are none."""
     max_steering: float = 0.0
-    """Largest angle of the front wheels [rad]."""
+    """Maximum angle of the front wheels [rad]."""
     wheel_radius: float = 0.3
     extra_axles: tuple[ExtraAxle, ...] = ()
-    """The axles beside those two, in the order of the file."""
+    """Additional axles in the order of the file."""
     mass: float = 1500.0
     max_speed: float = 70.0
     max_acceleration: float = 10.0
     max_deceleration: float = 10.0
     properties: Mapping[str, str] = field(default_factory=dict)
     color: tuple[float, float, float] | None = None
-    """Body paint, red green blue in [0, 1]; by the name where None."""
+    """Body paint, red green blue in [0, 1]; None for a color by the name."""
 
 
 @fast_frozen
 @dataclass(frozen=True)
 class Placement:
-    """Where a scripted actor stands after the next step: reference point [m], angles [rad], speed [m/s]."""
+    """State of a scripted actor after the next step: reference point [m], angles [rad], speed [m/s]."""
 
     x: float
     y: float
@@ -66,10 +67,11 @@ class Placement:
     roll: float = 0.0
     speed: float = 0.0
     teleport: bool = False
-    """True if the actor jumps: velocity and acceleration then follow `speed`, not the distance covered."""
+    """True for a teleport: velocity and acceleration follow `speed` instead of the covered distance."""
     across: bool = True
-    """False where it goes where it points, so that the velocity is the speed along the heading; else the distance
-    covered in the step says how fast it moves across."""
+    """False if the velocity is the speed along the heading. True if the lateral velocity follows from the covered
+    distance.
+    """
 
 
 @fast_frozen
@@ -80,7 +82,7 @@ class Control:
     throttle: float = 0.0
     """[0, 1]"""
     brake: float = 0.0
-    """[0, 1]; 1 is the vehicle's largest deceleration."""
+    """[0, 1]; 1 is the maximum deceleration of the vehicle."""
     steering: float = 0.0
     """Angle of the front wheels, left positive [rad]."""
     reverse: bool = False

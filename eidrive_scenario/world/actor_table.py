@@ -1,4 +1,4 @@
-"""The actors of a world, in the order in which they entered, and the views of them."""
+"""Table of the actors of a world in the order of addition, and their views."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from eidrive_scenario.world.view import FEW, Contact, WorldView
 
 @dataclass(frozen=True)
 class ActorTable:
-    """What stays as long as nobody enters or leaves.
+    """Data of the actors that is constant while no actor is added or removed.
 
-    row_of_handle  the row of the actor whose body has that number in pybullet, GROUND for what is no actor; the last
-                   entry, that of the handle -1, is NOTHING
+    row_of_handle  row of the actor by the number of its body in pybullet, GROUND for other bodies; the last entry, for
+                   handle -1, is NOTHING
     """
 
     bodies: tuple[Body, ...]
@@ -30,11 +30,11 @@ class ActorTable:
     offset: Array
     row_of_handle: NDArray[np.int64]
     row_in_list: list[int]
-    """The same as a list."""
+    """`row_of_handle` as a list."""
 
     @classmethod
     def of(cls, bodies: Mapping[str, Body], highest_handle: int) -> ActorTable:
-        """From the bodies by name; `highest_handle` is that of other bodies in pybullet."""
+        """Return the table of bodies by name. `highest_handle` is that of other bodies in pybullet."""
         order = tuple(bodies.values())
         size = np.array([body.spec.size for body in order], dtype=float).reshape(-1, 3)
         offset = np.array([body.spec.offset for body in order], dtype=float).reshape(-1, 3)
@@ -63,7 +63,7 @@ class ActorTable:
         unseen: tuple[str, ...],
         unseen_by: Mapping[str, tuple[str, ...]],
     ) -> WorldView:
-        """How all stand and move now, and what else the view says of this instant."""
+        """Return the view of the current poses and motion."""
         states = [body.state for body in self.bodies]
         table = np.array(states, dtype=float).reshape(-1, 14)
         table.flags.writeable = False

@@ -1,4 +1,4 @@
-"""How an actor looks beside its body and pose: its lights, what moves on it, and who sees it."""
+"""Appearance of an actor: lights, animations and visibility."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 FLASH = 0.5
-"""How long a flashing light is on, and off, where nobody says so [s]."""
+"""Default duration of the on and off phases of a flashing light [s]."""
 
 Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class LightState:
-    """A light of a vehicle: its type (as the standard names it) and mode (on, off, flashing).
+    """Light of a vehicle: type by the standard, and mode (on, off, flashing).
 
-    since, fade    when it was switched, and how long the switching takes [s]
-    on_for, off_for  of a flashing light [s]
+    since, fade      time of the last switch, and duration of the transition [s]
+    on_for, off_for  phases of a flashing light [s]
     """
 
     light: str
@@ -31,7 +31,7 @@ class LightState:
     off_for: float = FLASH
 
     def brightness(self, time: float) -> float:
-        """How bright it is at a time [s], in [0, 1]; switched from dark to bright or back over its fade."""
+        """Return the brightness at a time [s] in [0, 1], including the fade after a switch."""
         passed = max(time - self.since, 0.0)
         if self.mode == "flashing":
             period = self.on_for + self.off_for
@@ -42,13 +42,13 @@ class LightState:
 
 @dataclass(frozen=True)
 class AnimationState:
-    """Something that moves on an actor, or how it moves.
+    """Animation of a part of an actor or of its motion.
 
-    kind   component, user component, motion, file or user animation
-    what   the part, the motion or the file, as the scenario names it
-    state  how far it has to go, in [0, 1]; None if the scenario does not say
-    since, duration  when it began, and how long it takes [s]; None if the scenario does not say
-    gestures  of a pedestrian, as the standard names them
+    kind             component, user component, motion, file or user animation
+    what             part, motion or file by its name in the scenario
+    state            target state in [0, 1]; None if the scenario omits it
+    since, duration  start and duration [s]; None if the scenario omits it
+    gestures         gestures of a pedestrian by the standard
     """
 
     kind: str
@@ -62,7 +62,7 @@ class AnimationState:
 
 @dataclass(frozen=True)
 class Visibility:
-    """Who can see an actor; `named` are the sensors, by their names, for which something else was said."""
+    """Visibility of an actor. `named` are sensors, by name, with a separate value."""
 
     graphics: bool = True
     traffic: bool = True
@@ -70,13 +70,13 @@ class Visibility:
     named: Mapping[str, bool] = field(default_factory=dict)
 
     def by(self, sensor: str) -> bool:
-        """Return whether the sensor of this name sees it."""
+        """Return whether the sensor of this name detects the actor."""
         return self.named.get(sensor, self.sensors)
 
 
 @dataclass(frozen=True)
 class Appearance:
-    """All of it: lights by type, animations by the part that moves, and who sees the actor."""
+    """Lights by type, animations by part, and visibility of an actor."""
 
     lights: Mapping[str, LightState] = field(default_factory=dict)
     animations: Mapping[str, AnimationState] = field(default_factory=dict)
@@ -84,6 +84,6 @@ class Appearance:
 
     @property
     def motion(self) -> str:
-        """The motion of a pedestrian, as the standard names it; empty where nobody has said."""
+        """Motion of a pedestrian by the standard; empty if it is not specified."""
         held = self.animations.get("motion")
         return held.what if held is not None else ""

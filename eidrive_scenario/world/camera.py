@@ -1,4 +1,4 @@
-"""A camera without a lens of its own, and what it sees."""
+"""Ideal camera and its images."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from eidrive_scenario.arrays import Array
 
 
 class CameraImage(NamedTuple):
-    """rgb (H, W, 3), depth (H, W) along the optical axis [m], inf where nothing is; segmentation (H, W): row or -1.
+    """Image: rgb (H, W, 3), depth (H, W) along the optical axis [m] with inf for no hit, segmentation (H, W) of rows or
+    -1.
 
-    Heads of traffic signals are less than -1: `World.signal_labels` says which.
+    Heads of traffic signals have labels below -1 (see `World.signal_labels`).
     """
 
     rgb: NDArray[np.uint8]
@@ -25,9 +26,10 @@ class CameraImage(NamedTuple):
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A camera without distortion, square pixels. Pixel (j, i) covers [j, j + 1) x [i, i + 1) of the picture's plane.
+    """Camera without distortion and with square pixels. Pixel (j, i) covers [j, j + 1) x [i, i + 1) of the image plane.
 
-    focal, center_x, center_y [px]; near, far along the optical axis [m]
+    focal, center_x, center_y  [px]
+    near, far                  along the optical axis [m]
     """
 
     width: int
@@ -40,23 +42,24 @@ class Pinhole:
 
     @classmethod
     def of_fov(cls, width: int, height: int, fov: float, near: float = 0.1, far: float = 500.0) -> Pinhole:
-        """With a horizontal field of view [rad] and its axis in the middle."""
+        """Return a camera with a horizontal field of view [rad] and its axis in the image center."""
         return cls(width, height, width / 2 / math.tan(fov / 2), width / 2, height / 2, near, far)
 
     def finer(self, times: float) -> Pinhole:
-        """Return the same view on `times` as many pixels along each axis."""
+        """Return the same camera with `times` as many pixels along each axis."""
         lens = (self.focal * times, self.center_x * times, self.center_y * times)
         return Pinhole(round(self.width * times), round(self.height * times), *lens, self.near, self.far)
 
     @property
     def intrinsics(self) -> Array:
-        """(3, 3) from camera coordinates to pixels."""
+        """Matrix (3, 3) from camera coordinates to pixels."""
         return np.array([[self.focal, 0.0, self.center_x], [0.0, self.focal, self.center_y], [0.0, 0.0, 1.0]])
 
 
 class Radiance(NamedTuple):
-    """The light that reaches a camera: luminance (H, W, 3) of linear sRGB [cd/m²]; depth and segmentation as in
-    Picture."""
+    """Light that reaches a camera: luminance (H, W, 3) of linear sRGB [cd/m²]; depth and segmentation as in
+    CameraImage.
+    """
 
     luminance: NDArray[np.float32]
     depth: NDArray[np.float32]

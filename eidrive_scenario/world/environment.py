@@ -1,4 +1,4 @@
-"""Time of day, weather and the state of the road, as the scenario says them."""
+"""Time of day, weather and road condition by the scenario."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from datetime import datetime, timedelta
 
 @dataclass(frozen=True)
 class Environment:
-    """What holds now; None if the scenario has not said it.
+    """Current environment; None for values that the scenario has not set.
 
-    date_time      ISO 8601, of the instant `clock_since` [s] of the run
-    clock_runs     False: the time of day stands still
-    friction       scales the grip of tires, 1 on a dry road
-    wetness, clouds, precipitation   as the standard names them
+    date_time      ISO 8601, at time `clock_since` [s] of the run
+    clock_runs     False if the time of day is constant
+    friction       factor of the grip of tires, 1 on a dry road
+    wetness, clouds, precipitation   values of the standard
     precipitation_intensity [mm/h], precipitation_share in [0, 1] (files of 1.0)
-    fog_range      visual range [m];  illuminance of the sun [lx]
+    fog_range      visual range [m]
+    illuminance    of the sun [lx]
     sun_azimuth, sun_elevation, wind_direction [rad];  wind_speed [m/s]
     temperature [K], pressure [Pa]
     """
@@ -41,7 +42,7 @@ class Environment:
     dome_image: str | None = None
 
     def clock(self, time: float) -> datetime | None:
-        """Return the date and time in the simulated world at a time of the run [s]."""
+        """Return the simulated date and time at a time of the run [s]."""
         if self.date_time is None:
             return None
         start = datetime.fromisoformat(self.date_time)

@@ -1,4 +1,4 @@
-"""From what a scenario says of time of day, weather and road to the weather of the world."""
+"""Conversion of time of day, weather and road condition of the scenario to the weather of the world."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.weather import Weather
 
 LATITUDE = 48.0
-"""Where the sun's height is reckoned from a time of day alone [degrees]; the clock then shows the sun's time."""
+"""Latitude for the elevation of the sun by the time of day [degrees]; the clock shows solar time."""
 LEAST_FRICTION = 1e-3
-"""The standard allows a road without any friction; tires need a little."""
+"""Minimum friction. The standard permits a road without friction, which the tire model does not support."""
 HURRICANE = 100.0
-"""Wind that is stronger blows as strong as this [m/s]."""
+"""Maximum wind speed; higher values are limited to it [m/s]."""
 CLEAR = 1e6
-"""A visual range beyond this is as this [m]; the standard allows an infinite one."""
+"""Maximum visual range; higher values are limited to it [m]. The standard permits an infinite one."""
 HEAVY_RAIN = 50.0
-"""What a share of 1 means in files of OpenSCENARIO 1.0, whose precipitation has no unit [mm/h]."""
+"""Intensity of a share of 1 in files of OpenSCENARIO 1.0, whose precipitation has no unit [mm/h]."""
 FULL_SUN = 1.0
-"""An intensity of the sun up to this is a share of what a sun of its height gives, as many files have it; what is
-greater is in lux, as the standard says."""
+"""Maximum intensity of the sun that is a share of the illuminance by its elevation, as in many files. A higher one is
+in
+lux, as in the standard.
+"""
 WET_BY_RAIN = 0.5
-"""Wetness of a road on which it rains, where the scenario does not say it."""
+"""Default wetness of a road in rain."""
 
 _WETNESS = {"dry": 0.0, "moist": 0.25, "wetWithPuddles": 0.5, "lowFlooded": 0.75, "highFlooded": 1.0}
 _CLOUDS = {"free": 0.0, "cloudy": 0.5, "overcast": 1.0, "rainy": 1.0, "skyOff": 0.0} | {
@@ -33,10 +35,9 @@ _CLOUDS = {"free": 0.0, "cloudy": 0.5, "overcast": 1.0, "rainy": 1.0, "skyOff": 
 
 
 def weather_from_environment(environment: Environment, time: float = 0.0) -> Weather:
-    """The weather at a time of the run [s]; what the environment does not say is as in a `Weather` without settings.
+    """Return the weather at a time of the run [s]. Values that the environment omits are the defaults of `Weather`.
 
-    Angles of the sun and of the wind are taken as the standard has them: the sun's azimuth from north (y) over east
-    (x), the wind's direction from x over y.
+    Angles follow the standard: azimuth of the sun from north (y) over east (x), direction of the wind from x over y.
     """
     said: dict[str, Any] = {
         "name": environment.name,
@@ -59,9 +60,9 @@ def weather_from_environment(environment: Environment, time: float = 0.0) -> Wea
 
 
 def solar_position(moment: datetime, latitude: float = LATITUDE) -> tuple[float, float]:
-    """Azimuth from north over east and elevation of the sun [degrees] at the sun's own time of a place.
+    """Return azimuth from north over east and elevation of the sun [degrees] at solar time.
 
-    Declination by Cooper, The absorption of radiation in solar stills (1969): right to half a degree.
+    Declination by Cooper, The absorption of radiation in solar stills (1969), with an error below half a degree.
     """
     declination = math.radians(23.45) * math.sin(2.0 * math.pi * (284 + moment.timetuple().tm_yday) / 365.0)
     hours = moment.hour + moment.minute / 60.0 + moment.second / 3600.0

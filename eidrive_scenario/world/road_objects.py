@@ -1,6 +1,6 @@
-"""What stands at the roads: poles, trees, barriers and the posts of signals, as the road network's objects say.
+"""Bodies of road objects and signals: poles, trees, barriers, posts.
 
-Buildings are the scenery's own. What is painted on the road, or has no height, is no piece of furniture.
+Buildings are part of the scenery. Objects that are painted on the road or have no height are excluded.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SIZES: Mapping[str, tuple[float, float, float]] = {
     "gantry": (0.5, 8.0, 6.0),
     "island": (2.0, 1.0, 0.15),
 }
-"""Usual length, width and height by kind, where the map leaves them open [m]."""
+"""Default length, width and height by kind, for maps that omit them [m]."""
 
 _KINDS: Mapping[str, str] = {
     "tree": "tree",
@@ -45,25 +45,25 @@ _KINDS: Mapping[str, str] = {
     "gantry": "gantry",
     "trafficIsland": "island",
 }
-"""OpenDRIVE's types of objects that are furniture."""
+"""Kinds by type of OpenDRIVE objects."""
 _WITHOUT_TYPE = ("none", "-1", "")
 LEAST = 0.1
-"""Flatter things are paint [m]."""
+"""Minimum height of an object; lower ones are paint [m]."""
 STEP = 0.2
-"""Vehicles roll over what is lower [m]."""
+"""Maximum height of an object that vehicles roll over [m]."""
 TRUNK = 0.05
-"""Radius of a trunk as a share of the tree's height."""
+"""Radius of a trunk as a share of the height of the tree."""
 POST = 0.05
 """Radius of the post of a signal [m]."""
 CLEARANCE = 2.1
-"""Usual height of the lower edge of a signal, where the map has it on the ground [m]."""
+"""Default height of the lower edge of a signal that the map has on the ground [m]."""
 
 
 class RoadObjectBody(NamedTuple):
-    """One piece: kind (a key of SIZES, or `post` for a signal's), pose of its foot, length, width and height [m].
+    """Body of an object: kind (a key of SIZES, or `post` of a signal), pose of its base, length, width and height [m].
 
-    radius   of a round one; 0 for a box
-    blocks   sight, and where `solid` also vehicles
+    radius  of a round body; 0 for a box
+    blocks  the line of sight and, if `solid`, vehicles
     """
 
     name: str
@@ -77,9 +77,9 @@ class RoadObjectBody(NamedTuple):
 
 
 class SignalHead(NamedTuple):
-    """The part of a signal that one looks at: pose of the middle of its lower edge, facing the traffic before its post.
+    """Head of a signal: pose of the center of its lower edge, facing the traffic.
 
-    carried   whether a post below carries it
+    carried  whether a post below carries it
     """
 
     signal: Signal
@@ -90,9 +90,9 @@ class SignalHead(NamedTuple):
 
 
 def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[RoadObjectBody]:
-    """Yield all furniture of a road network, posts of signals included, but for objects with some ids."""
+    """Yield the bodies of all objects and signal posts of a road network, except objects with some ids."""
     for placed in placed_objects(roads):
-        found = _fixture(roads, placed) if placed.object.id not in without else None
+        found = _object_body(roads, placed) if placed.object.id not in without else None
         if found is not None:
             yield found
     for head in signal_heads(roads):
@@ -104,7 +104,7 @@ def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Ite
 
 
 def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
-    """Signals that stand or hang, in the order of the map; one that is painted on the road has no head."""
+    """Return the heads of standing and hanging signals in the order of the map, without painted ones."""
     standing = [signal for signal in roads.signals.values() if not _painted(signal)]
     if not standing:
         return []
@@ -119,7 +119,7 @@ def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
 
 
 def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
-    """With its usual size where the map has none, or has the whole assembly of post and head."""
+    """Return the head with default size if the map omits it or gives that of the whole assembly."""
     lamps = signal.dynamic
     width, height = (0.34, 0.94) if lamps else (0.61, 0.61)
     if 0.1 <= signal.width <= (0.5 if lamps else 1.2):
@@ -147,7 +147,7 @@ def _drivable(roads: RoadNetwork, here: tuple[str, int, float, float, float]) ->
     return found is not None and found.drivable
 
 
-def _fixture(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | None:
+def _object_body(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | None:
     entry = placed.object
     kind = _KINDS.get(entry.type)
     if kind is None and entry.type in _WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
@@ -157,7 +157,7 @@ def _fixture(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | None:
     pose, length, width = placed.pose, placed.length, placed.width
     height = max([placed.height, *(corner.height for outline in entry.outlines for corner in outline)])
     if entry.outlines and not entry.repeats:
-        pose, length, width = _around(roads, placed)
+        pose, length, width = _bounding_box(roads, placed)
     usual = SIZES[kind]
     length, width, height = length or usual[0], width or usual[1], height or usual[2]
     if height < LEAST:
@@ -172,8 +172,8 @@ def _fixture(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | None:
     return RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
 
 
-def _around(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:
-    """Return the box around an object's outlines: pose of the middle of its foot, length and width [m]."""
+def _bounding_box(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:
+    """Return the box around the outlines of an object: pose of the center of its base, length and width [m]."""
     pose = placed.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)
     offset = np.concatenate(outlines(roads, placed.object))[:, :2] - (pose.x, pose.y)

@@ -1,4 +1,4 @@
-"""From an entity of the scenario to the body of an actor."""
+"""Specification of an actor from an entity of the scenario."""
 
 from __future__ import annotations
 
@@ -66,11 +66,13 @@ _USUAL_SIZE: dict[str, Vector3] = {
 
 
 def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpec:
-    """Return the body of the actor `name`, as its Vehicle, Pedestrian or MiscObject says.
+    """Return the specification of the actor `name` by its Vehicle, Pedestrian or MiscObject.
 
-    Its shape is the Property `eidrive.shape`, or else follows from the category, the name and the 3D model; its paint
-    is the Property `eidrive.color` (`#rrggbb`). A dimension of 0, with which some catalogs leave the box open, becomes
-    that of a common body of this shape. Raise ScenarioError with the line of the wrong Property or dimension.
+    The shape is the Property `eidrive.shape`, or else follows from the category, the name and the 3D model. The paint
+    is the
+    Property `eidrive.color` (`#rrggbb`). Some catalogs omit the box by dimensions of 0; these are replaced by defaults
+    of
+    the shape. Raise ScenarioError with the line of an invalid Property or dimension.
     """
     properties = {entry.name: entry.value for entry in entity.properties.property} if entity.properties else {}
     shape = _shape(entity, properties)
@@ -143,7 +145,7 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
 
 
 def _words(entity: Vehicle | MiscObject) -> set[str]:
-    """Return the words in the entity's name and 3D model, single and in neighboring pairs."""
+    """Return the words in the name and 3D model of the entity, single and as consecutive pairs."""
     words: set[str] = set()
     for text in (entity.name, (entity.model3d or "").rsplit("/", 1)[-1]):
         parts = [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", text)]
@@ -158,7 +160,7 @@ def _color(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
         return None
     if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
         line, source = _place(entity, COLOR_PROPERTY)
-        raise ScenarioError(Diagnostic(f"color {text!r} is not understood", "write it as #rrggbb", source, line))
+        raise ScenarioError(Diagnostic(f"color {text!r} is invalid", "write it as #rrggbb", source, line))
     red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return red, green, blue
 

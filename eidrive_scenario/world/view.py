@@ -1,4 +1,4 @@
-"""The truth at one instant, frozen, as a struct of arrays."""
+"""Ground truth at one time as an immutable struct of arrays."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
 
 FEW = 16
-"""Up to this many actors, plain numbers are faster than arrays."""
+"""Maximum number of actors for which scalars are faster than arrays."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Two boxes began to touch during the step that led to this view."""
+    """Start of a contact of two boxes during the step before this view."""
 
     first: str
     second: str
     position: tuple[float, float, float]
-    """Point of touch in the world frame [m]."""
+    """Point of contact in the world frame [m]."""
     impact_speed: float
-    """Speed of one relative to the other at the first touch [m/s]."""
+    """Relative speed at the first contact [m/s]."""
 
 
 class ActorState(NamedTuple):
-    """One row of a view in plain numbers, named and measured as its arrays."""
+    """Row of a view as scalars, with the names and units of the arrays."""
 
     x: float
     y: float
@@ -51,7 +51,7 @@ class ActorState(NamedTuple):
 @fast_frozen
 @dataclass(frozen=True)
 class WorldView:
-    """All actors at time `time` [s]; one row per actor, in the order in which they entered the world.
+    """All actors at time `time` [s]; one row per actor in the order of addition.
 
     position      (N, 3) of the reference point (OpenSCENARIO: rear axle center on the ground for vehicles) [m]
     yaw pitch roll  (N,) [rad]; right-handed, x forward, y left, z up; pitch positive nose down (z-y'-x'' rotation)
@@ -60,10 +60,10 @@ class WorldView:
     yaw_rate      (N,) [rad/s]
     speed         (N,) along the heading, negative backwards [m/s]
     size          (N, 3) length, width, height of the bounding box [m]
-    offset        (N, 3) box center in the actor's frame [m]
-    contacts      touches that began during the step that led here
-    unseen        actors that sensors do not see, as the scenario says
-    unseen_by     the same for the sensors of these names, of whom it says something else
+    offset        (N, 3) box center in the frame of the actor [m]
+    contacts      contacts that started during the step before
+    unseen        actors that the scenario hides from sensors
+    unseen_by     hidden actors for sensors, by name, with separate values
     """
 
     time: float
@@ -85,28 +85,28 @@ class WorldView:
     unseen_by: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:
-        """Return the actors that the sensor of this name does not see, as the scenario says."""
+        """Return the actors that the scenario hides from the sensor of this name."""
         return self.unseen_by.get(sensor, self.unseen)
 
     @cached_property
     def rows(self) -> Mapping[str, int]:
-        """Name to row."""
+        """Row by name."""
         return {name: row for row, name in enumerate(self.names)}
 
     @cached_property
     def kinematics(self) -> Array:
-        """(N, 9) position, yaw, pitch, roll and velocity."""
+        """Position, yaw, pitch, roll and velocity (N, 9)."""
         angles = np.stack([self.yaw, self.pitch, self.roll], axis=1)
         return np.concatenate([self.position, angles, self.velocity], axis=1)
 
     @cached_property
     def states(self) -> Sequence[ActorState]:
-        """Of each row how the actor stands and moves: for looks at single actors, at which arrays are slow."""
+        """State of each row as scalars, for access to single actors, where arrays are slow."""
         motion = [self.kinematics, self.acceleration, self.yaw_rate[:, None], self.speed[:, None]]
         return [ActorState(*row) for row in np.concatenate(motion, axis=1).tolist()]
 
     def without(self, names: Collection[str]) -> WorldView:
-        """Return the same instant without some actors."""
+        """Return the same view without some actors."""
         kept = [row for row, name in enumerate(self.names) if name not in names]
         if len(kept) == len(self.names):
             return self
@@ -126,7 +126,7 @@ class WorldView:
         return name in self.rows
 
     def row(self, name: str) -> int:
-        """Return the row of an actor. Raise KeyError, naming the actor, if it is not in the world."""
+        """Return the row of an actor. Raise KeyError with its name if it is not present."""
         try:
             return self.rows[name]
         except KeyError:
@@ -134,12 +134,12 @@ class WorldView:
 
     @property
     def centers(self) -> Array:
-        """(N, 3) centers of the bounding boxes in the world frame [m]; pitch and roll neglected."""
+        """Centers of the bounding boxes in the world frame (N, 3) [m], ignoring pitch and roll."""
         return self.boxes[:, :3]
 
     @cached_property
     def plain_boxes(self) -> Sequence[Sequence[float]]:
-        """The rows of `boxes` in plain numbers: for looks at single actors, at which arrays are slow."""
+        """Rows of `boxes` as scalars, for access to single actors, where arrays are slow."""
         if len(self.names) <= FEW:
             bodies = zip(self.states, self.offset.tolist(), self.size.tolist(), strict=True)
             return [_box(*body) for body in bodies]
@@ -148,7 +148,7 @@ class WorldView:
 
     @cached_property
     def boxes(self) -> Array:
-        """(N, 7) x y z l w h yaw of the bounding boxes, center in the world frame [m, rad]."""
+        """Bounding boxes x y z l w h yaw (N, 7), center in the world frame [m, rad]."""
         if 0 < len(self.names) <= FEW:
             return np.array(self.plain_boxes)
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)

@@ -1,4 +1,4 @@
-"""The weather of a world: what a person may set, and what follows from it for light, air and road."""
+"""Weather of a world: settings, and derived properties of light, air and road."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from eidrive_scenario.library import resolve
 from eidrive_scenario.settings import Settings, load_yaml_file, parse_settings
 
 CONTRAST_THRESHOLD = 0.02
-"""Koschmieder: one sees as far as the contrast of a black object against the sky is this."""
+"""Contrast of a black object against the sky at the visual range (Koschmieder)."""
 EXTINCTION_AT_RANGE = -math.log(CONTRAST_THRESHOLD)
-"""3.912: optical thickness of the air along the visual range."""
+"""Optical thickness of the air along the visual range, 3.912."""
 DECIBEL_PER_KM = math.log(10.0) / 10.0 / 1000.0
 """One dB/km as a coefficient of extinction [1/m]."""
 RAIN_LAW = (1.076, 0.67)
 """Attenuation of light by rain of R mm/h: k R^a [dB/km] (ITU-R P.1814, measured in France)."""
 SNOW_LAW = (5.5253, 1.38)
-"""The same for dry snow at 550 nm (ITU-R P.1814)."""
+"""Attenuation of light by dry snow at 550 nm (ITU-R P.1814)."""
 WET_GRIP_LOSS = 0.41
-"""Peak adhesion on asphalt is 0.85 where dry and down to 0.5 where wet (Wong, Theory of Ground Vehicles, table of road
-adhesion after Taborek 1957): 0.5 / 0.85 = 0.59 of the dry grip is left on standing water."""
+"""Loss of grip on standing water.
+
+Peak adhesion on asphalt is 0.85 if dry and down to 0.5 if wet (Wong, Theory of Ground Vehicles, table of road adhesion
+after Taborek 1957): 0.5 / 0.85 = 0.59 of the dry grip remains.
+"""
 SNOW_GRIP = 0.235
-"""The same table: 0.2 on hard-packed snow."""
+"""Grip on hard-packed snow by the same table, 0.2 / 0.85."""
 DARK = 1.0
-"""Sun's elevation below which vehicles light their lamps by themselves [degrees]."""
+"""Elevation of the sun below which vehicles switch on their lamps automatically [degrees]."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -38,18 +41,19 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 class Weather(Settings):
     """Sun, clouds, air, precipitation and road. The default is a clear day with a high sun.
 
-    sun_azimuth    0 is north (y), 90 east (x) [degrees]
-    sun_elevation  above the horizon, negative at night [degrees]
-    sun_illuminance  direct light of the sun across its rays [lx]; None is what a sun of this height gives, times
-    sun_share      which dims it
-    cloud_cover    share of the sky
-    visual_range   Koschmieder's, of the air without precipitation [m]; fog below 1000
-    precipitation, precipitation_intensity  what falls, and how much water [mm/h]
-    wetness        of the road: 0 dry, 0.25 moist, 0.5 wet with puddles, 0.75 and 1 flooded
-    friction       grip of the tires as a share of that on a dry road; None is what wetness and snow leave
-    wind_direction, wind_speed  where the wind blows to, 0 along x, 90 along y [degrees]; [m/s]
-    street_lighting  illuminance on the roads by lamps that stand there, at night [lx]
-    headlights     `auto` lights those of vehicles when it is dark or the air is thick
+    sun_azimuth       0 is north (y), 90 east (x) [degrees]
+    sun_elevation     above the horizon, negative at night [degrees]
+    sun_illuminance   direct light of the sun across its rays [lx]; None for the value by its elevation times sun_share
+    sun_share         factor of the direct light of the sun
+    cloud_cover       share of the sky
+    visual_range      by Koschmieder, of the air without precipitation [m]; fog below 1000
+    precipitation, precipitation_intensity  kind, and amount of water [mm/h]
+    wetness           of the road: 0 dry, 0.25 moist, 0.5 wet with puddles, 0.75 and 1 flooded
+    friction          grip of the tires as a share of that on a dry road; None for the value by wetness and snow
+    wind_direction    direction to which the wind blows, 0 along x, 90 along y [degrees]
+    wind_speed        [m/s]
+    street_lighting   illuminance on the roads by street lamps at night [lx]
+    headlights        `auto` switches on those of vehicles in the dark and in thick air
     """
 
     name: str = ""
@@ -70,7 +74,7 @@ class Weather(Settings):
     headlights: Literal["auto", "on", "off"] = "auto"
 
     @model_validator(mode="after")
-    def _something_falls(self) -> Weather:
+    def _check_precipitation(self) -> Weather:
         if self.precipitation_intensity > 0.0 and self.precipitation == "none":
             raise ValueError("precipitation_intensity above 0 needs `precipitation: rain` or `precipitation: snow`")
         return self
@@ -84,12 +88,12 @@ class Weather(Settings):
 
     @property
     def fog_extinction(self) -> float:
-        """Of the air without precipitation [1/m]: 3.912 / visual range (Koschmieder 1924)."""
+        """Extinction of the air without precipitation [1/m]: 3.912 / visual range (Koschmieder 1924)."""
         return EXTINCTION_AT_RANGE / self.visual_range
 
     @property
     def precipitation_extinction(self) -> float:
-        """By drops or flakes [1/m]."""
+        """Extinction by drops or flakes [1/m]."""
         if self.precipitation == "none" or self.precipitation_intensity == 0.0:
             return 0.0
         factor, power = RAIN_LAW if self.precipitation == "rain" else SNOW_LAW
@@ -97,7 +101,7 @@ class Weather(Settings):
 
     @property
     def extinction(self) -> float:
-        """Of visible light [1/m]: of the light of a thing at distance d, exp(-extinction · d) arrives."""
+        """Extinction of visible light [1/m]: the share exp(-extinction · d) of light passes the distance d."""
         return self.fog_extinction + self.precipitation_extinction
 
     @property
@@ -111,16 +115,17 @@ class Weather(Settings):
 
     @property
     def lamps_on(self) -> bool:
-        """Whether vehicles whose lamps nobody switches have them on."""
+        """Whether vehicles switch on their lamps automatically."""
         if self.headlights != "auto":
             return self.headlights == "on"
         return self.sun_elevation < DARK or EXTINCTION_AT_RANGE / self.extinction < 1500.0
 
 
 def load_weather(source: str | Path, *, origin: str = "") -> Weather:
-    """A preset of the library by name, or a YAML file; `origin` says where the name was given, such as an option.
+    """Return a weather preset of the library by name, or a YAML file.
 
-    Raise SettingError with the file and line of each mistake, or with `origin` where there is no such file.
+    `origin` is the source of the name, such as an option. Raise SettingError with file and line of each error, or with
+    `origin` if the file does not exist.
     """
     try:
         path = resolve("weather", source)

@@ -1,4 +1,4 @@
-"""The world of one run: who stands where, moved from one tick to the next."""
+"""World of one run: state of the actors and its simulation by time steps."""
 
 from __future__ import annotations
 
@@ -36,11 +36,12 @@ from eidrive_scenario.world.weather import Weather
 class World:
     """Actors on roads, in one pybullet client without a window.
 
-    `step` moves scripted actors exactly to their placements and driven ones by their controls, in physics steps of
-    1 / `physics_rate` seconds. Everything is deterministic. Close it after use, or use it in a `with` statement;
-    otherwise its client is freed when it is collected.
+    `step` moves scripted actors exactly to their placements, and driven ones by their controls in physics steps of
+    1 / `physics_rate` seconds. All results are deterministic. Close the world after use, or use it in a `with`
+    statement;
+    otherwise its client is freed by garbage collection.
 
-    entities  ids of the road network's objects that come as actors, and so are no part of the scenery
+    entities  ids of road objects that are actors, and thus no part of the scenery
     """
 
     def __init__(
@@ -83,34 +84,34 @@ class World:
         self.close()
 
     def close(self) -> None:
-        """Give the pybullet client back; the world cannot be used any more."""
+        """Free the pybullet client. The world is unusable afterwards."""
         self._visuals = None
         self._client = -1
         self._release()
 
     @property
     def time(self) -> float:
-        """The present [s]."""
+        """Current time [s]."""
         return self.tick * self.dt
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The actors in the order in which they entered."""
+        """Actors in the order of addition."""
         return tuple(self._bodies)
 
     def spec(self, name: str) -> ActorSpec:
-        """Return the body of an actor. Raise SimulationError if it is not in the world."""
+        """Return the specification of an actor. Raise SimulationError if it is not present."""
         return self._body(name).spec
 
     def add(self, spec: ActorSpec, placement: Placement, *, driven: bool = False) -> None:
-        """Bring an actor into the world. Raise SimulationError if one of that name is there already."""
+        """Add an actor. Raise SimulationError if an actor with this name is present."""
         if spec.name in self._bodies:
-            raise SimulationError(f"actor {spec.name!r} is in the world already")
+            raise SimulationError(f"actor {spec.name!r} is already in the world")
         self._enter(spec, placement, driven)
         self._contacts = self._contacts + self._tracker.update(tuple(self._bodies.values()), {})
 
     def remove(self, name: str) -> None:
-        """Take an actor out of the world. Raise SimulationError if it is not there."""
+        """Remove an actor. Raise SimulationError if it is not present."""
         self._body(name).remove()
         del self._bodies[name]
         self._driven.pop(name, None)
@@ -118,7 +119,7 @@ class World:
         self._changed()
 
     def set_driven(self, name: str, driven: bool) -> None:
-        """From the next step on the actor moves by controls, or else by placements; its speed carries over."""
+        """Move the actor by controls or by placements from the next step on. Its speed is kept."""
         body = self._body(name)
         if driven == (name in self._driven):
             return
@@ -141,16 +142,16 @@ class World:
 
     @property
     def weather(self) -> Weather:
-        """The weather at present."""
+        """Current weather."""
         return self._weather
 
     def set_weather(self, weather: Weather) -> None:
-        """Another weather from now on, its grip on the tires included."""
+        """Set the weather, including its effect on the grip of tires."""
         self._weather = weather
         self._friction = weather.friction_scale
 
     def set_display_state(self, signals: Mapping[str, str], appearances: Mapping[str, Appearance]) -> None:
-        """What traffic signals show from now on, by their ids, and how those actors look that are not as usual."""
+        """Set the states of traffic signals by id, and the appearances of actors that differ from the default."""
         self._signals = signals
         if appearances is not self._appearances:
             self._appearances = appearances
@@ -164,21 +165,21 @@ class World:
 
     @property
     def signal_labels(self) -> Mapping[int, str]:
-        """What the heads of traffic signals are in the segmentation of pictures, and their ids."""
+        """Labels of the heads of traffic signals in segmentation images, with the ids of the signals."""
         heads = signal_heads(self._roads) if self._roads is not None else ()
         return {FIRST_LABEL - row: head.signal.id for row, head in enumerate(heads)}
 
     def add_building(
         self, name: str, center: Vector3, size: Vector3, yaw: float = 0.0, color: Vector3 | None = None
     ) -> None:
-        """Put up a building: a box around `center` [m], length, width, height [m], that stops vehicles and rays."""
+        """Add a building, a box around `center` [m] of length, width, height [m] that blocks vehicles and rays."""
         self._scenery.add_building(name, center, size, yaw, color)
         self._changed()
 
     def step(self, placements: Mapping[str, Placement], controls: Mapping[str, Control]) -> None:
-        """Move on by one tick. A scripted actor without a placement stands, a driven one without control rolls.
+        """Simulate one tick. A scripted actor without placement stands, and a driven one without control coasts.
 
-        A placement of a driven actor is a jump. Raise SimulationError for a name that is not in the world.
+        A placement of a driven actor is a teleport. Raise SimulationError if a name is not present.
         """
         for name in placements.keys() | controls.keys():
             self._body(name)
@@ -197,21 +198,22 @@ class World:
         self._contacts = self._tracker.update(self._actors.bodies, touches)
 
     def view(self) -> WorldView:
-        """Return the truth now; the same object until something changes."""
+        """Return the current view, the same object until a change."""
         if self._view is None:
             self._view = self._actors.view(self.time, self.tick, self._contacts, self._unseen, self._unseen_by)
         return self._view
 
     def distance(self, first: str, second: str) -> float:
-        """Return distance between the boxes of two actors [m], 0 where they touch. Raise SimulationError."""
+        """Return the distance between the boxes of two actors [m], 0 in contact. Raise SimulationError."""
         return box_distance(self._body(first).box, self._body(second).box)
 
     def raycast(
         self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = (), *, sensor: str = ""
     ) -> RayHits:
-        """What rays (M, 3) to (M, 3) meet first; actors in `ignore`, and such that the sensor does not see, are passed.
+        """Return the first hits of rays (M, 3) to (M, 3). Actors in `ignore` and actors hidden from the sensor are
+        skipped.
 
-        `sensor` is its name: without one, actors count that the scenario hides from sensors as such.
+        `sensor` is its name. Without a sensor, the visibility for sensors in general is used.
         """
         self._refresh()
         rows = self.view().rows
@@ -222,7 +224,7 @@ class World:
         return cast_rays(self._client, begin, end, self._actors.row_of_handle, passed)
 
     def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
-        """The rows that rays meet first, as `raycast` has them: quicker for up to a thousand rays in plain numbers."""
+        """Return the rows of the first hits of rays as `raycast` does, but faster for up to a thousand rays."""
         self._refresh()
         if self._unseen:
             rows: list[int] = self.raycast(origins, targets).rows.tolist()
@@ -230,7 +232,7 @@ class World:
         return first_met(self._client, origins, targets, self._actors.row_in_list)
 
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
-        """(M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
+        """Return whether the line of sight from the origin (3,) to each target (M, 3) is free, except for `ignore`."""
         clear: NDArray[np.bool_] = self.raycast(origin, targets, ignore).fraction >= 1.0
         return clear
 
@@ -245,18 +247,20 @@ class World:
         *,
         ignore: Iterable[str] = (),
     ) -> CameraImage:
-        """What a camera sees: rgb, depth and segmentation.
+        """Return the image of a camera: rgb, depth and segmentation.
 
-        An ideal camera, with automatic exposure and without noise; `radiance` is for others. pose (4, 4) camera to
-        world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in `ignore` are not drawn.
-        The first picture of a world makes all models; a world without pictures never does.
+        The camera is ideal, with automatic exposure and without noise (see `radiance` for others). pose (4, 4) camera
+        to world,
+        x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in `ignore` are not drawn. The first
+        image of
+        a world creates all meshes; a world without images never does.
         """
         seen = self.radiance(pose, Pinhole.of_fov(width, height, fov, near, far), ignore=ignore)
         rgb = tone_map(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))
         return CameraImage(rgb, seen.depth, seen.segmentation)
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
-        """The light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
+        """Return the light that a camera at this pose (4, 4) receives in the current weather, with depth and labels."""
         if self._visuals is None:
             self._visuals = Visuals(self._scenery)
         rows = self.view().rows
@@ -282,7 +286,7 @@ class World:
         self._changed()
 
     def _changed(self) -> None:
-        """Somebody entered or left, or something was put up: what was prepared for the former actors is void."""
+        """Reset caches after a change of actors or scenery."""
         self._view = None
         self._physics.changed()
         self._physics.scenery_changed()
@@ -295,7 +299,7 @@ class World:
         return self._cast
 
     def _refresh(self) -> None:
-        """Make what rays meet, and have it where the actors are."""
+        """Create the bodies for rays, and move those of actors to their current poses."""
         raised = self._scenery.raise_ground()
         if self._scenery.raise_obstacles() or raised:
             self._changed()

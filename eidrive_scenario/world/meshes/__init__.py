@@ -1,4 +1,4 @@
-"""Meshes of actors, made in code: low in polygons, to scale, the same for the same size."""
+"""Generated low-polygon meshes of actors, true to scale and deterministic for the same size."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ BUILDERS: Mapping[str, Callable[[BodyDimensions], Mesh]] = {
 
 
 def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
-    """Material to triangles (K, 3, 3) of an actor: origin at the center of its box on the ground, x forward [m].
+    """Return triangles (K, 3, 3) of an actor by material: origin at the center of its box on the ground, x forward [m].
 
-    A truck without a front axle is a trailer. A pedestrian stands, walks or lies as its motion says, in the standard's
-    words.
+    A truck without a front axle is a trailer. A pedestrian stands, walks or lies by its motion, a value of the
+    standard.
     """
     length, width, height = spec.size
     if spec.wheelbase > 0.0:
@@ -50,7 +50,7 @@ def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
 
 
 def shadow(spec: ActorSpec) -> Array:
-    """Return the dark patch under an actor, triangles (K, 3, 3) in the same frame: it ties the body to the ground."""
+    """Return the dark area below an actor as triangles (K, 3, 3) in the same frame."""
     half_length, half_width = spec.size[0] / 2 + 0.12, spec.size[1] / 2 + 0.12
     corner = min(0.5, half_length / 2, half_width / 2)
     outline = [
@@ -62,7 +62,7 @@ def shadow(spec: ActorSpec) -> Array:
 
 
 _ABOVE_GROUND = 0.035
-"""Height of the shadow, above the markings of the road [m]."""
+"""Height of the shadow, above the road markings [m]."""
 
 
 @lru_cache(maxsize=256)

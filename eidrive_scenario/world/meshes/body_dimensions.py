@@ -1,4 +1,4 @@
-"""What a mesh is built into, and the wheels that many share."""
+"""Dimensions of the body of an actor, and wheels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, cylinder
 
 @dataclass(frozen=True)
 class BodyDimensions:
-    """The bounding box of an actor: origin at its center on the ground, x forward; all in meters.
+    """Bounding box of an actor: origin at its center on the ground, x forward; all in meters.
 
     front, rear  x of the axles
     """
@@ -24,14 +24,14 @@ class BodyDimensions:
     rear: float
     wheel_radius: float
     extra_axles: tuple[ExtraAxle, ...] = ()
-    """The others; their x as those of front and rear."""
+    """Additional axles; their x is in the frame of front and rear."""
 
     def x(self, share: float) -> float:
         """Return x at a share of the length, 0 at the rear end and 1 at the front."""
         return (share - 0.5) * self.length
 
     def z(self, share: float) -> float:
-        """z at a share of the height."""
+        """Return z at a share of the height."""
         return share * self.height
 
     @property
@@ -41,9 +41,9 @@ class BodyDimensions:
 
 
 def add_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tire: float, *, axles: tuple[float, ...] = ()) -> None:
-    """Wheels, `tire` wide, with rims and dark arches, whose outer faces lie at y = ±side.
+    """Add wheels of width `tire` with rims and dark arches, whose outer faces are at y = ±side.
 
-    Without `axles` those of all axles: the body then hides what lies further in.
+    By default the wheels of all axles are added; the body then hides their inner parts.
     """
     for x in axles or (frame.front, frame.rear):
         _add_pair(mesh, x, frame.wheel_radius, side, tire)
@@ -52,9 +52,10 @@ def add_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tire: float, *, a
 
 
 def add_extra_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tire: float, steered: float | None = None) -> None:
-    """The wheels of the further axles below a body, on their own track, as far as that lies within y = ±side.
+    """Add the wheels of additional axles below a body with their track widths, within y = ±side.
 
-    tire  width of a wheel, or of two side by side; steered  the same for an axle that steers, where it differs
+    tire     width of a wheel, or of twin tires
+    steered  width for a steered axle, if it differs
     """
     for axle in frame.extra_axles:
         wide = steered if steered is not None and axle.max_steering > 0.0 else tire

@@ -1,4 +1,4 @@
-"""Buildings: walls with rows of windows, and a roof."""
+"""Meshes of buildings: walls with rows of windows, and a roof."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ STOREY = 3.2
 WINDOW = (1.3, 1.5)
 """Width and height of a window [m]."""
 PITCH = 3.0
-"""From one window to the next [m]."""
+"""Distance between windows [m]."""
 _PROUD = 0.03
 
 
 def building(size: Vector3) -> dict[str, Array]:
-    """Material to triangles of a building of this length, width and height; origin at its center on the ground."""
+    """Return triangles by material of a building of this length, width and height; origin at its center on the
+    ground.
+    """
     length, width, height = size
     mesh = Mesh()
     mesh.add("wall", box((0, 0, height / 2 - 0.1), (length - 2 * _PROUD, width - 2 * _PROUD, height - 0.2)))

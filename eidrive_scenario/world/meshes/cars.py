@@ -1,4 +1,4 @@
-"""Passenger cars, from the hatchback to the off-roader."""
+"""Meshes of passenger cars, from hatchback to off-roader."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions, add_wh
 from eidrive_scenario.world.meshes.solids import Mesh, box, loft, polygon
 
 _TALL = 0.37
-"""Height over length above which a car is built as an off-roader or hatchback, without a boot."""
+"""Minimum height over length of a car without a boot (off-roader or hatchback)."""
 
 
 def car(frame: BodyDimensions) -> Mesh:
-    """Return a saloon with bonnet and boot; a tall or short one gets an upright tail instead."""
+    """Return a saloon with bonnet and boot, or with an upright tail if it is tall or short."""
     mesh = Mesh()
     upright = frame.height / frame.length > _TALL or frame.length < 4.3
     belt, side = (0.60, 0.97) if upright else (0.635, 0.97)
@@ -27,7 +27,7 @@ def car(frame: BodyDimensions) -> Mesh:
 
 
 def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, waist: float, top: float) -> Array:
-    """Return a section of the shell at a share x of the length: shares of half the width and of the height."""
+    """Return a section of the shell at a share x of the length; widths and heights are shares as well."""
     y, tilt = width * frame.side, 0.9
     half = [(y * 0.86, bottom), (y, bottom + 0.07), (y * 1.0, waist), (y * tilt, top - 0.015), (y * 0.55, top)]
     points = [(-a, b) for a, b in half] + [(a, b) for a, b in reversed(half)]
@@ -35,7 +35,7 @@ def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, waist: f
 
 
 def _shell(mesh: Mesh, frame: BodyDimensions, belt: float, side: float, upright: bool) -> None:
-    """The body below the windows."""
+    """Add the body below the windows."""
     tail = belt if upright else belt + 0.02
     sections = [
         (0.000, 0.80, 0.24, 0.40, 0.47),
@@ -56,7 +56,7 @@ def _shell(mesh: Mesh, frame: BodyDimensions, belt: float, side: float, upright:
 def _cabin(
     mesh: Mesh, frame: BodyDimensions, belt: float, sill: tuple[float, float], roof: tuple[float, float]
 ) -> None:
-    """Roof, pillars and windows above the belt line."""
+    """Add roof, pillars and windows above the belt line."""
     low, high = frame.z(belt - 0.01), frame.z(0.975)
     wide, narrow = 0.87 * frame.side, 0.66 * frame.side
     (x0, x3), (x1, x2) = (frame.x(sill[0]), frame.x(sill[1])), (frame.x(roof[0]), frame.x(roof[1]))
@@ -77,12 +77,12 @@ def _cabin(
 
 
 def _face(bottom: Array, top: Array) -> Array:
-    """The four corners of a face: bottom from left to right as seen from outside, then the top in the same way."""
+    """Return the four corners of a face: bottom from left to right seen from outside, then top likewise."""
     return np.stack([bottom[0], bottom[1], top[0], top[1]])
 
 
 def _pane(face: Array, left: float, right: float, low: float, high: float) -> Array:
-    """Return a window in a face, between shares of its width and height, lifted off the face by a centimeter."""
+    """Return a window in a face between shares of its width and height, a centimeter outside the face."""
     p00, p10, p01, p11 = face
     normal = np.cross(p10 - p00, p01 - p00)
     lift = 0.012 * normal / np.linalg.norm(normal)
@@ -95,7 +95,7 @@ def _pane(face: Array, left: float, right: float, low: float, high: float) -> Ar
 
 
 def _details(mesh: Mesh, frame: BodyDimensions, belt: float, upright: bool) -> None:
-    """Lights, grille, bumpers, plates, mirrors, door lines, handles."""
+    """Add lights, grille, bumpers, plates, mirrors, door lines, handles."""
     x, z, side = frame.x, frame.z, frame.side
     nose, tail = x(1.0), x(0.0)
     mesh.add("trim", box((nose - 0.03, 0, z(0.30)), (0.08, 0.95 * side, z(0.11))))

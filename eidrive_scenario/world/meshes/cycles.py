@@ -1,4 +1,4 @@
-"""Two-wheelers with their riders."""
+"""Meshes of two-wheelers with their riders."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, ball, bevelled_box, box, 
 
 
 def motorbike(frame: BodyDimensions) -> Mesh:
-    """Return a motorbike and a rider with helmet, as high as the frame."""
+    """Return a motorbike and a rider with helmet, of the height of the frame."""
     mesh = Mesh()
     radius, x0, x1 = min(frame.wheel_radius, 0.34), frame.rear, frame.front
     base = x1 - x0
@@ -77,7 +77,7 @@ def _rider(
     foot: tuple[float, float, float],
     lean: float,
 ) -> None:
-    """Somebody who sits at seat_x, seat_z, holds the bar and has the feet on the pedals."""
+    """Add a rider who sits at seat_x, seat_z, holds the bar and has the feet on the pedals."""
     top = frame.height
     head = 0.115
     shoulder_x, shoulder_z = seat_x + lean, top - 2 * head - 0.04

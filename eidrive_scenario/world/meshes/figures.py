@@ -1,4 +1,4 @@
-"""Masts and boxes."""
+"""Meshes of masts and boxes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, cylind
 
 
 def roadside_unit(frame: BodyDimensions) -> Mesh:
-    """Return a mast with a cabinet at its foot and a head of camera, LiDAR and antenna."""
+    """Return a mast with a cabinet at its base and a head of camera, lidar and antenna."""
     mesh = Mesh()
     z, side = frame.z, frame.side
     half = frame.length / 2
@@ -30,7 +30,7 @@ def roadside_unit(frame: BodyDimensions) -> Mesh:
 
 
 def crate(frame: BodyDimensions) -> Mesh:
-    """Return a box with battens, for whatever has no shape of its own."""
+    """Return a box with battens, for objects without a specific mesh."""
     mesh = Mesh()
     length, width, height = frame.length, frame.width, frame.height
     batten = 0.06 * min(length, width, height)

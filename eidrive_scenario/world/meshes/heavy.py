@@ -1,4 +1,4 @@
-"""Trucks, fire engines and buses."""
+"""Meshes of trucks, fire engines and buses."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def truck(frame: BodyDimensions) -> Mesh:
 
 
 def trailer(frame: BodyDimensions) -> Mesh:
-    """Return a closed cargo body on its own axles, with legs to stand on."""
+    """Return a closed cargo body on its axles, with support legs."""
     mesh = Mesh()
     radius = max((axle.wheel_radius for axle in frame.extra_axles), default=0.0) or frame.wheel_radius
     floor = min(2 * radius + 0.12, 0.5 * frame.height)
@@ -40,7 +40,7 @@ def trailer(frame: BodyDimensions) -> Mesh:
 
 
 def _cargo(mesh: Mesh, frame: BodyDimensions, cargo: float, floor: float) -> None:
-    """A closed body over `cargo` meters from the rear end on, with seams and a stripe."""
+    """Add a closed body over `cargo` [m] from the rear end, with seams and a stripe."""
     x, side = frame.x, frame.side
     middle = x(0.0) + cargo / 2
     mesh.add(
@@ -144,7 +144,7 @@ def bus(frame: BodyDimensions) -> Mesh:
 
 
 def _cab(mesh: Mesh, frame: BodyDimensions, length: float, top: float, material: str, *, crew: bool = False) -> None:
-    """The driver's cab at the front end, as high as a share of the height."""
+    """Add the cab at the front end; its height is a share of the total height."""
     x, z, side = frame.x, frame.z, frame.side
     nose, floor, roof = x(1.0), 0.75 * frame.wheel_radius, z(top)
     high, middle = roof - floor, nose - length / 2
@@ -212,7 +212,7 @@ def _tail(mesh: Mesh, frame: BodyDimensions, floor: float) -> None:
 
 
 def _chassis(mesh: Mesh, frame: BodyDimensions) -> None:
-    """Frame, tank and wheels; twin tires at the rear."""
+    """Add frame, tank and wheels, with twin tires at the rear."""
     radius, side = frame.wheel_radius, frame.side
     mesh.add("trim", box((-0.02, 0, 1.3 * radius), (0.94 * frame.length, 0.9 * side, 0.6 * radius)))
     middle = (frame.front + frame.rear) / 2

@@ -1,4 +1,4 @@
-"""Colors of the materials, and paint by name."""
+"""Colors of materials, and body paints."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ PAINTS: tuple[Color, ...] = (
     (0.90, 0.90, 0.89), (0.12, 0.13, 0.15), (0.55, 0.57, 0.59), (0.63, 0.09, 0.09), (0.10, 0.22, 0.48),
     (0.30, 0.33, 0.36), (0.16, 0.34, 0.26), (0.72, 0.66, 0.54), (0.80, 0.44, 0.10), (0.34, 0.52, 0.66),
 )  # fmt: skip
-"""Body paints, of which each actor gets one by its name."""
+"""Body paints; the name of an actor selects one."""
 
 CLOTHES: tuple[Color, ...] = (
     (0.70, 0.16, 0.14), (0.16, 0.36, 0.62), (0.24, 0.46, 0.28),
@@ -75,16 +75,16 @@ FIXED_PAINT: dict[str, Color] = {
     "rsu": MATERIALS["steel"],
     "box": (0.78, 0.55, 0.28),
 }
-"""Paint that goes with the shape and not with the name."""
+"""Body paints by shape that do not depend on the name."""
 
 
 def paint(name: str, shape: str) -> Color:
-    """Return the paint of an actor without a color of its own, the same in every process."""
+    """Return the paint of an actor without a specified color, identical in all processes."""
     if shape in FIXED_PAINT:
         return FIXED_PAINT[shape]
     return by_name(name, CLOTHES if shape in ("pedestrian", "bicycle", "motorbike") else PAINTS)
 
 
 def by_name(name: str, colors: tuple[Color, ...]) -> Color:
-    """Return one of the colors, by a hash of the name."""
+    """Return one of the colors by a hash of the name."""
     return colors[int.from_bytes(hashlib.blake2b(name.encode(), digest_size=4).digest(), "little") % len(colors)]

@@ -1,4 +1,4 @@
-"""People, on foot and in the motions that the standard knows."""
+"""Meshes of pedestrians in the motions of the standard."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from eidrive_scenario.world.meshes.solids import Mesh, ball, bevelled_box, cylin
 
 
 class Posture(NamedTuple):
-    """How a body is held.
+    """Posture of a body.
 
-    pace     how far the feet are apart, as a share of a walker's stride
-    hip      height of the hip as a share of the body's
-    knee     how far the knees are before the hip, and their height, as shares of the body's height
-    bend     of the upper body, forwards [rad]
-    lift     of the whole, as a share of the height
+    pace     distance between the feet, as a share of the stride of walking
+    hip      height of the hip as a share of the body height
+    knee     distance of the knees ahead of the hip, and their height, as shares of the body height
+    bend     forward bend of the upper body [rad]
+    lift     lift of the body as a share of the height
     lies     on the back
     """
 
@@ -48,16 +48,16 @@ POSTURES: Mapping[str, Posture] = {
     "jumping": Posture(pace=0.5, lift=0.15),
     "lying": Posture(lies=True),
 }
-"""By the standard's PedestrianMotionType; without one people walk."""
+"""Postures by PedestrianMotionType of the standard; the default is walking."""
 
 
 def in_motion(frame: BodyDimensions, motion: str) -> dict[str, Array]:
-    """Material to triangles of a pedestrian in a motion; in one that is not known it stands."""
+    """Return triangles by material of a pedestrian in a motion, standing if the motion is unknown."""
     return _held(frame, POSTURES.get(motion, POSTURES["standing"])).materials()
 
 
 def pedestrian(frame: BodyDimensions) -> Mesh:
-    """Somebody in mid-stride, arms swinging, inside the box."""
+    """Return a walking pedestrian with swinging arms inside the box."""
     return _held(frame, WALKING)
 
 
@@ -97,7 +97,7 @@ def _legs(mesh: Mesh, frame: BodyDimensions, posture: Posture) -> None:
 
 
 def _upper_body(mesh: Mesh, frame: BodyDimensions, posture: Posture) -> None:
-    """From the hip up, bent about it; the arms hang and swing."""
+    """Add the upper body, bent about the hip, with hanging and swinging arms."""
     z, shoulder, head = frame.z, _shoulder(frame), 0.068 * frame.height
     hip, neck = z(0.50), z(0.835)
     down = z(posture.hip) - hip
@@ -120,7 +120,7 @@ def _upper_body(mesh: Mesh, frame: BodyDimensions, posture: Posture) -> None:
 
 
 def _bent(solid: Array, hip: float, angle: float) -> Array:
-    """Turned forwards about the hip."""
+    """Return a solid bent forward about the hip."""
     if angle == 0.0:
         return solid
     x, up = solid[..., 0], solid[..., 2] - hip
@@ -129,7 +129,7 @@ def _bent(solid: Array, hip: float, angle: float) -> Array:
 
 
 def _lay_down(mesh: Mesh) -> None:
-    """On the back, the middle over the origin."""
+    """Rotate the body onto its back, with its center above the origin."""
     whole = np.concatenate([solid.reshape(-1, 3) for solids in mesh.triangles.values() for solid in solids])
     middle, back = whole[:, 2].max() / 2, whole[:, 0].min()
     for solids in mesh.triangles.values():

@@ -1,4 +1,4 @@
-"""What stands at the roads, to scale: origin at the middle of the foot, x along the object's heading."""
+"""Meshes of road objects, true to scale: origin at the center of the base, x along the heading."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CONIFERS = ("fir", "pine", "spruce", "conifer", "tanne", "fichte")
 def road_object_mesh(
     kind: str, name: str, length: float, width: float, height: float, radius: float
 ) -> Mapping[str, Array]:
-    """Material to triangles (K, 3, 3) of one piece."""
+    """Return triangles (K, 3, 3) of a road object by material."""
     mesh = Mesh()
     _BUILDERS[kind](mesh, name, length, width, height, radius)
     return mesh.materials()
@@ -23,9 +23,9 @@ def road_object_mesh(
 
 @lru_cache(maxsize=64)
 def traffic_light(colors: tuple[str, ...], width: float, height: float) -> Mapping[str, Array]:
-    """Return a head with lamps from top to bottom, looking along +x; origin at the middle of its lower edge.
+    """Return a signal head with lamps from top to bottom, facing +x; origin at the center of its lower edge.
 
-    The lamps are materials of their own: `lamp_red 0`, … numbered from the top.
+    The lamps are separate materials: `lamp_red 0`, … numbered from the top.
     """
     mesh = Mesh()
     deep, cell = 0.5 * width, height / max(len(colors), 1)
@@ -39,7 +39,7 @@ def traffic_light(colors: tuple[str, ...], width: float, height: float) -> Mappi
 
 
 def _visor(z: float, lens: float) -> Array:
-    """Return a small roof over a lamp."""
+    """Return a visor above a lamp."""
     return tapered_box((0.07, 0, z + 1.12 * lens), (0.14, 2.0 * lens, 0.02), (0.14, 1.6 * lens))
 
 

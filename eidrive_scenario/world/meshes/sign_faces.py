@@ -1,4 +1,4 @@
-"""What a traffic sign looks like, by its country's numbering or, where that is not known, by its name."""
+"""Faces of traffic signs by the numbers of the country or, if unknown, by the name."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from eidrive_scenario.roads import Signal
 
 
 class SignFace(NamedTuple):
-    """shape   octagon, triangle (point up), yield (point down), disc, diamond or board
+    """Face of a traffic sign.
+
+    shape         octagon, triangle (point up), yield (point down), disc, diamond or board
     fill, border  colors: red, white, yellow, blue, black, or none
-    text    digits and letters in its middle
+    text          digits and letters in the center
     """
 
     shape: str
@@ -46,7 +48,7 @@ _GERMAN: tuple[tuple[range, SignFace], ...] = (
     (range(306, 307), PRIORITY),
     (range(310, 440), INFORMATION),
 )
-"""Numbers of the German catalog (VzKat), which OpenDRIVE's own signals follow."""
+"""Numbers of the German catalog (VzKat), which the OpenDRIVE signal catalog follows."""
 _AMERICAN: Mapping[str, SignFace] = {"R1-1": STOP, "R1-2": YIELD, "R2-1": SignFace("board", "white", "black")}
 _SWEDISH: Mapping[str, SignFace] = {
     "a": WARNING, "b1": YIELD, "b2": STOP, "b4": PRIORITY, "c1": NO_ENTRY, "c": PROHIBITION, "d": MANDATORY,
@@ -62,11 +64,11 @@ _WORDS: tuple[tuple[str, SignFace], ...] = (
     ("warning", WARNING),
 )
 LIMITS = ("274", "R2-1", "c31", "jin", "maximum speed")
-"""Types that are speed limits."""
+"""Types of speed limits."""
 
 
 def sign_face(signal: Signal) -> SignFace:
-    """Return the face of a sign; a speed limit shows its number."""
+    """Return the face of a sign; that of a speed limit contains its number."""
     kind, country = signal.type.strip(), signal.country.strip().upper()
     subtype = signal.subtype.strip()
     whole = f"{kind.lower()}{subtype}"
@@ -84,7 +86,7 @@ def sign_face(signal: Signal) -> SignFace:
 
 
 def _limit(signal: Signal) -> str:
-    """Return the number on a speed limit, as it is painted; Swedish maps give it in tens."""
+    """Return the number of a speed limit as shown. Swedish maps give it in tens."""
     numbers = [float(text) for text in re.findall("[0-9]+", signal.name) if 5 <= float(text) <= 140]
     value = signal.value
     if value is not None and 5.0 <= value <= 140.0 and not (value <= 12.0 and numbers):

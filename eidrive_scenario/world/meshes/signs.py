@@ -1,6 +1,6 @@
-"""Traffic signs: plates of all shapes with borders, numbers and words; origin at the middle of their lower edge.
+"""Meshes of traffic signs: plates with borders, numbers and words; origin at the center of the lower edge.
 
-They look along +x, at the traffic; as that sees it, y runs to the right and z upwards.
+Signs face +x, towards the traffic. Seen by the traffic, y points right and z up.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from eidrive_scenario.world.meshes.sign_faces import NO_ENTRY, SignFace
 from eidrive_scenario.world.meshes.solids import Mesh, polygon
 
 LAYER = 0.004
-"""Each layer of paint lies so far before the one below [m]; far more than in truth, for the eyes of a far camera."""
+"""Distance between layers of paint [m]. It exceeds the real one for depth resolution of distant cameras."""
 BORDERS = {"octagon": 0.06, "board": 0.05, "diamond": 0.14}
 BORDER = 0.12
-"""Width of a border as a share of the plate's, by its shape where it is not the usual one."""
+"""Width of a border as a share of the width of the plate, by shape if it differs from the default."""
 
 GLYPHS = {
     "0": "111101101101111", "1": "010110010010111", "2": "111001111100111", "3": "111001011001111",
@@ -26,12 +26,12 @@ GLYPHS = {
     "8": "111101111101111", "9": "111101111001111",
     "S": "111100111001111", "T": "111010010010010", "O": "111101101101111", "P": "111101111100100",
 }  # fmt: skip
-"""Three columns and five lines, from the top left."""
+"""Glyphs of three columns and five lines, from the top left."""
 
 
 @lru_cache(maxsize=256)
 def sign(face: SignFace, width: float, height: float) -> dict[str, Array]:
-    """Material to triangles (K, 3, 3) of a sign."""
+    """Return triangles (K, 3, 3) of a sign by material."""
     mesh = Mesh()
     outline = _outline(face.shape, width, height)
     mesh.add("steel", polygon(_at(outline, -LAYER))[:, ::-1])
@@ -50,7 +50,7 @@ def sign(face: SignFace, width: float, height: float) -> dict[str, Array]:
 
 
 def _outline(shape: str, width: float, height: float) -> Array:
-    """Return (M, 2) corners, counter-clockwise as the traffic sees it."""
+    """Return the corners (M, 2), counter-clockwise as seen by the traffic."""
     half, tall = width / 2, height / 2
     if shape == "board":
         return np.array([(-half, 0.0), (half, 0.0), (half, height), (-half, height)])
@@ -67,12 +67,12 @@ def _outline(shape: str, width: float, height: float) -> Array:
 
 
 def _inner(shape: str, height: float) -> float:
-    """Return the height of a triangle's center."""
+    """Return the height of the center of a triangle."""
     return height / 3 if shape == "triangle" else 2 * height / 3
 
 
 def _letters(text: str, middle: Array, width: float, height: float) -> list[Array]:
-    """Cells of the letters as small squares, joined along each line."""
+    """Return the cells of letters as squares, merged along each line."""
     columns = 4 * len(text) - 1
     cell = min(width / columns, height / 5)
     left, top = -cell * columns / 2, middle[1] + 2.5 * cell
@@ -89,7 +89,7 @@ def _letters(text: str, middle: Array, width: float, height: float) -> list[Arra
 
 
 def _runs(bits: str) -> list[tuple[int, int]]:
-    """Stretches of ones: where each begins, and where it has ended."""
+    """Return the start and end of each sequence of ones."""
     found: list[tuple[int, int]] = []
     for index, bit in enumerate(bits):
         if bit == "1":

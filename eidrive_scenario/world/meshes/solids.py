@@ -1,4 +1,4 @@
-"""Solids as triangles (K, 3, 3) [m], counter-clockwise seen from outside: the clay of which all bodies are made."""
+"""Solids as triangles (K, 3, 3) [m], counter-clockwise seen from outside, from which all meshes are built."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ _BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 
 
 @dataclass
 class Mesh:
-    """Triangles by the name of their material, in the frame of the bounding box's center on the ground."""
+    """Triangles by material, in the frame of the center of the bounding box on the ground."""
 
     triangles: dict[str, list[Array]] = field(default_factory=dict)
 
     def add(self, material: str, *solids: Array) -> None:
-        """Put solids, triangles (K, 3, 3), into the mesh."""
+        """Add solids (K, 3, 3) to the mesh."""
         self.triangles.setdefault(material, []).extend(solids)
 
     def add_mirrored(self, material: str, *solids: Array) -> None:
-        """Put solids and their mirror images on the other side (y -> -y) into the mesh."""
+        """Add solids and their mirror images on the other side (y -> -y)."""
         self.add(material, *solids, *(mirrored(solid) for solid in solids))
 
     def add_sided(self, material: str, *solids: Array) -> None:
-        """Put solids of the left side (y > 0) and their mirror images into the mesh, as materials of their own."""
+        """Add solids of the left side (y > 0) and their mirror images as separate materials."""
         self.add(f"{material}_left", *solids)
         self.add(f"{material}_right", *(mirrored(solid) for solid in solids))
 
     def materials(self) -> dict[str, Array]:
-        """Material to its triangles (K, 3, 3)."""
+        """Return the triangles (K, 3, 3) by material."""
         return {material: np.concatenate(solids) for material, solids in self.triangles.items()}
 
 
 def mirrored(solid: Array) -> Array:
-    """Return the mirror image at the plane y = 0, its faces still looking outwards."""
+    """Return the mirror image at the plane y = 0 with faces that point outwards."""
     flipped: Array = (solid * (1.0, -1.0, 1.0))[:, ::-1]
     return flipped
 
@@ -62,7 +62,10 @@ def box(center: Point, size: Point) -> Array:
 
 
 def tapered_box(center: Point, size: Point, top: Point, shift: float = 0.0) -> Array:
-    """A frustum of length, width and height `size` whose top is `top` long and wide and `shift` further ahead."""
+    """Return a frustum of length, width and height `size`.
+
+    Its top has the length and width `top` and is `shift` further ahead.
+    """
     x, y, z = center
     length, width, height = size
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -72,7 +75,7 @@ def tapered_box(center: Point, size: Point, top: Point, shift: float = 0.0) -> A
 
 
 def bevelled_box(center: Point, size: Point, bevel: float) -> Array:
-    """Return an upright cuboid whose edges are cut off by `bevel`, as sheet metal looks from some way off."""
+    """Return an upright cuboid with edges bevelled by `bevel`, like sheet metal."""
     x, y, z = center
     length, width, height = (extent / 2 for extent in size)
 
@@ -96,7 +99,7 @@ def bevelled_box(center: Point, size: Point, bevel: float) -> Array:
 def loft(rings: Sequence[Array] | Array) -> Array:
     """Return a skin over rings (S, M, 3), closed by a fan at each end.
 
-    The rings run counter-clockwise as seen from the first ring's side.
+    The rings are counter-clockwise as seen from the side of the first ring.
     """
     stack = np.asarray(rings, dtype=float)
     following = np.roll(stack, -1, axis=1)
@@ -128,7 +131,7 @@ def ball(center: Point, radius: Point, rings: int = 6, sides: int = 10) -> Array
 
 
 def moved(solid: Array, by: Point) -> Array:
-    """Return the same solid elsewhere."""
+    """Return a translated solid."""
     elsewhere: Array = solid + np.asarray(by, dtype=float)
     return elsewhere
 

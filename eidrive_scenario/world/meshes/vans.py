@@ -1,4 +1,4 @@
-"""Vans and what is built on them."""
+"""Meshes of vans and ambulances."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, shoulder
 
 
 def _body(mesh: Mesh, frame: BodyDimensions, roof_from: float) -> None:
-    """Bonnet, cab, and the closed body back to a share of the length."""
+    """Add bonnet, cab, and the closed body back to a share of the length."""
     sections = [
         (0.80, 0.965, 0.13, 0.53, 0.985),
         (0.835, 0.96, 0.13, 0.52, 0.93),
@@ -91,7 +91,7 @@ def _body(mesh: Mesh, frame: BodyDimensions, roof_from: float) -> None:
 
 def _cab_details(mesh: Mesh, frame: BodyDimensions) -> None:
     x, z, side = frame.x, frame.z, frame.side
-    # Between the sections at 0.835 and 0.925, where the windscreen lies on the skin.
+    # The sections at 0.835 and 0.925 enclose the windscreen, which is on the skin.
     low, high = (x(0.921), z(0.60)), (x(0.840), z(0.905))
     screen = [(low[0], -0.74, low[1]), (low[0], 0.74, low[1]), (high[0], 0.76, high[1]), (high[0], -0.76, high[1])]
     lift = np.array([z(0.93) - z(0.575), 0.0, x(0.925) - x(0.835)])

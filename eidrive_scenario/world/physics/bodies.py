@@ -1,4 +1,4 @@
-"""The bodies of the actors in pybullet: one rigid box each; and those of scripted actors, which are placed."""
+"""Bodies of actors in pybullet: one rigid box per actor, and the bodies of scripted actors."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.view import ActorState
 
 RAYS, SCRIPTED, DRIVEN, STATIC, TERRAIN = 1, 2, 4, 8, 16
-"""Groups of pybullet's collision filter; a ray belongs to the first by pybullet's default."""
+"""Groups of the collision filter of pybullet; rays belong to the first by default."""
 
 UNMOVED = 1e9
-"""Mass of what no collision moves [kg], and moment of inertia about the axes that no collision turns [kg m²]."""
+"""Mass of bodies that collisions do not move [kg], and their moment of inertia [kg m²]."""
 RESTITUTION = 0.3
-"""Of one body; two rebound with its square, about 0.1, as cars do above some 5 m/s."""
+"""Restitution of one body. Two rebound with its square, about 0.1, as cars above some 5 m/s."""
 BODY_FRICTION = 0.7
 STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
 class Body(ABC):
-    """One actor: its state, plain numbers as they stand in the view's rows, and its rigid body in pybullet."""
+    """Actor with its state as scalars, in the units of the view, and its rigid body in pybullet."""
 
     def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
         self.client = client
@@ -33,37 +33,37 @@ class Body(ABC):
         self.moved = True
         """Whether the last step changed its pose."""
         self.stale = False
-        """Whether the rigid body is not yet where the actor is: pybullet hears of it when somebody asks pybullet."""
+        """Whether the pose of the rigid body is outdated. It is updated before pybullet is used."""
         self.yaw_rate = 0.0
         self.acceleration: Vector3 = (0.0, 0.0, 0.0)
         self._dt = dt
         self._stand(placement)
         self.velocity = self._along_heading(placement.speed)
         self.velocity_before = self.velocity
-        """At the beginning of the last step [m/s]."""
+        """Velocity at the start of the last step [m/s]."""
 
     @property
     def box(self) -> tuple[float, ...]:
-        """(7,) x y z l w h yaw of the bounding box."""
+        """Bounding box x y z l w h yaw (7,)."""
         return (self.center_x, self.center_y, self.center_z, *self.spec.size, self.yaw)
 
     @property
     def state(self) -> ActorState:
-        """How it stands and moves."""
+        """Pose and motion."""
         return ActorState(self.x, self.y, self.z, self.yaw, self.pitch, self.roll, *self.velocity, *self.acceleration,
                           self.yaw_rate, self.speed)  # fmt: skip
 
     @property
     @abstractmethod
     def travel(self) -> float:
-        """How far any part of it goes within a tick, if nothing hits it and it keeps its velocity [m]."""
+        """Maximum displacement of any part within a tick at constant velocity without a collision [m]."""
 
     @abstractmethod
-    def settle(self) -> None:
-        """Put the rigid body where the actor is."""
+    def sync_pose(self) -> None:
+        """Move the rigid body to the pose of the actor."""
 
     def remove(self) -> None:
-        """Take the body out of pybullet."""
+        """Remove the body from pybullet."""
         bullet.removeBody(self.handle, physicsClientId=self.client)
 
     def _stand(self, placement: Placement) -> None:
@@ -92,10 +92,11 @@ class Body(ABC):
         )
 
     def _create(self, center: Vector3, at: Vector3, mass: float, inertia: float, group: int, meets: int) -> None:
-        """Make the rigid body, whose box has its center there in the frame of the center of gravity.
+        """Create the rigid body with the center of its box in the frame of the center of gravity.
 
-        What must not be moved is added as a static body and gets its huge mass only then: pybullet does not integrate
-        it, yet collisions see the velocity that it is given, which that of a static body they do not.
+        An immovable body is created as static and gets its huge mass afterwards. pybullet then does not integrate it,
+        but
+        collisions consider its velocity, which they ignore for a static body.
         """
         length, width, height = self.spec.size
         here = {"physicsClientId": self.client}
@@ -128,14 +129,14 @@ class Body(ABC):
 
 
 class ScriptedBody(Body):
-    """An actor that stands exactly where it is placed; nothing pushes it."""
+    """Actor at exact placements; collisions do not move it."""
 
     def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
         super().__init__(client, spec, placement, dt)
         self._create(spec.offset, (self.x, self.y, self.z), UNMOVED, UNMOVED, SCRIPTED, DRIVEN)
         self._from: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
         self._resting = False
-        """Whether it did not move in the last step, and came to its stand before that."""
+        """Whether it did not move in the last step, and had stopped before."""
         self._resting_state: ActorState | None = None
 
     @property
@@ -148,7 +149,7 @@ class ScriptedBody(Body):
 
     @property
     def travel(self) -> float:
-        """How far any part of it has been moved in the step that it was placed for [m]."""
+        """Maximum displacement of any part in the current step [m]."""
         if not self.moved:
             return 0.0
         x, y, z, yaw, pitch, _ = self._from
@@ -156,13 +157,13 @@ class ScriptedBody(Body):
         return math.dist((x, y, z), (self.x, self.y, self.z)) + turn * 2.0 * self.radius
 
     def rest(self) -> None:
-        """Stay for this step: no placement was given."""
+        """Stay for this step without a placement."""
         self.place(Placement(self.x, self.y, self.z, self.yaw, self.pitch, self.roll))
 
     def place(self, placement: Placement) -> None:
-        """Be there at the end of the step, with a velocity out of the given speed and the distance covered.
+        """Move to the placement at the end of the step, with a velocity from the given speed and the covered distance.
 
-        Along the heading the velocity is the given speed; across, it follows from the distance where there is any.
+        The velocity along the heading is the given speed. The lateral one follows from the distance if there is any.
         """
         p = placement
         if self._resting and p.speed == 0.0 and self._from == (p.x, p.y, p.z, p.yaw, p.pitch, p.roll):
@@ -190,15 +191,15 @@ class ScriptedBody(Body):
         self.stale = self.stale or was_moving or is_moving
         self._resting, self._resting_state = not is_moving and self.acceleration == STILL, None
 
-    def settle(self) -> None:
-        """Put the rigid body where the actor is."""
+    def sync_pose(self) -> None:
+        """Move the rigid body to the pose of the actor."""
         self.stale = False
         turn = quaternion(self.yaw, self.pitch, self.roll)
         bullet.resetBasePositionAndOrientation(self.handle, (self.x, self.y, self.z), turn, self.client)
         bullet.resetBaseVelocity(self.handle, self.velocity, (0.0, 0.0, self.yaw_rate), self.client)
 
     def pass_through(self, share: float) -> None:
-        """Put the rigid body on the way between its last and its next place, for a collision in between."""
+        """Move the rigid body to a point between its last and next pose, for a collision in between."""
         x, y, z, yaw, pitch, roll = self._from
         turn = quaternion(
             yaw + share * wrap_angle(self.yaw - yaw),

@@ -1,4 +1,4 @@
-"""pybullet, imported without the line that it prints about its build."""
+"""Import of pybullet without its build message."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ _NOTICE = b"pybullet build time:"
 
 
 def _import_silently() -> Any:
-    """Import pybullet while the file descriptor 2 points to a file in memory; what else came there is passed on.
+    """Import pybullet while file descriptor 2 refers to a file in memory. Other output is passed on.
 
-    The notice is printed by C code, so that `contextlib.redirect_stderr` does not reach it.
+    The message is printed by C code, which `contextlib.redirect_stderr` does not affect.
     """
     if sys.stderr is not None:
         sys.stderr.flush()
     try:
         kept = os.dup(2)
-    except OSError:  # the process has no standard error; nothing to silence
+    except OSError:  # Without a standard error of the process there is no message to suppress.
         import pybullet
 
         return pybullet
@@ -43,7 +43,7 @@ bullet: Any = _import_silently()
 
 
 def connect() -> int:
-    """Return a new client without a window. Raise SimulationError when pybullet has no more to give."""
+    """Return a new client without a window. Raise SimulationError if pybullet has no free client."""
     client: int = bullet.connect(bullet.DIRECT)
     if client < 0:
         raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")

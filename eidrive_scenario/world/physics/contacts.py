@@ -1,4 +1,4 @@
-"""Which boxes began to touch, and how hard."""
+"""Start of contacts between boxes, with impact speeds."""
 
 from __future__ import annotations
 
@@ -14,31 +14,33 @@ from eidrive_scenario.world.physics.bodies import Body
 from eidrive_scenario.world.view import Contact
 
 PARTED = 0.05
-"""Two boxes that touched must be this far apart before they can touch anew [m], lest a scrape counts as many."""
+"""Minimum gap after a contact before a new one is counted [m]. It prevents that a scrape counts as many contacts."""
 
 _FEW = 16
-"""Up to this many bodies, plain loops are faster than arrays."""
+"""Maximum number of bodies for which plain loops are faster than arrays."""
 
 
 class Touch(NamedTuple):
-    """What pybullet said about a contact within the step."""
+    """Contact that pybullet reported within the step."""
 
     position: Vector3
     impact_speed: float
 
 
 class ContactTracker:
-    """Finds the contacts that begin: overlaps of boxes at the ends of steps, and what pybullet resolved within one."""
+    """Tracker of starting contacts: overlaps of boxes at the ends of steps, and contacts that pybullet resolved
+    within.
+    """
 
     def __init__(self) -> None:
         self._touching: dict[tuple[str, str], None] = {}
 
     def forget(self, name: str) -> None:
-        """This actor has left the world."""
+        """Delete the contacts of a removed actor."""
         self._touching = {pair: None for pair in self._touching if name not in pair}
 
     def update(self, bodies: Sequence[Body], touches: dict[tuple[str, str], Touch]) -> tuple[Contact, ...]:
-        """Return the contacts that began since the last call; `touches` are pybullet's by the names of the pair."""
+        """Return the contacts that started since the last call; `touches` are those of pybullet by pair of names."""
         if not self._touching and not touches and not any(body.moved for body in bodies):
             return ()
         begun: list[Contact] = []
@@ -69,7 +71,7 @@ class ContactTracker:
 
 
 def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
-    """Pairs of which one has moved and whose circles, with the hysteresis, overlap; in the order of the bodies."""
+    """Yield pairs with a moved body whose circles overlap, including the hysteresis, in the order of the bodies."""
     if len(bodies) > _FEW:
         yield from _near_pairs_of_many(bodies)
         return
@@ -84,7 +86,7 @@ def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
 
 
 def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
-    """Yield the same by sweeping along x: only neighbors in the order of x can be near."""
+    """Yield the same pairs by a sweep along x: only consecutive bodies in x can be near."""
     x, y, radius, moved = np.array([(b.center_x, b.center_y, b.radius, b.moved) for b in bodies]).T
     order = np.argsort(x, kind="stable")
     sorted_x = x[order]
@@ -101,7 +103,7 @@ def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
 
 
 def _shared_point(first: Body, second: Body) -> Vector3:
-    """Return the middle of the corners of each box inside the other; of the centers, where boxes cross without such."""
+    """Return the mean of the corners of each box inside the other, or of the centers if there are none."""
     boxes = np.array([first.box, second.box])
     corners = box_corners(boxes)
     inside = [corners[0][points_in_box(corners[0], boxes[1])], corners[1][points_in_box(corners[1], boxes[0])]]
@@ -113,5 +115,5 @@ def _shared_point(first: Body, second: Body) -> Vector3:
 
 
 def relative_speed(first: Vector3, second: Vector3) -> float:
-    """Magnitude of the difference of two velocities [m/s]."""
+    """Return the magnitude of the difference of two velocities [m/s]."""
     return math.dist(first, second)

@@ -1,6 +1,6 @@
-"""The bodies of vehicles that drive: they move by the forces of their tires, and by what hits them.
+"""Bodies of driven vehicles, which move by tire forces and collisions.
 
-pybullet's gravity and damping are off; it integrates the velocities and resolves collisions.
+Gravity and damping of pybullet are off; it integrates the velocities and resolves collisions.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from eidrive_scenario.world.physics.multi_axle import track_of
 
 
 class DrivenBody(Body):
-    """A vehicle that moves by pedals and steering, and by what hits it.
+    """Vehicle that moves by pedals, steering and collisions.
 
-    Where something may hit it, `drive` and `read_back` let pybullet integrate its motion, step by step; else `roll`
-    does the same without pybullet.
+    If a collision is possible, pybullet integrates the motion step by step by `drive` and `read_back`. Otherwise
+    `coast`
+    computes the same without pybullet.
     """
 
     def __init__(
@@ -33,7 +34,7 @@ class DrivenBody(Body):
         self._ground = ground
         self._lever = self.track.to_reference
         self._motion = (0.0, 0.0, 0.0)
-        """Velocity x y of the center of gravity [m/s] and yaw rate [rad/s], as of the rigid body."""
+        """Velocity x y of the center of gravity [m/s] and yaw rate [rad/s] of the rigid body."""
         self._create(
             (spec.offset[0] - self._lever, spec.offset[1], 0.0),
             (self.x, self.y, self.z),
@@ -46,12 +47,14 @@ class DrivenBody(Body):
 
     @property
     def travel(self) -> float:
-        """How far any part of it goes within a tick, if nothing hits it and it keeps its velocity [m]."""
+        """Maximum displacement of any part within a tick at constant velocity without a collision [m]."""
         vx, vy, rate = self._motion
         return (math.hypot(vx, vy) + abs(rate) * 2.0 * self.radius) * self._dt
 
     def teleport(self, placement: Placement) -> None:
-        """Stand there now, rolling straight ahead with the given speed; the ground gives height, pitch and roll."""
+        """Move to the placement, rolling straight ahead with its speed. The ground determines height, pitch and
+        roll.
+        """
         z, pitch, roll = self._ground.at(placement.x, placement.y, placement.yaw)
         self._pose(placement.x, placement.y, z, placement.yaw, pitch, roll)
         self.speed, self.yaw_rate, self.acceleration = placement.speed, 0.0, (0.0, 0.0, 0.0)
@@ -60,11 +63,11 @@ class DrivenBody(Body):
         self.moved = self.stale = True
 
     def demand(self, control: Control, friction: float) -> Demand:
-        """What a control asks for in the steps of this tick."""
+        """Return the forces and the steering that a control requests for the steps of this tick."""
         return self.track.demand(control, friction, self.pitch)
 
     def drive(self, demand: Demand) -> None:
-        """Give the rigid body the velocity with which it moves over the next physics step."""
+        """Set the velocity of the rigid body for the next physics step."""
         handle, client = self.handle, self.client
         _, (qx, qy, qz, qw) = bullet.getBasePositionAndOrientation(handle, client)
         (vx, vy, _), (_, _, turning) = bullet.getBaseVelocity(handle, client)
@@ -77,12 +80,12 @@ class DrivenBody(Body):
         bullet.resetBaseVelocity(handle, velocity, (0.0, 0.0, turning), client)
 
     def present_velocity(self) -> Vector3:
-        """Of the rigid body now, within a step [m/s]."""
+        """Return the current velocity of the rigid body within a step [m/s]."""
         velocity: Vector3 = bullet.getBaseVelocity(self.handle, self.client)[0]
         return velocity
 
     def read_back(self) -> None:
-        """Take over pose and velocity from pybullet after a step, and set the body on the ground again."""
+        """Read pose and velocity from pybullet after a step, and set the body on the ground."""
         (x, y, z), (qx, qy, qz, qw) = bullet.getBasePositionAndOrientation(self.handle, self.client)
         (vx, vy, _), (_, _, rate) = bullet.getBaseVelocity(self.handle, self.client)
         yaw = math.atan2(2.0 * (qx * qy + qw * qz), 1.0 - 2.0 * (qy * qy + qz * qz))
@@ -91,9 +94,9 @@ class DrivenBody(Body):
         self.stale = bool(self.pitch or self.roll or lifted or qx or qy)
 
     def coast(self, demand: Demand, steps: int) -> None:
-        """Move by physics steps in which nothing can hit it.
+        """Move by physics steps without a possible collision.
 
-        As pybullet integrates: the velocity at the end of a step covers the step's distance.
+        As in pybullet, the velocity at the end of a step determines the distance of the step.
         """
         if self._stays(demand):
             steps = 1
@@ -112,13 +115,13 @@ class DrivenBody(Body):
         self.stale = self.stale or self.moved or self._motion != before
 
     def _stays(self, demand: Demand) -> bool:
-        """Return whether it stands, and each step leaves it so."""
+        """Return whether the vehicle stands and remains at standstill."""
         track = self.track
         still = self._motion == STILL and track.steering == demand.steering
         return still and track.advance(0.0, 0.0, 0.0, demand) == STILL
 
-    def settle(self) -> None:
-        """Put the rigid body where the actor is."""
+    def sync_pose(self) -> None:
+        """Move the rigid body to the pose of the actor."""
         self.stale = False
         vx, vy, rate = self._motion
         arm_x, arm_y, arm_z = self._arm(self.yaw)
@@ -129,7 +132,7 @@ class DrivenBody(Body):
         bullet.resetBaseVelocity(self.handle, (vx, vy, rise), (0.0, 0.0, rate), self.client)
 
     def _arrive(self, x: float, y: float, yaw: float, motion: Vector3) -> None:
-        """Take over place and heading of the center of gravity and its motion; the ground gives the rest."""
+        """Set position, heading and motion of the center of gravity. The ground determines the rest."""
         vx, vy, rate = self._motion = motion
         arm_x, arm_y, _ = self._arm(yaw)
         x, y = x - arm_x, y - arm_y
@@ -142,7 +145,7 @@ class DrivenBody(Body):
         self._accelerate_to((vx + arm_y * rate, vy - arm_x * rate, -math.tan(pitch) * level))
 
     def _arm(self, yaw: float) -> Vector3:
-        """From the reference point to the center of gravity, at half the height of the box, in the world [m]."""
+        """Return the vector from the reference point to the center of gravity, at half the height of the box [m]."""
         lever, height = self._lever, self.spec.offset[2]
         cy, sy = math.cos(yaw), math.sin(yaw)
         if self.pitch == 0.0 and self.roll == 0.0:

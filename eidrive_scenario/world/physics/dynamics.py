@@ -1,10 +1,10 @@
-"""How a driven vehicle moves: a single-track model with tire and drivetrain limits.
+"""Dynamics of a driven vehicle: a single-track model with limits of tires and drivetrain.
 
 Single-track model: R. Rajamani, Vehicle Dynamics and Control, 2nd ed., Springer 2012, section 2.3, with the axle
 loads at standstill. Tire: the brush model of E. Fiala in the form of R. Hindiyeh and J. C. Gerdes, "A controller
-framework for autonomous drifting", ASME J. Dyn. Syst. Meas. Control 136 (2014), whose largest side force is what the
-friction circle leaves beside the longitudinal force. Drive, brakes, rolling resistance and air drag:
-Rajamani, ch. 4. Vehicles with more than two axles: `multi_axle`.
+framework for autonomous drifting", ASME J. Dyn. Syst. Meas. Control 136 (2014). The friction circle limits its side
+force beside the longitudinal force. Drive, brakes, rolling resistance and air drag: Rajamani, ch. 4. Vehicles with more
+than two axles: `multi_axle`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from eidrive_scenario.world.actor import ActorSpec, Control
 
 GRAVITY = 9.81
 AIR_DENSITY = 1.2041
-"""At 20 °C and 101.325 kPa [kg/m³]."""
+"""Density of air at 20 °C and 101.325 kPa [kg/m³]."""
 LONGITUDINAL_SHARE = 0.95
-"""Share of the grip that drive and brakes may use: anti-lock and traction control leave the rest to the steering."""
+"""Share of the grip for drive and brakes. Anti-lock and traction control leave the rest to the steering."""
 
 PROPERTIES = (
     "power",
@@ -35,26 +35,27 @@ PROPERTIES = (
     "steering_rate",
     "steering_ratio",
 )
-"""The Properties of a Vehicle which `VehicleParameters.of` reads; each is a number, each may be missing."""
+"""Properties of a Vehicle that `VehicleParameters.of` reads; all are optional numbers."""
 
 
 class TrackAxle(NamedTuple):
-    """One axle of a vehicle with more than two."""
+    """Axle of a vehicle with more than two axles."""
 
     x: float
-    """Ahead of the rear axle [m]."""
+    """Distance ahead of the rear axle [m]."""
     front: bool
-    """Whether it is of the front group: nearer to the front axle than to the rear one."""
+    """Whether it belongs to the front group: nearer to the front axle than to the rear one."""
     max_steering: float
-    """[rad]; 0 where its wheels do not steer."""
+    """Maximum angle of its wheels [rad]; 0 if they do not steer."""
 
 
 @dataclass(frozen=True)
 class VehicleParameters:
-    """What the single-track model knows of a vehicle. The defaults in brackets hold where the catalog is silent.
+    """Parameters of the single-track model, with defaults in brackets.
 
-    Where there are more than two axles, front and rear are groups of axles, and lie in the middle of theirs: the axles
-    of a group carry the same load, as on levelling suspensions, and are alike.
+    With more than two axles, front and rear are groups of axles at their mean positions. The axles of a group carry the
+    same
+    load, as with levelling suspensions, and are alike.
     """
 
     mass: float
@@ -64,20 +65,20 @@ class VehicleParameters:
     weight_front: float
     """Share of the weight on the front axle at standstill [0.55; of n front and m rear axles 0.55 n to 0.45 m]."""
     yaw_inertia: float
-    """About the center of gravity [kg m²; mass times the product of its distances from the axles]."""
+    """Yaw inertia about the center of gravity [kg m²; mass times the product of its distances from the axles]."""
     max_steering: float
     """[rad]"""
     steering_rate: float
-    """Of the front wheels [rad/s; 0.8]."""
+    """Steering rate of the front wheels [rad/s; 0.8]."""
     steering_ratio: float
-    """Turn of the steering wheel over that of the front wheels [16]."""
+    """Angle of the steering wheel over that of the front wheels [16]."""
     max_speed: float
     max_acceleration: float
-    """That the drive gives at low speed [m/s²]."""
+    """Maximum acceleration of the drive at low speed [m/s²]."""
     max_deceleration: float
-    """That the brakes give at full pedal [m/s²]."""
+    """Maximum deceleration of the brakes [m/s²]."""
     power: float
-    """At the wheels [W; 60 W per kg]."""
+    """Power at the wheels [W; 60 W per kg]."""
     drive_front: float
     """Share of the drive force on the front axle [1]."""
     drag_area: float
@@ -85,21 +86,21 @@ class VehicleParameters:
     rolling_resistance: float
     """Force over weight [0.012]."""
     tire_friction: float
-    """Largest tire force over load, on a dry road [1.0]."""
+    """Maximum tire force over load on a dry road [1.0]."""
     cornering_stiffness_front: float
-    """Of the whole axle [N/rad; 14 per rad times its load]."""
+    """Cornering stiffness of the front axle [N/rad; 14 per rad times its load]."""
     cornering_stiffness_rear: float
-    """Of the whole axle [N/rad; 18 per rad times its load]."""
+    """Cornering stiffness of the rear axle [N/rad; 18 per rad times its load]."""
     rear: float = 0.0
-    """Where the rear group lies ahead of the rear axle [m]."""
+    """Position of the rear group ahead of the rear axle [m]."""
     axles: tuple[TrackAxle, ...] = ()
-    """All axles where there are more than two, the front and the rear one first; else none."""
+    """All axles if there are more than two, the front and the rear one first; else empty."""
 
     @classmethod
     def of(cls, spec: ActorSpec) -> VehicleParameters:
-        """Return the parameters in a vehicle's specification. Raise SettingError for a Property that makes no sense."""
+        """Return the parameters of a vehicle. Raise SettingError if a Property is invalid."""
         if spec.wheelbase <= 0.0:
-            what = f"{spec.name!r} cannot be driven: its axles are not apart"
+            what = f"{spec.name!r} cannot be driven: its wheelbase is not positive"
             raise SettingError(Diagnostic(what, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's"))
         axles = _axles(spec)
         front_group, rear_group = [axle.x for axle in axles if axle.front], [axle.x for axle in axles if not axle.front]
@@ -158,41 +159,43 @@ def _number(spec: ActorSpec, name: str, default: float, *, zero: bool = False, b
 
 
 class Demand(NamedTuple):
-    """What driver, road and slope ask of a vehicle for some steps, worked out beforehand."""
+    """Requests of driver, road and slope for some steps, computed in advance."""
 
     steering: float
-    """Where the front wheels shall turn to [rad]."""
+    """Target angle of the front wheels [rad]."""
     throttle: float
     brake: float
-    """Force of the brakes, as far as the grip allows [N]."""
+    """Force of the brakes within the grip [N]."""
     direction: float
     """1 forwards, -1 backwards."""
     grip_front: float
     grip_rear: float
-    """Largest forces of the tires [N]."""
+    """Maximum tire forces [N]."""
     traction_front: float
     traction_rear: float
-    """Largest forces along the wheels [N]."""
+    """Maximum forces along the wheels [N]."""
     slope: float
     """Force of the slope along the vehicle [N]."""
 
 
 class SingleTrack:
-    """The forces on one vehicle, turned into the change of its velocities over short steps of `step` seconds.
+    """Forces on one vehicle and the resulting change of its velocities over steps of `step` seconds.
 
-    At low speed the slip of a tire is no longer defined by its ratio of velocities. There the side force is bounded by
-    the one that just ends the side slip of its axle within the step, so that the model passes into the kinematic one
-    and comes to a stable rest, and yet a blow from the side finds no more than the tires' grip.
+    At low speed the slip of a tire is not defined by its ratio of velocities. There the side force is bounded by the
+    force
+    that ends the side slip of its axle within the step. The model thus passes into the kinematic one and comes to a
+    stable
+    rest, and a lateral impact is still limited by the grip of the tires.
     """
 
     def __init__(self, parameters: VehicleParameters, step: float) -> None:
         p = self.parameters = parameters
         self.steering = 0.0
-        """Present angle of the front wheels [rad]."""
+        """Current angle of the front wheels [rad]."""
         self.to_front = (1.0 - p.weight_front) * p.wheelbase
         self.to_rear = p.weight_front * p.wheelbase
         self.to_reference = p.rear + self.to_rear
-        """From the reference point, on the rear axle, ahead to the center of gravity [m]."""
+        """Distance from the reference point on the rear axle to the center of gravity ahead [m]."""
         self._cos, self._sin = 1.0, 0.0
         self._turn = p.steering_rate * step
         self._load_front = p.mass * GRAVITY * p.weight_front
@@ -202,7 +205,7 @@ class SingleTrack:
         self._full_drive = p.mass * p.max_acceleration
         self._full_brake = p.mass * p.max_deceleration
         self._stop = p.mass / step
-        """Force that ends a speed within a step [N s/m]."""
+        """Force per speed that ends a speed within a step [N s/m]."""
         self._per_mass = step / p.mass
         self._per_inertia = step / p.yaw_inertia
         inertia_front = 1.0 / (1.0 / p.mass + self.to_front**2 / p.yaw_inertia)
@@ -211,8 +214,11 @@ class SingleTrack:
         self._slowest_rear = step * p.cornering_stiffness_rear / inertia_rear
 
     def demand(self, control: Control, friction: float, pitch: float) -> Demand:
-        """What a control asks for; `friction` scales the tires' grip, `pitch` (positive nose down) is the road's,
-        whose slope pulls the vehicle."""
+        """Return the forces and the steering that a control requests.
+
+        `friction` scales the grip of the tires. `pitch` of the road (positive nose down) determines the force of the
+        slope.
+        """
         p = self.parameters
         grip = p.tire_friction * friction
         grip_front, grip_rear = grip * self._load_front, grip * self._load_rear
@@ -230,9 +236,9 @@ class SingleTrack:
         )
 
     def advance(self, forward: float, left: float, yaw_rate: float, demand: Demand) -> tuple[float, float, float]:
-        """Velocities forward and to the left [m/s] and yaw rate [rad/s] after one step.
+        """Return velocities forward and left [m/s] and yaw rate [rad/s] after one step.
 
-        The velocities are those of the center of gravity in the vehicle's axes, those of the beginning of the step.
+        The arguments are those of the center of gravity in the axes of the vehicle at the start of the step.
         """
         p = self.parameters
         if self.steering != demand.steering:
@@ -245,12 +251,12 @@ class SingleTrack:
         side_front = 0.0
         if slipping:
             slip = slipping / (rolling if rolling > self._slowest_front else self._slowest_front)
-            side_front = fiala(slip, p.cornering_stiffness_front, left_by(demand.grip_front, along_front))
+            side_front = fiala(slip, p.cornering_stiffness_front, remaining_side_force(demand.grip_front, along_front))
         rolling, slipping = abs(forward), left - to_rear * yaw_rate
         side_rear = 0.0
         if slipping:
             slip = slipping / (rolling if rolling > self._slowest_rear else self._slowest_rear)
-            side_rear = fiala(slip, p.cornering_stiffness_rear, left_by(demand.grip_rear, along_rear))
+            side_rear = fiala(slip, p.cornering_stiffness_rear, remaining_side_force(demand.grip_rear, along_rear))
 
         across_front = along_front * sin - side_front * cos
         force = along_front * cos + side_front * sin + along_rear + free
@@ -266,7 +272,7 @@ class SingleTrack:
         self._cos, self._sin = math.cos(self.steering), math.sin(self.steering)
 
     def _longitudinal(self, forward: float, demand: Demand) -> tuple[float, float, float]:
-        """Forces along the wheels at the front and the rear axle, and those that need no tire [N]."""
+        """Return the forces along the wheels of the front and the rear axle, and those without tires [N]."""
         p = self.parameters
         free = demand.slope - self._drag * forward * abs(forward)
         front = rear = 0.0
@@ -283,7 +289,7 @@ class SingleTrack:
             drive *= direction
             front = _limited(drive * p.drive_front, demand.traction_front)
             rear = _limited(drive * (1.0 - p.drive_front), demand.traction_rear)
-        # Brakes and rolling resistance stop the vehicle and hold it; they never push it.
+        # Brakes and rolling resistance stop and hold the vehicle; they never accelerate it.
         to_rest = self._stop * forward + free + front + rear
         rolling = _limited(to_rest, self._rolling)
         if demand.brake > 0.0:
@@ -294,7 +300,7 @@ class SingleTrack:
 
 
 def fiala(slip: float, stiffness: float, largest: float) -> float:
-    """Side force of an axle [N] at a tangent of its slip angle, saturating at `largest`, in the slip's direction."""
+    """Return the side force of an axle [N] at a tangent of its slip angle, limited to `largest`, in slip direction."""
     used = stiffness * slip / (3.0 * largest)
     size = abs(used)
     if size >= 1.0:
@@ -302,8 +308,8 @@ def fiala(slip: float, stiffness: float, largest: float) -> float:
     return largest * used * (3.0 - size * (3.0 - size))
 
 
-def left_by(grip: float, along: float) -> float:
-    """Side force that tires of this grip have left beside a force along them [N]."""
+def remaining_side_force(grip: float, along: float) -> float:
+    """Return the side force that remains of the grip of tires beside a longitudinal force [N]."""
     return math.sqrt(grip * grip - along * along) if along else grip
 
 

@@ -1,4 +1,4 @@
-"""The physics steps of one tick: driven vehicles move, and what collides with them is resolved and noted."""
+"""Physics steps of one tick: motion of driven vehicles and resolution of their collisions."""
 
 from __future__ import annotations
 
@@ -16,40 +16,46 @@ from eidrive_scenario.world.physics.dynamics import Demand
 from eidrive_scenario.world.physics.scenery import Scenery
 
 Touches = dict[tuple[str, str], Touch]
-"""By the names of the pair: in the order of the view's rows, a building last."""
+"""Contacts by pair of names in the order of the rows of the view, a building last."""
 
 _ROLL = Control()
-_BLOW = 20.0
-"""Speed that a collision may add within a tick, as far as the search for neighbors goes [m/s]."""
-_HARDEST = 20.0
-"""Acceleration of any part of a vehicle that nothing hits, at most [m/s²]."""
+_MAX_IMPACT = 20.0
+"""Speed that a collision may add within a tick in the search for neighbors [m/s]."""
+_MAX_ACCELERATION = 20.0
+"""Maximum acceleration of any part of a vehicle without a collision [m/s²]."""
 _MARGIN = 0.1
-"""pybullet deals with bodies that are nearer than twice its collision margin of 4 cm [m]."""
+"""Maximum distance of bodies that pybullet processes [m]: more than twice its collision margin of 4 cm."""
 
 
 _AHEAD = 5.0
-"""So much farther than needed it is looked what stands around a body, so that it need not be looked each time [m]."""
+"""Additional radius of the search for obstacles around a body, so that it is not repeated in each tick [m]."""
 
 
 MAX_TICK = 100.0
-"""Maximum length of a tick [s]; all its physics steps are taken at once."""
+"""Maximum length of a tick [s], as all its physics steps are computed in one call."""
 
 
 def substeps_per_tick(dt: float, physics_rate: float) -> int:
-    """Physics steps in one tick. Raise SettingError unless the tick is a whole number of them, of at most MAX_TICK."""
+    """Return the physics steps of a tick.
+
+    Raise SettingError unless the tick is at most MAX_TICK and a multiple of a physics step.
+    """
     exact = dt * physics_rate
     if not abs(dt) <= MAX_TICK or not math.isfinite(exact):
         raise SettingError(Diagnostic(f"a tick is {dt:g} s long", f"give a dt of at most {MAX_TICK:g} s"))
     count = round(exact)
     if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
         what = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
-        raise SettingError(Diagnostic(what, "choose dt and the rate so that this is a whole number, at least 1"))
+        raise SettingError(Diagnostic(what, "choose dt and the rate so that this is an integer of at least 1"))
     return count
 
 
 class Physics:
-    """Steps one pybullet client. Only driven bodies that may meet something within the tick move in pybullet; there
-    what else can hit them, or be hit, moves with them."""
+    """Steps of one pybullet client.
+
+    Only driven bodies with a possible contact within the tick move in pybullet, together with the bodies that may be
+    involved.
+    """
 
     def __init__(self, client: int, scenery: Scenery, dt: float, substeps: int) -> None:
         self.step = dt / substeps
@@ -58,24 +64,24 @@ class Physics:
         self._scenery = scenery
         self._dt = dt
         self._substeps = substeps
-        self._slack = _MARGIN + 0.5 * _HARDEST * dt * dt
+        self._slack = _MARGIN + 0.5 * _MAX_ACCELERATION * dt * dt
         self._searchable = False
         self._free: dict[str, tuple[tuple[float, float], float]] = {}
-        """Where each body was when it was last looked how far around it nothing stands, and how far that is [m]."""
+        """Position of each body at the last search for obstacles, and the free radius around it [m]."""
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=self.step, deterministicOverlappingPairs=1, physicsClientId=client
         )
 
     def changed(self) -> None:
-        """Bodies were put in or taken out, or moved."""
+        """Reset caches after bodies were added, removed or moved."""
         self._searchable = False
 
     def scenery_changed(self) -> None:
-        """Something was put up that does not move."""
+        """Reset caches after scenery was added."""
         self._free.clear()
 
     def refresh(self, bodies: Iterable[Body]) -> None:
-        """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
+        """Update the search structure of pybullet, which setting poses does not update."""
         if not self._searchable:
             _settle(bodies)
             bullet.performCollisionDetection(self._client)
@@ -88,7 +94,9 @@ class Physics:
         controls: Mapping[str, Control],
         friction: float,
     ) -> Touches:
-        """All steps of one tick, the scripted bodies being at their new places; returns what pybullet resolved."""
+        """Compute all steps of one tick after the scripted bodies have moved. Return the contacts that pybullet
+        resolved.
+        """
         self.changed()
         if not driven:
             return {}
@@ -113,7 +121,7 @@ class Physics:
         demands: Mapping[str, Demand],
         touches: Touches,
     ) -> None:
-        """The steps in pybullet."""
+        """Compute the steps in pybullet."""
         owners = {body.handle: (row, body) for row, body in enumerate(bodies.values())}
         for number in range(self._substeps):
             for scripted in passing:
@@ -125,26 +133,26 @@ class Physics:
             for body in watched.values():
                 self._note_touches(body, owners, before, touches)
         for scripted in passing:
-            scripted.settle()
+            scripted.sync_pose()
         for body in watched.values():
             body.read_back()
 
     def _within_reach(
         self, bodies: Mapping[str, Body], driven: Mapping[str, DrivenBody]
     ) -> tuple[list[ScriptedBody], dict[str, DrivenBody]]:
-        """Scripted bodies that move near a driven one, and the driven ones near any other body or a building.
+        """Return scripted bodies near a driven one, and driven ones near any other body or a building.
 
-        Nobody is, unless any two may meet; where they may, a blow can send them on to others.
+        Both are empty unless any two may meet. If two may meet, a collision can push them towards others.
         """
         passing: dict[str, ScriptedBody] = {}
         watched: dict[str, DrivenBody] = {}
         travels = {name: body.travel + self._slack for name, body in bodies.items()}
         if not any(self._may_meet(body, bodies, travels) for body in driven.values()):
             return [], watched
-        reaches = {name: body.radius + travels[name] + _BLOW * self._dt for name, body in bodies.items()}
+        reaches = {name: body.radius + travels[name] + _MAX_IMPACT * self._dt for name, body in bodies.items()}
         for name, body in driven.items():
             x, y, own = body.center_x, body.center_y, reaches[name]
-            near = self._stands_near(name, x, y, own)
+            near = self._is_near_static(name, x, y, own)
             for other_name, other in bodies.items():
                 dx, dy, reach = other.center_x - x, other.center_y - y, own + reaches[other_name]
                 if dx * dx + dy * dy <= reach * reach and other is not body:
@@ -156,9 +164,9 @@ class Physics:
         return list(passing.values()), watched
 
     def _may_meet(self, body: DrivenBody, bodies: Mapping[str, Body], travels: Mapping[str, float]) -> bool:
-        """Return whether a driven body may touch anything in this tick."""
+        """Return whether a driven body may have a contact in this tick."""
         x, y, radius, own = body.center_x, body.center_y, body.radius, travels[body.name]
-        if self._stands_near(body.name, x, y, radius + own):
+        if self._is_near_static(body.name, x, y, radius + own):
             return True
         for name, other in bodies.items():
             way = own + travels[name]
@@ -167,8 +175,8 @@ class Physics:
                 return True
         return False
 
-    def _stands_near(self, name: str, x: float, y: float, reach: float) -> bool:
-        """Return whether anything that does not move may be within reach of a body's middle [m]."""
+    def _is_near_static(self, name: str, x: float, y: float, reach: float) -> bool:
+        """Return whether any static object may be within reach of the center of a body [m]."""
         there, free = self._free.get(name, ((x, y), -math.inf))
         if reach + math.dist(there, (x, y)) < free:
             return False
@@ -183,7 +191,7 @@ class Physics:
         before: Mapping[int, Vector3],
         touches: Touches,
     ) -> None:
-        """Add what pybullet resolved between this body and others in the last step."""
+        """Add the contacts of this body that pybullet resolved in the last step."""
         for _, first, second, _, _, position, _, _, gap, force, *_ in bullet.getContactPoints(
             body.handle, physicsClientId=self._client
         ):
@@ -204,4 +212,4 @@ class Physics:
 def _settle(bodies: Iterable[Body]) -> None:
     for body in bodies:
         if body.stale:
-            body.settle()
+            body.sync_pose()

@@ -1,4 +1,4 @@
-"""The road's surface under a vehicle that drives on it."""
+"""Road surface below a driven vehicle."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from eidrive_scenario.roads import LaneLocation, RoadNetwork
 
 
 class GroundUnder:
-    """Height and slope of the ground below one vehicle; remembers the lane on which it stood last."""
+    """Height and slope of the ground below one vehicle, with the lane of its last position."""
 
     def __init__(self, roads: RoadNetwork | None, height: float = 0.0) -> None:
         self._roads = roads
@@ -14,9 +14,9 @@ class GroundUnder:
         self._height = height
 
     def at(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
-        """Return the height z [m], pitch and roll [rad] of something at x, y with that heading.
+        """Return height z [m], pitch and roll [rad] of a body at x, y with that heading.
 
-        Beside the road the ground is level, at the height at which the road was left.
+        Outside the road the ground is level at the height at which the vehicle left the road.
         """
         if self._roads is None:
             return self._height, 0.0, 0.0
@@ -30,5 +30,5 @@ class GroundUnder:
 
 
 def is_level(roads: RoadNetwork | None) -> bool:
-    """Return whether all roads lie in the plane z = 0."""
+    """Return whether all roads are in the plane z = 0."""
     return roads is None or all(road.elevation.is_zero and road.superelevation.is_zero for road in roads.roads.values())

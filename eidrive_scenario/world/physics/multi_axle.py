@@ -1,8 +1,9 @@
-"""The single-track model of a vehicle with more than two axles: each axle has its own slip.
+"""Single-track model of a vehicle with more than two axles, each with a separate slip.
 
-Axles that do not steer, at different places, cannot all roll without slip in a turn: they resist it, and the vehicle
-turns as on a longer wheelbase (C. B. Winkler, Simplified analysis of the steady-state turning of complex vehicles,
-Vehicle System Dynamics 29 (1998), 141-180). That follows here from the forces; nothing is prescribed.
+Unsteered axles at different positions cannot all roll without slip in a turn. They resist it, and the vehicle turns as
+with a longer wheelbase (C. B. Winkler, Simplified analysis of the steady-state turning of complex vehicles, Vehicle
+System
+Dynamics 29 (1998), 141-180). Here this results from the forces.
 """
 
 from __future__ import annotations
@@ -11,22 +12,22 @@ import math
 from dataclasses import dataclass
 
 from eidrive_scenario.openscenario.model import Vehicle
-from eidrive_scenario.world.physics.dynamics import Demand, SingleTrack, VehicleParameters, fiala, left_by
+from eidrive_scenario.world.physics.dynamics import Demand, SingleTrack, VehicleParameters, fiala, remaining_side_force
 from eidrive_scenario.world.specs import actor_spec
 
 
 @dataclass
 class _Wheels:
-    """One axle as the model rolls it."""
+    """Axle of the model."""
 
     lever: float
-    """Ahead of the center of gravity [m]."""
+    """Distance ahead of the center of gravity [m]."""
     front: bool
     gain: float
     """Tangent of its steering angle over that of the front axle."""
     max_steering: float
     slowest: float
-    """Speed below which its slip no longer follows from the ratio of velocities [m/s]."""
+    """Speed below which its slip does not follow from the ratio of velocities [m/s]."""
     cos: float = 1.0
     sin: float = 0.0
 
@@ -34,8 +35,9 @@ class _Wheels:
 class MultiAxleTrack(SingleTrack):
     """`SingleTrack` for all axles of `parameters.axles`.
 
-    An axle beside the front one steers where it may (`max_steering`), by the angle with which its wheels roll about the
-    same point as the front wheels, which lies abreast of the middle of the rear group's axles that do not steer.
+    An additional axle steers, if it can (`max_steering`), by the angle at which its wheels roll about the same point as
+    the
+    front wheels. This point is abreast of the mean position of the unsteered axles of the rear group.
     """
 
     def __init__(self, parameters: VehicleParameters, step: float) -> None:
@@ -53,7 +55,8 @@ class MultiAxleTrack(SingleTrack):
         for axle in p.axles:
             lever = axle.x - self.to_reference
             stiffness = p.cornering_stiffness_front if axle.front else p.cornering_stiffness_rear
-            # The axles of a group share what would end the side slip within a step, lest they overshoot together.
+            # The axles of a group share the force that ends the side slip within a step;
+            # otherwise they would overshoot together.
             slowest = step * stiffness * (1.0 / p.mass + lever**2 / p.yaw_inertia)
             gain = (axle.x - pivot) / (steered.x - pivot) if axle.max_steering > 0.0 else 0.0
             self._wheels.append(_Wheels(lever, axle.front, gain, axle.max_steering, slowest))
@@ -61,9 +64,10 @@ class MultiAxleTrack(SingleTrack):
 
     @property
     def turning_wheelbase(self) -> float:
-        """Tangent of the front wheels' angle over the curvature of a slow turn, Winkler's equivalent wheelbase [m].
+        """Tangent of the angle of the front wheels over the curvature of a slow turn: equivalent wheelbase by Winkler
+        [m].
 
-        In it the side forces, cornering stiffness times slip, and their moments are in balance.
+        At this curvature the side forces, cornering stiffness times slip, and their moments are balanced.
         """
         forces = lever = moment = steered = twisted = 0.0
         for wheels in self._wheels:
@@ -76,7 +80,7 @@ class MultiAxleTrack(SingleTrack):
         return (forces * moment - lever * lever) / (forces * twisted - lever * steered)
 
     def advance(self, forward: float, left: float, yaw_rate: float, demand: Demand) -> tuple[float, float, float]:
-        """As `SingleTrack.advance`."""
+        """Return the velocities after one step, as `SingleTrack.advance` does."""
         if self.steering != demand.steering:
             self._steer(demand.steering)
         along_front, along_rear, force = self._longitudinal(forward, demand)
@@ -91,7 +95,7 @@ class MultiAxleTrack(SingleTrack):
             side = left + wheels.lever * yaw_rate
             rolling, slipping = abs(forward * cos + side * sin), side * cos - forward * sin
             slip = slipping / (rolling if rolling > wheels.slowest else wheels.slowest)
-            push = fiala(slip, stiffness, left_by(grip, along))
+            push = fiala(slip, stiffness, remaining_side_force(grip, along))
             force += along * cos + push * sin
             pull = along * sin - push * cos
             across += pull
@@ -113,8 +117,12 @@ class MultiAxleTrack(SingleTrack):
 
 
 def turning_wheelbase(vehicle: Vehicle) -> float:
-    """On which a vehicle turns at low speed [m]: from the rear to the front axle, more with further axles; 0 without
-    a front axle. Raise InputError if something in the vehicle is wrong."""
+    """Return the effective wheelbase of a vehicle at low speed [m].
+
+    It is the distance between front and rear axle, more with further axles, and 0 without a front axle. Raise
+    InputError if
+    the vehicle is invalid.
+    """
     spec = actor_spec(vehicle.name, vehicle)
     if spec.wheelbase <= 0.0 or not spec.extra_axles:
         return max(spec.wheelbase, 0.0)
@@ -122,5 +130,5 @@ def turning_wheelbase(vehicle: Vehicle) -> float:
 
 
 def track_of(parameters: VehicleParameters, step: float) -> SingleTrack:
-    """Return the model for a vehicle of these parameters."""
+    """Return the model of a vehicle with these parameters."""
     return MultiAxleTrack(parameters, step) if parameters.axles else SingleTrack(parameters, step)

@@ -1,7 +1,7 @@
-"""The furniture of the roads as bodies in pybullet: what vehicles run into, and what hides one from another.
+"""Bodies of road objects in pybullet, which block vehicles and lines of sight.
 
-All of it goes into a few meshes of triangles: pybullet's steps take longer with each body, and a road may have ten
-thousand posts.
+They are merged into a few triangle meshes: each body slows down the steps of pybullet, and a road may have ten thousand
+posts.
 """
 
 from __future__ import annotations
@@ -18,44 +18,44 @@ from eidrive_scenario.world.physics.spatial_grid import SQUARE, SpatialGrid
 from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
 from eidrive_scenario.world.road_objects import RoadObjectBody
 
-MOST_FACES = 20_000
-"""In one collision shape; pybullet refuses much more."""
+MAX_FACES = 20_000
+"""Maximum number of faces of a collision shape; pybullet rejects much larger ones."""
 FOLIAGE = 0.8
-"""Share of a crown's or a bush's extents that lets nobody see through."""
+"""Share of the extents of a crown or bush that is opaque."""
 CROWN = 0.3
-"""Where a tree's crown begins, as a share of its height."""
+"""Height of the lower end of a crown as a share of the height of the tree."""
 _SIGNS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
 _FACES = np.array(
     [(0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6),
      (3, 0, 4), (3, 4, 7)]
 )  # fmt: skip
-"""Of a box: four corners of the bottom, then four of the top."""
+"""Faces of a box: four corners of the bottom, then four of the top."""
 
 
 class Obstacles:
-    """Everything that stands at the roads and has a body."""
+    """Road objects with a body."""
 
-    def __init__(self, furniture: Sequence[RoadObjectBody]) -> None:
-        solid = [piece for piece in furniture if piece.solid]
+    def __init__(self, road_objects: Sequence[RoadObjectBody]) -> None:
+        solid = [piece for piece in road_objects if piece.solid]
         self._solid = _merged_rails(solid)
-        self._soft = [piece for piece in furniture if piece.kind in ("tree", "vegetation")]
+        self._soft = [piece for piece in road_objects if piece.kind in ("tree", "vegetation")]
         self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
         self._nearby: SpatialGrid[RoadObjectBody] = SpatialGrid()
         for piece in self._solid:
             self._nearby.add(piece, _cells(piece))
 
     def raise_bodies(self, client: int) -> list[int]:
-        """Put the bodies into pybullet; returns their handles."""
+        """Create the bodies in pybullet and return their handles."""
         solid = [box for piece in self._solid for box in _solid_boxes(piece)]
         soft = [_foliage(piece) for piece in self._soft]
         return [*_meshes(client, solid, STATIC, RAYS | DRIVEN), *_meshes(client, soft, TERRAIN, RAYS)]
 
     def clearance(self, x: float, y: float, most: float) -> float:
-        """How far from a point nothing solid stands, at most `most` [m]."""
+        """Return the distance of a point from the nearest solid object, at most `most` [m]."""
         return min([_gap(piece, x, y) for piece in self._nearby.query(x, y, most)], default=most)
 
     def name_at(self, x: float, y: float) -> str:
-        """What stands at a point at which something was touched."""
+        """Return the name of the object at a point of contact."""
         gaps = [
             (_gap(self._solid[row], x, y), row)
             for row in np.flatnonzero(np.abs(self._where - (x, y)).max(axis=1) < 60.0).tolist()
@@ -64,7 +64,7 @@ class Obstacles:
 
 
 def _merged_rails(solid: Sequence[RoadObjectBody]) -> list[RoadObjectBody]:
-    """Parts of a rail or barrier that continue each other in a straight line as one piece."""
+    """Return the bodies with collinear consecutive parts of a rail or barrier merged."""
     whole: list[RoadObjectBody] = []
     for piece in solid:
         before = whole[-1] if whole else None
@@ -86,7 +86,7 @@ def _merged_rails(solid: Sequence[RoadObjectBody]) -> list[RoadObjectBody]:
 
 
 def _follows(before: RoadObjectBody, piece: RoadObjectBody) -> bool:
-    """Return whether a piece begins where the one before ends."""
+    """Return whether a part starts at the end of its predecessor."""
     step = (before.length + piece.length) / 2
     cos, sin = math.cos(before.pose.h), math.sin(before.pose.h)
     dx, dy = piece.pose.x - before.pose.x - step * cos, piece.pose.y - before.pose.y - step * sin
@@ -94,7 +94,7 @@ def _follows(before: RoadObjectBody, piece: RoadObjectBody) -> bool:
 
 
 Box = tuple[float, float, float, float, float, float, float]
-"""Middle of the bottom x, y, z, length, width, height [m], heading [rad]."""
+"""Center of the bottom x, y, z, length, width, height [m], heading [rad]."""
 
 
 def _solid_boxes(piece: RoadObjectBody) -> Iterator[Box]:
@@ -120,8 +120,8 @@ def _foliage(piece: RoadObjectBody) -> Box:
 
 def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterator[int]:
     here = {"physicsClientId": client}
-    for start in range(0, len(boxes), MOST_FACES // len(_FACES)):
-        table = np.array(boxes[start : start + MOST_FACES // len(_FACES)])
+    for start in range(0, len(boxes), MAX_FACES // len(_FACES)):
+        table = np.array(boxes[start : start + MAX_FACES // len(_FACES)])
         vertices = _corners(table)
         faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1, 3)
         shape = create_triangle_shape(client, vertices.reshape(-1, 3), faces)
@@ -132,7 +132,7 @@ def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterat
 
 
 def _corners(boxes: Array) -> Array:
-    """Return (N, 8, 3) of boxes (N, 7)."""
+    """Return the corners (N, 8, 3) of boxes (N, 7)."""
     along, aside = boxes[:, 3:4] / 2 * _SIGNS[:, 0], boxes[:, 4:5] / 2 * _SIGNS[:, 1]
     cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
     x, y = boxes[:, 0:1] + cos * along - sin * aside, boxes[:, 1:2] + sin * along + cos * aside
@@ -141,7 +141,7 @@ def _corners(boxes: Array) -> Array:
 
 
 def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
-    """Yield the squares that a piece may touch."""
+    """Yield the grid cells that a body may overlap."""
     steps = max(math.ceil(max(piece.length, piece.width) / SQUARE), 1)
     cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
     dx, dy = (cos, sin) if piece.length >= piece.width else (-sin, cos)
@@ -154,7 +154,7 @@ def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
 
 
 def _gap(piece: RoadObjectBody, x: float, y: float) -> float:
-    """How far a point lies outside of a piece [m]."""
+    """Return the distance of a point outside of a body [m]."""
     dx, dy = x - piece.pose.x, y - piece.pose.y
     if piece.radius:
         return max(math.hypot(dx, dy) - piece.radius, 0.0)

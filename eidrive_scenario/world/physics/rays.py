@@ -1,4 +1,4 @@
-"""Rays through the world, to see by and to measure with."""
+"""Ray casts through the world."""
 
 from __future__ import annotations
 
@@ -13,24 +13,27 @@ from eidrive_scenario.world.physics.bullet import bullet
 Point = tuple[float, float, float]
 
 GROUND, NOTHING = -1, -2
-"""Rows of a ray that ended at the ground or a building, and of one that met nothing."""
+"""Rows of rays that ended at the ground or a building, and of rays without a hit."""
 
 _BATCH = 16_000
 _STEP_IN = 0.01
-"""How far a ray is moved into a body that it may pass [m]. From a millimeter inside, pybullet sees the body again; from
-a centimeter in 0.3 % of directions, those along its surface, which then go in twice as far each time."""
+"""Distance by which a ray continues inside a skipped body [m].
+
+From a millimeter inside, pybullet hits the body again; from a centimeter in 0.3 % of directions, along the surface. The
+distance is doubled each time.
+"""
 _STEPS = 12
-"""So often for each body that may be passed: 40 m after the last."""
+"""Maximum number of continuations per skipped body: 40 m after the last."""
 
 
 @dataclass(frozen=True)
 class RayHits:
-    """What rays met first.
+    """First hits of rays.
 
     rows      (M,) row of the actor in the view; GROUND (-1) for the ground and buildings, NOTHING (-2)
-    fraction  (M,) share of the way from origin to target, 1 where nothing was met
-    position  (M, 3) where [m], the target where nothing was met
-    normal    (M, 3) of the surface, zero where nothing was met
+    fraction  (M,) share of the distance from origin to target, 1 without a hit
+    position  (M, 3) of the hit [m], the target without a hit
+    normal    (M, 3) of the surface, zero without a hit
     """
 
     rows: Integers
@@ -40,9 +43,9 @@ class RayHits:
 
 
 def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Integers, passed: Integers) -> RayHits:
-    """Cast rays (M, 3) to (M, 3); those bodies whose rows are in `passed` are looked through.
+    """Cast rays (M, 3) to (M, 3). Bodies whose rows are in `passed` are skipped.
 
-    The last entry of `row_of_handle`, which is that of the handle -1, is NOTHING.
+    The last entry of `row_of_handle`, for handle -1, is NOTHING.
     """
     handles, fraction, normal = _cast(client, origins, targets)
     rows = row_of_handle[handles]
@@ -64,7 +67,7 @@ def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Intege
 
 
 def first_met(client: int, origins: Sequence[Point], targets: Sequence[Point], row_of_handle: list[int]) -> list[int]:
-    """Return the rows that rays meet first, as of `cast_rays` but without arrays: for a few rays, one batch at most."""
+    """Return the rows of the first hits as `cast_rays` does, without arrays; for at most one batch of rays."""
     hits = bullet.rayTestBatch(origins, targets, numThreads=1, physicsClientId=client)
     return [row_of_handle[hit[0]] for hit in hits]
 

@@ -1,4 +1,4 @@
-"""What stands where, by squares of the ground: who is far from everything learns it at once."""
+"""Spatial hash of static objects by square cells of the ground."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ Thing = TypeVar("Thing")
 Cell = tuple[int, int]
 
 SQUARE = 10.0
-"""Side of a square [m]."""
+"""Side of a cell [m]."""
 _FAR = 300.0
-"""Reach from which on there may be more squares than any that have something in them [m]: steps of many seconds."""
+"""Reach from which on the occupied cells are searched instead of all cells in reach [m]: steps of many seconds."""
 
 
 class SpatialGrid(Generic[Thing]):
-    """Things that do not move, each in the squares that it may touch."""
+    """Static objects, each in the cells that it may overlap."""
 
     def __init__(self) -> None:
         self._in_cell: dict[Cell, list[Thing]] = {}
 
     def add(self, thing: Thing, cells: Iterable[Cell]) -> None:
-        """One more, in these squares."""
+        """Add an object to these cells."""
         for cell in dict.fromkeys(cells):
             self._in_cell.setdefault(cell, []).append(thing)
 
     def query(self, x: float, y: float, reach: float) -> list[Thing]:
-        """Return those in the squares within reach of a point [m]; one may come several times."""
+        """Return the objects in the cells within reach of a point [m], possibly with duplicates."""
         found: list[Thing] = []
         if reach > _FAR:
             side = reach + SQUARE
@@ -42,7 +42,7 @@ class SpatialGrid(Generic[Thing]):
 
 
 def grid_cells(x: float, y: float, reach: float) -> list[Cell]:
-    """Return the squares that touch the square around a point that reaches as far to each side [m]."""
+    """Return the cells that overlap the square around a point with half the side `reach` [m]."""
     left, right = math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE)
     low, high = math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE)
     if left == right and low == high:

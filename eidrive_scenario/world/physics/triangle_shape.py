@@ -1,8 +1,9 @@
-"""Concave triangle meshes as collision shapes of pybullet, without the memory that pybullet leaks for them.
+"""Concave triangle meshes as collision shapes of pybullet, without its memory leak.
 
 `createCollisionShape` of pybullet 3.2.7 keeps two references to each vertex of `vertices`, and two to `vertices` and
-`indices` themselves, for ever. So all calls share one set of vertex lists here, and the two sequences are emptied after
-the call: a call leaks two empty lists.
+`indices`, forever. All calls therefore share one set of vertex lists, and the two sequences are emptied after each
+call: a
+call leaks two empty lists.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.world.physics.bullet import bullet
 
 _vertices: list[list[float]] = []
-"""As many as the largest mesh so far had."""
+"""Shared vertices, as many as the largest mesh had."""
 _lock = Lock()
 
 

@@ -1,1 +1,1 @@
-"""How the world looks: triangles to pixels, and the light on them. numpy alone, so that it is the same everywhere."""
+"""Renderer: rasterization and lighting in numpy only, with identical results on all machines."""

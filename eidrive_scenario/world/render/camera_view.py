@@ -1,4 +1,4 @@
-"""Where a camera is, and the rays through its pixels."""
+"""Pose of a camera, and the rays through its pixels."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.camera import Pinhole
 
 Pixels = NDArray[np.intp] | slice
-"""Numbers of pixels, line by line."""
+"""Indices of pixels, line by line."""
 
 
 class CameraView:
-    """A camera at a pose (4, 4): camera to world, x right, y down, z forward.
+    """Camera at a pose (4, 4): camera to world, x right, y down, z forward.
 
-    place (3,) in the world [m]; x, y (P,) of the rays through the pixels in its own frame at depth 1, and their length
+    place  (3,) position in the world [m]
+    x, y   (P,) of the rays through the pixels in the camera frame at depth 1, and their length
     """
 
     def __init__(self, pose: Array, pinhole: Pinhole) -> None:
@@ -29,13 +30,13 @@ class CameraView:
         self.x, self.y, self.length = _own_rays(pinhole)
 
     def rays(self, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-        """Rays of these own x and y in the world's axes, at depth 1."""
+        """Return rays with these x and y of the camera frame in world axes, at depth 1."""
         turn = self._turn
         rx, ry, rz = (turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] for axis in range(3))
         return rx, ry, rz
 
     def directions(self, pixels: Pixels) -> tuple[Floats, Floats, Floats]:
-        """Return the same through pixels, of length 1."""
+        """Return unit vectors through pixels in world axes."""
         length = self.length[pixels]
         rx, ry, rz = self.rays(self.x[pixels], self.y[pixels])
         return rx / length, ry / length, rz / length
@@ -50,7 +51,7 @@ def _own_rays(pinhole: Pinhole) -> tuple[Floats, Floats, Floats]:
 
 
 def runs(pixels: NDArray[np.intp], most: int) -> list[NDArray[np.intp] | slice]:
-    """Rising numbers of pixels in parts of at most so many; a part without gaps is a slice, which costs no copies."""
+    """Return ascending pixel indices in parts of at most `most`. A contiguous part is a slice, which avoids copies."""
     parts: list[NDArray[np.intp] | slice] = []
     for start in range(0, len(pixels), most):
         part = pixels[start : start + most]

@@ -1,4 +1,4 @@
-"""Which triangles a camera may see, and where they lie in its picture."""
+"""Culling of triangles, and their projection to the image."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.render.model import MeshInstance
 
 _COARSE_PIXELS = 14.0
-"""A model whose diameter covers fewer pixels is drawn coarsely."""
+"""Minimum diameter of a model in pixels for its full geometry; smaller ones are drawn coarsely."""
 
 
 class Surfaces(NamedTuple):
-    """What N triangles are: normal in the world (3, N), albedo (3, N), finish (N,), label (N,) and what they emit
-    (3, N) [cd/m²]."""
+    """Properties of N triangles: normal in the world (3, N), albedo (3, N), finish (N,), label (N,), emission (3, N)
+    [cd/m²].
+    """
 
     normal: Floats
     albedo: Floats
@@ -28,8 +29,11 @@ class Surfaces(NamedTuple):
 
 
 class VisibleGeometry(NamedTuple):
-    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (3, N) of their corners; of each the row among the
-    M that were not cut (N,), and what those are: normal, albedo (M, 3), finish, label (M,) and glow (M, 3)."""
+    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (3, N) of their corners.
+
+    Each has a row (N,) among M triangles before clipping, with normal, albedo (M, 3), finish, label (M,) and glow (M,
+    3).
+    """
 
     x: Array
     y: Array
@@ -43,7 +47,7 @@ class VisibleGeometry(NamedTuple):
 
     @property
     def surfaces(self) -> Surfaces:
-        """Of all triangles."""
+        """Properties of all triangles."""
         rows = self.whose
         return Surfaces(
             np.ascontiguousarray(self.normal[rows].T),
@@ -64,7 +68,7 @@ class _Chosen(NamedTuple):
 
 
 def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole) -> VisibleGeometry:
-    """Return triangles that face the camera and may lie in its picture, cut off at its near plane."""
+    """Return triangles that face the camera and may be in its image, clipped at its near plane."""
     sides = _sides(pinhole)
     chosen = []
     for instance, pixels in _in_sight(instances, pose, pinhole, sides):
@@ -76,7 +80,7 @@ def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pi
     corners, normal, albedo, finish, label, glow = (
         np.concatenate([part[column] for part in chosen]) for column in range(len(_Chosen._fields))
     )
-    # Corner by corner, axis by axis: (3, 3, N).
+    # Corners and axes first: (3, 3, N).
     (x, y, depth), whose = _cut(np.ascontiguousarray(corners.transpose(2, 1, 0), dtype=np.float64), pinhole.near)
     nearness = 1.0 / depth
     x = pinhole.focal * x * nearness + pinhole.center_x
@@ -95,7 +99,7 @@ _NOTHING = _Chosen(
 
 
 def _sides(pinhole: Pinhole) -> Array:
-    """(5, 3) inward unit normals of the planes through the eye and the picture's edges, and of the near plane."""
+    """Return inward unit normals (5, 3) of the planes through the camera and the image edges, and of the near plane."""
     left, right = -pinhole.center_x / pinhole.focal, (pinhole.width - pinhole.center_x) / pinhole.focal
     top, bottom = -pinhole.center_y / pinhole.focal, (pinhole.height - pinhole.center_y) / pinhole.focal
     planes = np.array([(1, 0, -left), (-1, 0, right), (0, 1, -top), (0, -1, bottom), (0, 0, 1)], dtype=float)
@@ -106,7 +110,7 @@ def _sides(pinhole: Pinhole) -> Array:
 def _in_sight(
     instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole, sides: Array
 ) -> list[tuple[MeshInstance, float]]:
-    """Return the instances whose spheres reach into the picture, and how many pixels these cover across."""
+    """Return the instances whose spheres overlap the image, with their diameters in pixels."""
     if not instances:
         return []
     centers = (np.array([instance.center for instance in instances]) - pose[:3, 3]) @ pose[:3, :3]
@@ -122,20 +126,20 @@ def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array,
     model = instance.model
     to_camera = pose[:3, :3].T @ instance.rotation
     shift = pose[:3, :3].T @ (instance.position - pose[:3, 3])
-    eye = -(to_camera.T @ shift).astype(np.float32)
+    viewpoint = -(to_camera.T @ shift).astype(np.float32)
     if model.cells is not None:
         centers = model.cells.center @ to_camera.T + shift
         near = (centers @ sides.T >= -model.cells.radius[:, None]).all(axis=1)
         near &= centers[:, 2] - model.cells.radius <= pinhole.far
         rows = model.cells.rows(near)
-        rows = rows[model.normals[rows] @ eye > model.plane[rows]]
+        rows = rows[model.normals[rows] @ viewpoint > model.plane[rows]]
     elif instance.label >= 0 and pixels < _COARSE_PIXELS:
-        rows = model.coarse[model.normals[model.coarse] @ eye > model.plane[model.coarse]]
+        rows = model.coarse[model.normals[model.coarse] @ viewpoint > model.plane[model.coarse]]
     else:
-        rows = np.flatnonzero(model.normals @ eye > model.plane)
+        rows = np.flatnonzero(model.normals @ viewpoint > model.plane)
     if not len(rows):
         return None
-    # As one table of corners: numpy multiplies a stack of small matrices one by one.
+    # All corners in one table: numpy multiplies a stack of small matrices individually.
     corners = model.triangles[rows].reshape(-1, 3) @ to_camera.T.astype(np.float32) + shift.astype(np.float32)
     glow = np.zeros((len(rows), 3), dtype=np.float32)
     if instance.glow:
@@ -152,9 +156,9 @@ def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array,
 
 
 def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
-    """Triangles, (3, 3, N) by axis and corner, without what is nearer than the near plane, and the rows they had.
+    """Return triangles (3, 3, N) by axis and corner, clipped at the near plane, and their original rows.
 
-    Of one with one corner behind the plane two are left, of one with two corners behind it one.
+    A triangle with one corner behind the plane becomes two, one with two corners behind it becomes one.
     """
     behind = corners[2] < near
     count = behind[0].astype(np.int8) + behind[1] + behind[2]
@@ -179,7 +183,7 @@ def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _crossing(first: Array, second: Array, near: float) -> Array:
-    """Where edges between corners (3, N) meet the near plane."""
+    """Return the intersections of edges between corners (3, N) with the near plane."""
     share = (near - first[2]) / (second[2] - first[2])
     found: Array = first + share * (second - first)
     return found

@@ -1,4 +1,4 @@
-"""How surfaces answer light, by the name of their material."""
+"""Reflection properties of surfaces by material."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from eidrive_scenario.arrays import Floats
 
 
 class Finish(NamedTuple):
-    """mirror    share of light that it throws back like a mirror when seen from straight above
-    grain     how much its albedo varies from place to place
-    soaks     whether rain darkens it and lies on it
-    returns   luminance towards a lamp beside the camera for each lx that it gives there [cd/m²/lx]
+    """Finish of a surface.
+
+    mirror    share of light that is reflected specularly at normal incidence
+    grain     variation of its albedo between positions
+    soaks     whether rain darkens it and forms a film on it
+    returns   luminance towards a lamp beside the camera per illuminance [cd/m²/lx]
     """
 
     mirror: float = 0.0
@@ -35,8 +37,10 @@ FINISHES: dict[str, Finish] = {
     "sheeting": Finish(returns=50.0),
     "reflector": Finish(mirror=0.05, returns=2.0),
 }
-"""Clear coat and glass: 0.04 for one face of index 1.5 (Fresnel). Markings 150 mcd/m²/lx as EN 1436 class R3, and signs
-50 cd/m²/lx as EN 12899-1 class RA1 white ask."""
+"""Finishes: clear coat and glass have 0.04 for one face of index 1.5 (Fresnel).
+
+Markings have 150 mcd/m²/lx as EN 1436 class R3 requires, and signs 50 cd/m²/lx as EN 12899-1 class RA1 requires.
+"""
 
 _BY_MATERIAL = {
     "driving": "road", "junction": "road", "shoulder": "road", "parking": "road", "biking": "road", "asphalt": "road",
@@ -61,5 +65,5 @@ RETURNS: Floats = np.array([finish.returns for finish in FINISHES.values()], dty
 
 
 def finish_of(material: str) -> int:
-    """Return the number of a material's finish; matt where nothing is said."""
+    """Return the index of the finish of a material, matt by default."""
     return _NUMBERS[_BY_MATERIAL.get(material, "matt")]

@@ -1,4 +1,4 @@
-"""What is drawn: triangles with what they are made of, and where they stand."""
+"""Drawable models: triangles with materials, and their instances."""
 
 from __future__ import annotations
 
@@ -18,18 +18,22 @@ Light = tuple[float, float, float]
 """Red, green, blue of linear sRGB."""
 
 _COARSE_SHARE = 0.97
-"""Of a model's surface, the share that its coarse version keeps: the largest triangles."""
+"""Share of the surface of a model that its coarse version keeps: the largest triangles."""
 _CELL = 30.0
-"""Scenery is cut into squares of this side, of which those out of sight cost nothing [m]."""
+"""Side of the squares into which scenery is split [m]; squares out of sight are skipped."""
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Triangles (K, 3, 3) in a frame of their own [m], each flat and seen from its front. Each equals only itself.
+    """Triangles (K, 3, 3) in a local frame [m], flat and visible from the front. Models are equal only if identical.
 
-    normals (K, 3) unit, plane (K,) = normal · corner, albedo (K, 3) linear, finish (K,) index of FINISHES,
-    material (K,) index of `materials`, coarse indices of the triangles that matter from afar; center (3,), half (3,)
-    extents and radius around it
+    normals   (K, 3) unit vectors
+    plane     (K,) = normal · corner
+    albedo    (K, 3) linear
+    finish    (K,) index of FINISHES
+    material  (K,) index of `materials`
+    coarse    indices of the triangles of the coarse version
+    center    (3,), half (3,) and radius: center, half extents and enclosing radius
     """
 
     triangles: Floats
@@ -48,15 +52,14 @@ class Model:
 
     @cached_property
     def is_coarse(self) -> NDArray[np.bool_]:
-        """(K,) whether a triangle is among the coarse ones."""
+        """Whether each triangle belongs to the coarse version (K,)."""
         marks = np.zeros(len(self.triangles), dtype=bool)
         marks[self.coarse] = True
         return marks
 
 
 class Cells(NamedTuple):
-    """The squares of a grid on the ground by which a large model is sorted: the first triangle of each, their numbers,
-    and the spheres (center, radius) around them."""
+    """Grid cells by which a large model is sorted: first triangles, counts, and spheres (center, radius)."""
 
     first: Integers
     counts: Integers
@@ -64,7 +67,7 @@ class Cells(NamedTuple):
     radius: Array
 
     def rows(self, chosen: NDArray[np.bool_]) -> Integers:
-        """Return the triangles of the chosen cells."""
+        """Return the triangles of the selected cells."""
         first, count = self.first[chosen], self.counts[chosen]
         ends = np.cumsum(count)
         found: Integers = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
@@ -73,9 +76,9 @@ class Cells(NamedTuple):
 
 @dataclass(frozen=True)
 class MeshInstance:
-    """A model somewhere: rotation (3, 3) and position (3,) to the world, label in the segmentation.
+    """Instance of a model: rotation (3, 3) and position (3,) in the world, label in the segmentation.
 
-    glow   what its materials emit [cd/m²], by material
+    glow  emission by material [cd/m²]
     """
 
     model: Model
@@ -86,19 +89,19 @@ class MeshInstance:
 
     @cached_property
     def center(self) -> Array:
-        """(3,) of the sphere of radius `model.radius` around it, in the world [m]."""
+        """Center (3,) of the sphere of radius `model.radius` in the world [m]."""
         found: Array = self.rotation @ self.model.center + self.position
         return found
 
 
 def linear(color: Color) -> Light:
-    """Return a color as screens show it, as a share of reflected light: the inverse of sRGB's curve (IEC 61966-2-1)."""
+    """Return the linear color of a display color: inverse of the curve of sRGB (IEC 61966-2-1)."""
     red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return red, green, blue
 
 
 def model(mesh: Mapping[str, Array], colors: Mapping[str, Color]) -> Model:
-    """Return a model of triangles (K, 3, 3) by material; colors not given are those of the palette."""
+    """Return a model of triangles (K, 3, 3) by material; the palette has the colors that are not given."""
     triangles, albedo, finish, material = [], [], [], []
     for number, (name, solid) in enumerate(mesh.items()):
         color = linear(colors[name] if name in colors else MATERIALS[name])
@@ -121,7 +124,7 @@ def model(mesh: Mapping[str, Array], colors: Mapping[str, Color]) -> Model:
 
 
 def merged(models: Iterable[Model]) -> Model:
-    """Return several models in one frame as one; materials of one name count as one."""
+    """Return several models in one frame as one model, with materials merged by name."""
     parts = list(models)
     names = tuple(dict.fromkeys(name for part in parts for name in part.materials))
     numbers = [np.array([names.index(name) for name in part.materials], dtype=np.int16) for part in parts]
@@ -135,30 +138,30 @@ def merged(models: Iterable[Model]) -> Model:
     )
 
 
-def gridded(whole: Model) -> Model:
-    """Return the same model, cut along a grid, so that what is out of sight costs little."""
-    squares = np.floor(whole.triangles.mean(axis=1)[:, :2] / _CELL).astype(np.int64)
+def gridded(source: Model) -> Model:
+    """Return the model split by a grid, so that invisible parts are skipped."""
+    squares = np.floor(source.triangles.mean(axis=1)[:, :2] / _CELL).astype(np.int64)
     _, cell = np.unique(squares, axis=0, return_inverse=True)
     cell = cell.ravel()
     order = np.argsort(cell, kind="stable")
     count = np.bincount(cell)
     first = np.cumsum(count) - count
-    corners = whole.triangles[order].astype(np.float64)
+    corners = source.triangles[order].astype(np.float64)
     low = np.minimum.reduceat(corners.min(axis=1), first, axis=0)
     high = np.maximum.reduceat(corners.max(axis=1), first, axis=0)
     sorted_one = _model(
-        whole.triangles[order],
-        whole.normals[order],
-        whole.albedo[order],
-        whole.finish[order],
-        whole.material[order],
-        whole.materials,
+        source.triangles[order],
+        source.normals[order],
+        source.albedo[order],
+        source.finish[order],
+        source.material[order],
+        source.materials,
     )
     return replace(sorted_one, cells=Cells(first, count, (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2))
 
 
 def placed(part: Model, rotation: Array, position: Array) -> Model:
-    """Return the model in the frame in which it stands at this rotation and position."""
+    """Return the model rotated and translated."""
     turn = rotation.T
     return _model(
         (part.triangles.astype(np.float64) @ turn + position).astype(np.float32),

@@ -1,4 +1,4 @@
-"""Triangles to pixels: large ones as blocks of rows, all others at once; the nearest of each pixel's fragments."""
+"""Rasterization: large triangles as blocks of rows, all others jointly; the nearest fragment of each pixel wins."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from eidrive_scenario.arrays import Array, Floats, Integers
 _SHIFT = np.uint64(32)
 _LOW = np.uint64(0xFFFFFFFF)
 _LARGE = 8000.0
-"""Triangles of so many pixels are filled row by row as blocks, which pays from about there on."""
+"""Minimum number of pixels of triangles that are filled row by row as blocks, which is then faster."""
 _FULL = 0.15
-"""And of at least this share of the block that holds them."""
+"""Minimum share of the bounding block that such triangles cover."""
 _LEAST = 1e-30
-"""Nearness of what is infinitely far; 0 is nothing."""
+"""Nearness of infinite distance; 0 means no triangle."""
 
 
 class Cover(NamedTuple):
-    """What each pixel of a window of the picture shows, from line `top` and column `left` on.
+    """Visible triangles in a window of the image from line `top` and column `left` on.
 
-    triangle (h, w) numbers, -1 if there is none; nearness (h, w) of it there, 0 where there is none
+    triangle  (h, w) index, -1 without a triangle
+    nearness  (h, w) at the pixel, 0 without a triangle
     """
 
     triangle: NDArray[np.int32]
@@ -32,13 +33,13 @@ class Cover(NamedTuple):
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """Lines and columns of the picture."""
+        """Lines and columns in the image."""
         height, width = self.triangle.shape
         return slice(self.top, self.top + height), slice(self.left, self.left + width)
 
 
 class _Corners(NamedTuple):
-    """Of N triangles, from the uppermost corner to the lowest."""
+    """Corners of N triangles, from the uppermost to the lowest."""
 
     x: Array
     y: Array
@@ -46,7 +47,7 @@ class _Corners(NamedTuple):
 
 
 class _Spans(NamedTuple):
-    """Rows of triangles, one after the other: whose, at which line, and the columns from left up to right."""
+    """Rows of triangles in sequence: triangle, line, and columns from left up to right."""
 
     whose: Integers
     line: Integers
@@ -55,11 +56,13 @@ class _Spans(NamedTuple):
 
 
 def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
-    """Cover a picture with triangles, given by x, y [px] and nearness (3, N) of their corners.
+    """Rasterize triangles given by x, y [px] and nearness (3, N) of their corners.
 
-    A pixel shows a triangle that holds its center, the one of greatest nearness there. Nearness must be positive and
-    linear across the picture: 1 / depth in perspective. Of equals the later one wins. A center on an edge belongs to
-    the triangle right of or below that edge, so that neighbors neither overlap nor leave gaps.
+    A pixel shows the triangle of maximum nearness among those that contain its center. Nearness must be positive and
+    linear
+    in the image: 1 / depth in perspective. In a tie the later triangle wins. A center on an edge belongs to the
+    triangle
+    right of or below that edge, so that neighbors neither overlap nor leave gaps.
     """
     found = rasterize_reference(x, y, nearness, width, height)
     if found.triangle.shape == (height, width):
@@ -70,8 +73,10 @@ def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> C
 
 
 def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
-    """The same for the part of the picture that holds all of them. What one triangle shows does not depend on others
-    but for what lies before it."""
+    """Return the same for the bounding window of all triangles.
+
+    The result of one triangle does not depend on others except by occlusion.
+    """
     rows = _rows(x, y, nearness, width, height)
     if rows is None:
         return Cover(np.full((0, 0), -1, dtype=np.int32), np.zeros((0, 0), dtype=np.float32))
@@ -88,8 +93,9 @@ def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height:
 
 
 def greatest(x: Array, y: Array, nearness: Array, width: int, height: int) -> tuple[Floats, int, int]:
-    """The nearness alone, 0 where nothing is, of the part of the picture that holds all triangles, and its first line
-    and column."""
+    """Return the nearness in the bounding window of all triangles, 0 without a triangle, and its first line and
+    column.
+    """
     rows = _rows(x, y, nearness, width, height)
     if rows is None:
         return np.zeros((0, 0), dtype=np.float32), 0, 0
@@ -104,7 +110,7 @@ def greatest(x: Array, y: Array, nearness: Array, width: int, height: int) -> tu
 
 
 class _Large(NamedTuple):
-    """One triangle: its number, its rows, and how nearness grows along them; level (M,) is that at column 0."""
+    """One triangle: index, rows, and the slope of nearness along them; level (M,) is the value at column 0."""
 
     number: int
     line: Integers
@@ -126,7 +132,7 @@ class _Small(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """All rows that hold centers of pixels, and the part of the picture in which they lie."""
+    """All rows that contain pixel centers, and their bounding window."""
 
     large: list[_Large]
     small: _Small
@@ -135,8 +141,8 @@ class _Rows(NamedTuple):
 
 
 def _rows(x: Array, y: Array, nearness: Array, width: int, height: int) -> _Rows | None:
-    """Of triangles with corners (3, N); None if there are none."""
-    # Over so short an axis, comparing rows is many times as fast as a reduction.
+    """Return the rows of triangles with corners (3, N); None if there are none."""
+    # On such a short axis, comparisons of rows are many times faster than a reduction.
     low, high = np.minimum(np.minimum(y[0], y[1]), y[2]), np.maximum(np.maximum(y[0], y[1]), y[2])
     left_end, right_end = np.minimum(np.minimum(x[0], x[1]), x[2]), np.maximum(np.maximum(x[0], x[1]), x[2])
     first = np.clip(np.ceil(low - 0.5), 0, height).astype(np.int64)
@@ -171,7 +177,7 @@ def _rows(x: Array, y: Array, nearness: Array, width: int, height: int) -> _Rows
 
 
 def _from_top(corners: Array) -> _Corners:
-    """Return (3, 3, N) x, y and nearness of corners in any order: the uppermost, the middle and the lowest."""
+    """Return x, y and nearness (3, 3, N) of corners in any order as uppermost, middle and lowest."""
     for one, two in ((0, 1), (1, 2), (0, 1)):
         wrong = np.flatnonzero(corners[1, two] < corners[1, one])
         corners[:, one, wrong], corners[:, two, wrong] = corners[:, two, wrong], corners[:, one, wrong]
@@ -179,7 +185,7 @@ def _from_top(corners: Array) -> _Corners:
 
 
 def _slopes(corners: _Corners) -> tuple[Array, Array]:
-    """How nearness grows per pixel rightwards and downwards (N,)."""
+    """Return the slopes of nearness per pixel to the right and downwards (N,)."""
     (x0, x1, x2), (y0, y1, y2), (n0, n1, n2) = corners
     with np.errstate(divide="ignore", invalid="ignore"):
         twice_area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
@@ -189,7 +195,7 @@ def _slopes(corners: _Corners) -> tuple[Array, Array]:
 
 
 def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _Spans:
-    """Return the rows of all triangles that hold centers of pixels."""
+    """Return the rows of all triangles that contain pixel centers."""
     (x0, x1, x2), (y0, y1, y2), _ = corners
     counts = last - first
     whose = np.repeat(np.arange(len(counts)), counts)
@@ -207,10 +213,10 @@ def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _S
 
 
 def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Floats, NDArray[np.bool_]]:
-    """Return the lines and columns that a triangle spans, nearness there, and which of it lies inside."""
+    """Return lines and columns of the bounding block of a triangle, its nearness, and its mask."""
     first, last = int(one.line[0]), int(one.line[-1]) + 1
     begin, end = int(one.left.min()), int(one.right.max())
-    # Where a tip is thinner than a pixel, some of its lines hold no center of one.
+    # A tip that is thinner than a pixel has lines without pixel centers.
     rows = one.line - first
     levels = np.zeros(last - first)
     levels[rows] = one.level
@@ -226,7 +232,7 @@ def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Float
 
 
 def _fragments(few: _Small, top: int, left: int, width: int) -> tuple[Integers, Floats]:
-    """Return the pixels of a window of this width in which rows lie, one after the other, and nearness there."""
+    """Return the pixels of rows in a window of this width in sequence, with their nearness."""
     lengths = few.right - few.left
     step = np.arange(int(lengths.sum())) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     value = np.repeat(few.slope, lengths)
@@ -238,7 +244,7 @@ def _fragments(few: _Small, top: int, left: int, width: int) -> tuple[Integers, 
 
 
 def _scatter(triangle: NDArray[np.int32], near: Floats, few: _Small, top: int, left: int) -> None:
-    """Draw the rows of many triangles over what is there, all fragments at once."""
+    """Draw the rows of many triangles over existing ones, all fragments jointly."""
     first = int(few.line.min())
     rows = slice(first - top, int(few.line.max()) + 1 - top)
     triangle, near = triangle[rows], near[rows]

@@ -1,4 +1,4 @@
-"""The light that surfaces send to the camera, pixel by pixel: what one pixel shows does not depend on others."""
+"""Luminance of surfaces towards the camera; each pixel is independent of others."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from eidrive_scenario.world.render.surfaces import variation
 from eidrive_scenario.world.weather import Weather
 
 _STREET_LAMP = np.array([1.08, 1.0, 0.78])
-"""Color of lamps along streets, linear sRGB."""
+"""Color of street lamps, linear sRGB."""
 _GLINT = 350.0
-"""Exponent of the sun's image in a car's paint: a spot of some four degrees."""
+"""Exponent of the reflection of the sun in car paint: a spot of some four degrees."""
 
 
 class Points(NamedTuple):
-    """What pixels (n,) show: their triangles, depth [m], places relative to the camera [m] and distance from it [m]."""
+    """Points in pixels (n,): triangles, depth [m], positions relative to the camera [m] and distance from it [m]."""
 
     triangle: NDArray[np.int32]
     depth: Floats
@@ -39,17 +39,19 @@ class Points(NamedTuple):
     distance: Floats
 
 
-def points_at(pixels: Pixels, cover: Cover, eye: CameraView) -> Points:
-    """What pixels show that show something."""
+def points_at(pixels: Pixels, cover: Cover, view: CameraView) -> Points:
+    """Return the points of pixels with a triangle."""
     far = np.float32(1.0) / cover.nearness.reshape(-1)[pixels]
-    rx, ry, rz = eye.rays(eye.x[pixels], eye.y[pixels])
+    rx, ry, rz = view.rays(view.x[pixels], view.y[pixels])
     triangle = cover.triangle.reshape(-1)[pixels]
-    return Points(triangle, far, rx * far, ry * far, rz * far, eye.length[pixels] * far)
+    return Points(triangle, far, rx * far, ry * far, rz * far, view.length[pixels] * far)
 
 
 class Lit(NamedTuple):
-    """N triangles in their light: luminance (3, N) under the sky and lamps overhead, what the sun adds where it shines
-    (None: nowhere), both together; and whether they look up (N,)."""
+    """Lighting of N triangles: luminance (3, N) by sky and street lamps, additional luminance by the sun (None: no
+    sun), sum
+    of both, and whether they face upwards (N,).
+    """
 
     surfaces: Surfaces
     steady: Floats
@@ -59,7 +61,7 @@ class Lit(NamedTuple):
 
 
 def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
-    """What the light does to whole triangles."""
+    """Return the lighting of whole triangles."""
     nx, ny, nz = surfaces.normal
     reflected = surfaces.albedo * np.float32(1.0 / math.pi)
     up = np.float32(0.5) + np.float32(0.5) * nz
@@ -106,10 +108,11 @@ def shade(
     lamplight: Lamplight | None,
     open_sky: Floats,
 ) -> Floats:
-    """Return (3, n) luminance of the points as seen from near [cd/m²]: sun and sky, lamps, and what shines itself.
+    """Return the luminance (3, n) of points at close distance [cd/m²]: sun and sky, lamps, and emission.
 
-    `place` is the camera's; lamplight and open_sky (n,), the share of the sky's light that bodies near by leave to
-    them, are those of the points.
+    `place` is the position of the camera. lamplight and open_sky (n,) are those of the points; open_sky is the share of
+    sky
+    light that nearby bodies leave.
     """
     triangle = points.triangle
     finish = among.surfaces.finish[triangle]
@@ -136,7 +139,7 @@ def shade(
 
 
 def _add_grain(luminance: Floats, points: Points, finish: NDArray[np.uint8], place: Array, weather: Weather) -> None:
-    """Road and soil vary from place to place, and are darker where they are wet."""
+    """Add spatial variation of road and soil, and darken wet parts."""
     grain = GRAIN[finish]
     grained = np.flatnonzero(grain)
     if not len(grained):
@@ -166,7 +169,7 @@ def _add_mirrors(
     lit: Floats | None,
     finish: NDArray[np.uint8],
 ) -> None:
-    """Sky and sun in paint, glass and metal."""
+    """Add reflections of sky and sun in paint, glass and metal."""
     rows = np.flatnonzero(MIRROR[finish])
     if not len(rows):
         return
@@ -196,7 +199,7 @@ def _add_mirrors(
             if lit is not None:
                 lobe *= lit[rows[glinting]]
             seen[:, glinting] += lobe * _column(light.sun)
-    # A mirror-like surface shows less of its own color, as what is thrown back does not get in.
+    # A specular surface shows less of its color, as reflected light does not enter it.
     own = luminance[:, rows]
     seen -= own * np.minimum(base, np.float32(0.5))
     seen *= share
@@ -205,7 +208,7 @@ def _add_mirrors(
 
 
 _DULL = 0.93
-"""Cosine of the angle to the sun's image beyond which it adds less than 1e-11 of its peak."""
+"""Cosine of the angle to the reflected sun beyond which it adds less than 1e-11 of its peak."""
 
 
 def _column(color: Array) -> Floats:
@@ -217,7 +220,7 @@ _ROW = 256
 
 
 def sampled(sky: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
-    """Return the sky (3, n) in directions (n,), which OpenCV wants as a picture."""
+    """Return the sky (3, n) in directions (n,), which OpenCV requires as an image."""
     count = len(x)
     shape = (-(-count // _ROW), _ROW)
     grids = []

@@ -1,4 +1,4 @@
-"""Noise tables by which surfaces vary from place to place."""
+"""Noise tables for the spatial variation of surfaces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SIZE = 512
 
 
 def _blurred(draws: Floats, deviation: float) -> Floats:
-    """Return a table (SIZE, SIZE) that repeats, blurred by a Gaussian of this deviation without a seam."""
+    """Return a periodic table (SIZE, SIZE) blurred by a Gaussian of this deviation without a seam."""
     margin = int(np.ceil(4.5 * deviation)) + 1
     blurred = np.asarray(cv2.GaussianBlur(np.pad(draws, margin, mode="wrap"), (0, 0), deviation), dtype=np.float32)
     return blurred[margin:-margin, margin:-margin]
@@ -22,7 +22,7 @@ def _blurred(draws: Floats, deviation: float) -> Floats:
 
 @lru_cache(maxsize=1)
 def patches() -> Floats:
-    """Return (SIZE, SIZE) smooth noise of mean 0 and deviation 1 that repeats without a seam."""
+    """Return smooth periodic noise (SIZE, SIZE) of mean 0 and deviation 1 without a seam."""
     draws = generator(0, "surfaces").standard_normal((SIZE, SIZE), dtype=np.float32)
     total = np.zeros((SIZE, SIZE), dtype=np.float32)
     for width, weight in ((3, 0.5), (9, 1.0), (27, 1.6)):
@@ -34,7 +34,7 @@ def patches() -> Floats:
 
 @lru_cache(maxsize=1)
 def grit() -> Floats:
-    """Return (SIZE, SIZE) noise of mean 0 and deviation 1 from one place to the next."""
+    """Return uncorrelated noise (SIZE, SIZE) of mean 0 and deviation 1."""
     draws = generator(0, "grit").standard_normal((SIZE, SIZE), dtype=np.float32)
     layer = _blurred(draws, 0.7)
     found: Floats = (layer / layer.std()).astype(np.float32)
@@ -43,7 +43,7 @@ def grit() -> Floats:
 
 @lru_cache(maxsize=1)
 def hollows() -> Floats:
-    """Return (SIZE, SIZE) smooth noise of mean 0 and deviation 1, of greater extent than `patches`."""
+    """Return smooth noise (SIZE, SIZE) of mean 0 and deviation 1 with larger structures than `patches`."""
     draws = generator(0, "hollows").standard_normal((SIZE, SIZE), dtype=np.float32)
     total = np.zeros((SIZE, SIZE), dtype=np.float32)
     for width, weight in ((8.0, 0.35), (22.0, 1.0)):
@@ -54,8 +54,9 @@ def hollows() -> Floats:
 
 
 def variation(x: Floats, y: Floats, distance: Floats) -> Floats:
-    """How much lighter or darker a surface is at places in the world [m], about ±1: fine grit near the camera, patches
-    everywhere."""
+    """Return the relative variation of a surface at world positions [m], about ±1: grit near the camera, patches
+    everywhere.
+    """
     found: Floats = _looked_up(patches(), x, y, 4.0)
     found *= np.float32(0.35)
     fine = _looked_up(grit(), x, y, 24.0)
@@ -65,7 +66,7 @@ def variation(x: Floats, y: Floats, distance: Floats) -> Floats:
 
 
 def _looked_up(table: Floats, x: Floats, y: Floats, per_meter: float) -> Floats:
-    """Return the values of a table that repeats, at places [m]."""
+    """Return the values of a periodic table at positions [m]."""
     mask = np.int32(SIZE - 1)
     at = (y * np.float32(per_meter)).astype(np.int32)
     at &= mask

@@ -1,4 +1,4 @@
-"""From luminance to the numbers of a picture: a meter, and a tone curve."""
+"""Conversion of luminance to pixel values: exposure metering and a tone curve."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Floats
 
 LUMA: Floats = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
-"""Luminance of linear sRGB (IEC 61966-2-1)."""
+"""Luminance weights of linear sRGB (IEC 61966-2-1)."""
 HEADROOM = 4.0
-"""Luminance that comes out as white, in units of that which comes out as middle light gray before the shoulder."""
+"""Luminance of white in units of the luminance that becomes middle light gray before the shoulder."""
 BRIGHTNESS = 0.85
-"""Share of the published key, which lets white road markings keep below white."""
+"""Factor of the published key, which keeps white road markings below white."""
 DARKEST = 0.03
 BLACK = 0.02
-"""What is darker does not ask for a longer exposure [cd/m²]."""
+"""Minimum luminance that affects the exposure [cd/m²]."""
 _STEPS = 8192
 
 
 def white_level(luminance: Floats) -> float:
-    """Return the luminance of a picture (H, W, 3) that shall come out as white [cd/m²].
+    """Return the luminance of an image (H, W, 3) that becomes white [cd/m²].
 
-    The mean of log luminance goes to a key that falls with darkness, so that a night looks like one:
+    The mean of log luminance is mapped to a key that decreases with darkness, so that night images are dark:
     1.03 - 2 / (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
     """
     sampled = np.maximum(_luma(np.ascontiguousarray(luminance[::2, ::2])), np.float32(BLACK))
@@ -34,21 +34,23 @@ def white_level(luminance: Floats) -> float:
 
 
 def _luma(luminance: Floats) -> Floats:
-    """Luminance (H, W) of a picture (H, W, 3)."""
+    """Return the luminance (H, W) of an image (H, W, 3)."""
     red, green, blue = (np.float32(part) for part in LUMA)
     found: Floats = luminance[..., 0] * red + luminance[..., 1] * green + luminance[..., 2] * blue
     return found
 
 
 def tone_map(signal: Floats) -> NDArray[np.uint8]:
-    """Return the numbers of a picture whose light is given as shares of white; what is brighter is white."""
+    """Return the pixel values of an image given as shares of white; higher values are clipped."""
     steps: Floats = np.clip(signal, np.float32(0.0), np.float32(1.0))
     steps *= np.float32(_STEPS - 1)
     return _TONES.take(steps.astype(np.uint16))
 
 
 def _tone_curve() -> NDArray[np.uint8]:
-    """A shoulder for highlights (Reinhard et al., Photographic tone reproduction, 2002, eq. 4), then sRGB's curve."""
+    """Return a shoulder for highlights (Reinhard et al., Photographic tone reproduction, 2002, eq. 4) and the sRGB
+    curve.
+    """
     scaled = np.linspace(0.0, HEADROOM, _STEPS)
     tone = scaled * (1.0 + scaled / HEADROOM**2) / (1.0 + scaled)
     encoded = np.where(tone <= 0.0031308, 12.92 * tone, 1.055 * tone ** (1 / 2.4) - 0.055)

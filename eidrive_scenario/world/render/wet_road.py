@@ -1,4 +1,4 @@
-"""The mirror image on a wet road, made from the picture itself."""
+"""Reflections on a wet road, computed from the image."""
 
 from __future__ import annotations
 
@@ -16,35 +16,37 @@ from eidrive_scenario.world.render.rasterization import Cover
 from eidrive_scenario.world.render.surfaces import hollows
 
 WATER = 0.02
-"""Share of light that water throws back when seen from straight above (Fresnel, index 1.33)."""
+"""Share of light that water reflects at normal incidence (Fresnel, index 1.33)."""
 DARKENING = 0.45
-"""Of the light that a soaked road returns, this share is lost: its pores hold water (Lekner and Dorf 1988)."""
+"""Share of reflected light that a soaked road loses, as its pores contain water (Lekner and Dorf 1988)."""
 _HEIGHT = 0.15
-"""What stands higher above the road has a mirror image [m]."""
+"""Minimum height above the road of reflected objects [m]."""
 
 
 def add_reflections(
-    planes: Floats, on_road: NDArray[np.intp], cover: Cover, open_sky: Floats, dome: Floats, eye: CameraView,
+    planes: Floats, on_road: NDArray[np.intp], cover: Cover, open_sky: Floats, dome: Floats, view: CameraView,
     wetness: float, ground: float,
 ) -> None:  # fmt: skip
-    """Add to luminance (3, P) of all pixels what a wet road mirrors in those that show one, from a picture of half as
-    many lines and columns; `ground` is the height of the road below the camera [m]."""
+    """Add reflections of a wet road to the luminance (3, P) of pixels, from an image of half the resolution.
+
+    `ground` is the height of the road below the camera [m].
+    """
     if not len(on_road):
         return
-    numbers = np.arange(planes.shape[1]).reshape(eye.shape)[::2, ::2]
-    small = replace(eye.pinhole.finer(0.5), width=numbers.shape[1], height=numbers.shape[0])
-    x, y, z = (part.reshape(numbers.shape) for part in eye.directions(numbers.ravel()))
+    numbers = np.arange(planes.shape[1]).reshape(view.shape)[::2, ::2]
+    small = replace(view.pinhole.finer(0.5), width=numbers.shape[1], height=numbers.shape[0])
+    x, y, z = (part.reshape(numbers.shape) for part in view.directions(numbers.ravel()))
     sky = sample(dome, x, y, np.abs(z))
     some = numbers[cover.triangle[::2, ::2] >= 0]
     far = np.float32(1.0) / cover.nearness.ravel()[some]
-    rx, ry, rz = eye.rays(eye.x[some], eye.y[some])
+    rx, ry, rz = view.rays(view.x[some], view.y[some])
     places = (rx * far, ry * far, rz * far)
-    image = mirrored(planes[:, some], places, sky, ground - float(eye.place[2]), eye.pose, small)
-    image = np.asarray(cv2.resize(blurred(image), eye.shape[::-1], interpolation=cv2.INTER_LINEAR))
-    rx, ry, rz = eye.rays(eye.x[on_road], eye.y[on_road])
+    image = mirrored(planes[:, some], places, sky, ground - float(view.place[2]), view.pose, small)
+    image = np.asarray(cv2.resize(blurred(image), view.shape[::-1], interpolation=cv2.INTER_LINEAR))
+    rx, ry, rz = view.rays(view.x[on_road], view.y[on_road])
     far = np.float32(1.0) / cover.nearness.ravel()[on_road]
-    share = reflectance(np.abs(rz / eye.length[on_road]))
-    place = (eye.place % 4096.0).astype(np.float32)
+    share = reflectance(np.abs(rz / view.length[on_road]))
+    place = (view.place % 4096.0).astype(np.float32)
     share *= puddles(rx * far + place[0], ry * far + place[1], wetness, hollows())
     dim = open_sky.ravel()[on_road]
     for own, plane in zip(planes, cv2.split(image), strict=True):
@@ -55,10 +57,11 @@ def add_reflections(
 def mirrored(
     light: Floats, places: tuple[Floats, Floats, Floats], sky: Floats, ground: float, pose: Array, pinhole: Pinhole
 ) -> Floats:
-    """Return (H, W, 3) what a mirror in the plane z = ground [m, relative to the camera] would show in each pixel.
+    """Return the image (H, W, 3) of a mirror in the plane z = ground [m, relative to the camera].
 
-    light (3, n) of the points that the picture shows, at places x, y, z (n,) relative to the camera; sky (H, W, 3) is
-    what the mirror shows where it has nothing else. Only what the picture shows is mirrored.
+    light (3, n) of the visible points at positions x, y, z (n,) relative to the camera. sky (H, W, 3) is used for
+    pixels
+    without a reflected point. Only visible points are reflected.
     """
     standing = np.flatnonzero(places[2] > ground + _HEIGHT)
     if not len(standing):
@@ -84,7 +87,7 @@ def mirrored(
 
 
 def blurred(image: Floats) -> Floats:
-    """Return the same picture (H, W, 3) in a rough surface: drawn out up and down, a little sideways."""
+    """Return the image (H, W, 3) as reflected by a rough surface: blurred mainly vertically."""
     height, width = image.shape[:2]
     tall = max(3, round(height / 24)) | 1
     wide = max(1, round(width / 160)) | 1
@@ -92,13 +95,15 @@ def blurred(image: Floats) -> Floats:
 
 
 def reflectance(cosine: Floats) -> Floats:
-    """Of water, by the cosine of the angle to the upright (Schlick 1994)."""
+    """Return the reflectance of water by the cosine of the angle of incidence (Schlick 1994)."""
     found: Floats = np.float32(WATER) + np.float32(1.0 - WATER) * (np.float32(1.0) - cosine) ** 5
     return found
 
 
 def puddles(x: Floats, y: Floats, wetness: float, table: NDArray[np.float32]) -> Floats:
-    """How smooth the water lies at places in the world [m], in [0, 1]: a film on a moist road, puddles on a wet one."""
+    """Return the smoothness of the water at world positions [m] in [0, 1]: a film on a moist road, puddles on a wet
+    one.
+    """
     mask = table.shape[0] - 1
     noise = table[(y * 12.0).astype(np.int64) & mask, (x * 12.0).astype(np.int64) & mask]
     film = np.float32(0.25 * min(2.0 * wetness, 1.0))

@@ -1,4 +1,4 @@
-"""What cameras see beside the roads: furniture, signs, and traffic lights with their lamps."""
+"""Visible objects beside the roads: road objects, signs, and traffic lights with lamps."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from eidrive_scenario.world.render.model import Light, MeshInstance, Model, grid
 from eidrive_scenario.world.road_objects import RoadObjectBody, SignalHead
 
 FIRST_LABEL = -10
-"""In a segmentation the first signal's head has this label, the next one -11, and so on."""
+"""Segmentation label of the head of the first signal; the next one has -11, and so on."""
 IN_SIGHT = 200.0
-"""Heads of signals further away than this are not drawn [m]."""
+"""Maximum distance of drawn signal heads [m]."""
 LAMPS: Mapping[str, Light] = {
     RED: (8_000.0, 120.0, 60.0),
     YELLOW: (8_000.0, 3_400.0, 80.0),
     GREEN: (160.0, 8_000.0, 2_800.0),
 }
-"""Luminance of lit lamps [cd/m²]: 250 cd, as EN 12368 asks of class A 3/1, over a lens of 200 mm."""
+"""Luminance of lit lamps [cd/m²]: 250 cd, as EN 12368 requires of class A 3/1, over a lens of 200 mm."""
 UNLIT = {RED: (0.20, 0.03, 0.03), YELLOW: (0.20, 0.15, 0.03), GREEN: (0.03, 0.16, 0.10)}
 
 
 class Roadside:
-    """The models of one road network's furniture and signals."""
+    """Meshes of the road objects and signals of one road network."""
 
     def __init__(self, pieces: Sequence[RoadObjectBody], heads: Sequence[SignalHead]) -> None:
         self._still: Model | None = _standing(pieces)
@@ -38,10 +38,10 @@ class Roadside:
         self._turns = [rotation_matrix(head.pose.h, 0.0, 0.0) for head in heads]
         self._places = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
 
-    def instances(self, eye: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
-        """Return all that may be in sight of a camera at `eye` (3,), with the signals in their states at `time` [s]."""
+    def instances(self, viewpoint: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
+        """Return all objects within sight of a camera at `viewpoint` (3,), with the signal states at `time` [s]."""
         found = [] if self._still is None else [MeshInstance(self._still, np.eye(3), np.zeros(3))]
-        near = np.flatnonzero(np.linalg.norm(self._places - eye, axis=1) < IN_SIGHT)
+        near = np.flatnonzero(np.linalg.norm(self._places - viewpoint, axis=1) < IN_SIGHT)
         for row in near.tolist():
             glow = _glow(self._heads[row], states.get(self._heads[row].signal.id), time)
             label = FIRST_LABEL - row
@@ -50,7 +50,7 @@ class Roadside:
 
 
 def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:
-    """Return all furniture in one model; equal pieces are placed together."""
+    """Return all road objects as one model; equal objects are placed together."""
     equal: dict[tuple[str, str, float, float, float, float], list[RoadObjectBody]] = {}
     for piece in pieces:
         key = (piece.kind, piece.name, piece.length, piece.width, piece.height, piece.radius)
@@ -66,7 +66,7 @@ def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:
 
 
 def _placed(part: Array, poses: Array) -> Array:
-    """Return (N K, 3, 3) triangles (K, 3, 3) at poses (N, 6), upright."""
+    """Return triangles (N K, 3, 3) of a mesh (K, 3, 3) at upright poses (N, 6)."""
     cos, sin = np.cos(poses[:, 3])[:, None, None], np.sin(poses[:, 3])[:, None, None]
     x, y, z = part[None, ..., 0], part[None, ..., 1], part[None, ..., 2]
     px, py, pz = (poses[:, axis][:, None, None] for axis in range(3))
@@ -83,7 +83,7 @@ def _head_model(head: SignalHead) -> Model:
 
 
 def _glow(head: SignalHead, state: str | None, time: float) -> Mapping[str, Light]:
-    """What the lamps of a light emit."""
+    """Return the luminance of the lamps of a traffic light."""
     colors = lamp_colors(head.signal)
     if state is None or not colors:
         return {}

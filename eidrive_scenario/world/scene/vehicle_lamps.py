@@ -1,4 +1,4 @@
-"""The lamps of vehicles: which of them shine, how brightly, and what they throw on the road."""
+"""Lamps of vehicles: state, brightness and beams."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from eidrive_scenario.world.weather import Weather
 
 HEADLIGHT: Light = (6_500.0, 6_000.0, 4_900.0)
 TAILLIGHT: Light = (300.0, 0.8, 0.5)
-"""Luminance of what shines at night [cd/m²]."""
+"""Luminance of lamps at night [cd/m²]."""
 
 _HIGH: Light = (26_000.0, 24_000.0, 20_000.0)
 _DAY: Light = (9_000.0, 9_200.0, 9_600.0)
@@ -22,7 +22,9 @@ _WHITE: Light = (7_000.0, 6_800.0, 6_200.0)
 _PLATE: Light = (28.0, 26.0, 22.0)
 _BEACON: Light = (150.0, 700.0, 11_000.0)
 _RED_BEACON: Light = (11_000.0, 20.0, 12.0)
-"""Luminous intensities between the bounds of UN Regulations 7, 6, 38, 23, 87 and 65 over the areas of our lamps."""
+"""Luminous intensities within the bounds of UN Regulations 7, 6, 38, 23, 87 and 65, divided by the areas of the
+lamps.
+"""
 
 _SHINES: Mapping[str, tuple[tuple[str, Light], ...]] = {
     "daytimeRunningLights": (("headlight", _DAY),),
@@ -39,14 +41,14 @@ _SHINES: Mapping[str, tuple[tuple[str, Light], ...]] = {
     "licensePlateIllumination": (("plate", _PLATE),),
     "specialPurposeLights": (("blue_light", _BEACON), ("red_light", _RED_BEACON)),
 }
-"""The standard's lights, and the materials of our meshes that shine when they are on."""
+"""Light types of the standard, and the materials of the meshes that emit light."""
 _BEAMS = ("lowBeam", "highBeam", "fogLights", "fogLightsFront")
 
 
 def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float) -> Mapping[str, Light]:
-    """What an actor's materials emit at `time` [s], linear red, green, blue [cd/m²].
+    """Return the luminance of the materials of an actor at `time` [s], linear red, green, blue [cd/m²].
 
-    Lamps that nobody has switched follow the weather: low beam and tail lamps where it is dark or the air is thick.
+    Lamps without a LightStateAction follow the weather: low beam and tail lamps are on in the dark and in thick air.
     """
     found: dict[str, Light] = {}
     for name, light in _lights(spec, appearance, weather).items():
@@ -58,7 +60,7 @@ def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float)
 
 
 def beam(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float) -> tuple[float, bool] | None:
-    """How bright the headlamps are, in [0, 1], and whether on high beam; None if they are dark."""
+    """Return the brightness of the headlamps in [0, 1], and whether they are on high beam; None if they are off."""
     lights = _lights(spec, appearance, weather)
     found = {name: lights[name].brightness(time) for name in _BEAMS if name in lights}
     brightest = max(found.values(), default=0.0)
@@ -66,7 +68,7 @@ def beam(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float)
 
 
 def _lights(spec: ActorSpec, appearance: Appearance, weather: Weather) -> Mapping[str, LightState]:
-    """Return the lights that were switched, and low beam by itself where it was not."""
+    """Return the switched lights, and an automatic low beam if it was not switched."""
     lights = appearance.lights
     if weather.lamps_on and "lowBeam" not in lights and spec.wheelbase > 0.0 and spec.shape != "bicycle":
         return {"lowBeam": LightState("lowBeam", "on"), **lights}
@@ -74,7 +76,7 @@ def _lights(spec: ActorSpec, appearance: Appearance, weather: Weather) -> Mappin
 
 
 def _colored(luminance: Light, light: LightState, brightness: float) -> Light:
-    """In the light's own color where it has one, as bright as before."""
+    """Return the luminance in the color of the light, if it has one, at the same brightness."""
     if light.color is not None:
         red, green, blue = linear(light.color)
         most = max(red, green, blue)

@@ -1,4 +1,4 @@
-"""What cameras see: the models of roads, buildings and actors, made when the first picture is asked for."""
+"""Scene of the cameras: models of roads, buildings and actors, created for the first image."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from eidrive_scenario.world.scene.vehicle_lamps import beam, glow
 from eidrive_scenario.world.weather import Weather
 
 _BESIDE_ROADS = 1500.0
-"""How far the ground goes on around the roads [m]."""
+"""Extent of the ground around the roads [m]."""
 _BELOW_ROADS = 0.06
-"""How far the ground lies below the roads, lest it shows through [m]."""
+"""Distance of the ground below the roads, which prevents that it is visible through them [m]."""
 _LIT_WINDOWS = 0.3
-"""Share of a building's windows with a light behind them at night."""
+"""Share of the windows of a building that are lit at night."""
 WINDOW_LIGHT: Light = (26.0, 19.0, 10.0)
 """Luminance of a lit window [cd/m²]."""
 
 
 class DisplayState(NamedTuple):
-    """What changes beside the poses: the time [s], what signals show, and how actors look."""
+    """Visible state in addition to the poses: time [s], signal states, and appearances of actors."""
 
     time: float = 0.0
     signals: Mapping[str, str] = MappingProxyType({})
@@ -50,12 +50,12 @@ class DisplayState(NamedTuple):
 
 
 class Visuals:
-    """All that can be drawn, placed anew for each picture."""
+    """Drawable models, placed for each image."""
 
     def __init__(self, scenery: Scenery) -> None:
         self._scenery = scenery
         heads = signal_heads(scenery.roads) if scenery.roads is not None else ()
-        self._roadside = Roadside(scenery.furniture, heads)
+        self._roadside = Roadside(scenery.road_objects, heads)
         self._shown_buildings = 0
         self._ground = self._ground_parts()
         self._renderer = Renderer()
@@ -71,9 +71,10 @@ class Visuals:
         weather: Weather,
         shown: DisplayState = DisplayState(),  # noqa: B008 - it is immutable
     ) -> Radiance:
-        """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine.
+        """Return the light that reaches a camera; `bodies` are in the order of their rows.
 
-        Those that the scenario makes invisible do neither.
+        Bodies in `hidden` are not drawn, but cast shadows and emit light. Bodies that the scenario makes invisible do
+        neither.
         """
         looks = {body.name: shown.appearances.get(body.name, _USUAL) for body in bodies.values()}
         bodies = {row: body for row, body in bodies.items() if looks[body.name].visibility.graphics}
@@ -108,7 +109,7 @@ class Visuals:
         return self._renderer.render(subjects, beams, weather, pose, pinhole, ground)
 
     def _ground_parts(self) -> list[MeshInstance]:
-        """Roads, their markings, and the land around, cut along a grid."""
+        """Return roads, markings and surrounding land, split by a grid."""
         low, high = np.zeros(3), np.zeros(3)
         parts: list[Model] = []
         if self._scenery.roads is not None:
@@ -162,7 +163,7 @@ def _actor_model(
 
 
 def _stance(body: Body) -> tuple[Array, Array]:
-    """Rotation (3, 3) of an actor, and the center of the bottom of its box in the world."""
+    """Return the rotation (3, 3) of an actor, and the center of the bottom of its box in the world."""
     ox, oy, oz = body.spec.offset
     rotation = rotation_matrix(body.yaw, body.pitch, body.roll)
     foot: Array = np.array([body.x, body.y, body.z]) + rotation @ (ox, oy, oz - body.spec.size[2] / 2)
@@ -170,7 +171,7 @@ def _stance(body: Body) -> tuple[Array, Array]:
 
 
 def _building_model(building: Building) -> Model:
-    """Return a building; behind some of its windows, by its name, somebody has a light on."""
+    """Return a building; its name determines the lit windows."""
     own = building.color or by_name(building.name, FACADES)
     mesh = dict(building_mesh(building.size))
     windows = mesh.pop("window", None)

@@ -1,4 +1,4 @@
-"""Cars for the tests of the world."""
+"""Fixtures of the world: a car and a level world."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CarFactory = Callable[..., ActorSpec]
 
 @pytest.fixture
 def car() -> CarFactory:
-    """Makes a car of 1500 kg, 2.7 m between the axles, whose box is 4.5 x 1.8 x 1.5 m around x = 1.35."""
+    """Factory of cars of 1500 kg with a wheelbase of 2.7 m and a box of 4.5 x 1.8 x 1.5 m around x = 1.35."""
 
     def make(name: str = "Ego", *, shape: str = "car", **properties: object) -> ActorSpec:
         return ActorSpec(
@@ -38,6 +38,6 @@ def car() -> CarFactory:
 
 @pytest.fixture
 def world() -> Iterator[World]:
-    """A level world at 20 ticks per second."""
+    """Level world at 20 ticks per second."""
     with World(dt=0.05) as world:
         yield world

@@ -1,9 +1,10 @@
-"""From entities of the scenario, and of the project's own catalogs, to bodies."""
+"""Tests of actor specifications from entities of scenarios and of the library catalogs."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lxml import etree
@@ -32,7 +33,7 @@ def properties(**entries: str) -> model.Properties:
 
 
 def vehicle(name: str, category: str, **entries: str) -> model.Vehicle:
-    axle = {"position_z": 0.35, "track_width": 1.6, "wheel_diameter": 0.7}
+    axle: dict[str, Any] = {"position_z": 0.35, "track_width": 1.6, "wheel_diameter": 0.7}
     return model.Vehicle(
         name=name,
         vehicle_category=model.VehicleCategory(category),
@@ -47,7 +48,7 @@ def vehicle(name: str, category: str, **entries: str) -> model.Vehicle:
     )
 
 
-def test_a_vehicle_keeps_its_numbers() -> None:
+def test_actor_spec_of_vehicle_has_its_values() -> None:
     spec = actor_spec("Ego", vehicle("car_white", "car", power="90000"))
     assert (spec.name, spec.shape, spec.category) == ("Ego", "car", "car")
     assert spec.size == (5.0, 2.0, 1.5)
@@ -71,12 +72,12 @@ def test_a_vehicle_keeps_its_numbers() -> None:
         ("tram_line_9", "tram", "bus", "bus"),
     ],
 )
-def test_the_shape_follows_category_and_name(name: str, category: str, shape: str, kind: str) -> None:
+def test_shape_follows_category_and_name(name: str, category: str, shape: str, kind: str) -> None:
     spec = actor_spec("A", vehicle(name, category))
     assert (spec.shape, spec.category) == (shape, kind)
 
 
-def test_the_property_decides() -> None:
+def test_shape_property_has_priority() -> None:
     spec = actor_spec("A", vehicle("anything", "truck", eidrive__shape="firetruck", eidrive__color="#ff8000"))
     assert spec.shape == "firetruck"
     assert spec.color == pytest.approx((1.0, 128 / 255, 0.0))
@@ -89,12 +90,12 @@ def test_the_property_decides() -> None:
         ({"eidrive__color": "red"}, "a.xosc:9: color 'red'.*#rrggbb"),
     ],
 )
-def test_a_wrong_property_is_refused_with_its_line(entries: dict[str, str], message: str) -> None:
+def test_invalid_property_is_an_error_with_line(entries: dict[str, str], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         actor_spec("A", vehicle("x", "car", **entries))
 
 
-def test_negative_dimensions_are_refused_and_open_ones_filled() -> None:
+def test_negative_dimensions_are_errors_and_missing_ones_are_defaults() -> None:
     def walker(height: float) -> model.Pedestrian:
         return model.Pedestrian(
             name="walker", mass=75.0, pedestrian_category=model.PedestrianCategory.PEDESTRIAN,
@@ -108,7 +109,7 @@ def test_negative_dimensions_are_refused_and_open_ones_filled() -> None:
     assert spec.offset[2] == spec.size[2] / 2
 
 
-def test_a_mast_is_a_roadside_unit() -> None:
+def test_mast_has_shape_of_roadside_unit() -> None:
     def thing(name: str) -> model.MiscObject:
         category = model.MiscObjectCategory.POLE
         return model.MiscObject(name=name, mass=10.0, misc_object_category=category, bounding_box=bounding_box(1, 1, 4))
@@ -119,7 +120,7 @@ def test_a_mast_is_a_roadside_unit() -> None:
 
 
 @pytest.mark.parametrize("file", ["vehicles", "pedestrians", "misc_objects"])
-def test_catalogs_are_valid_against_the_standard(file: str) -> None:
+def test_catalogs_are_valid_by_the_schema(file: str) -> None:
     corpora = os.environ.get("EIDRIVE_CORPORA")
     if not corpora:
         pytest.skip("EIDRIVE_CORPORA is not set: ASAM's schema is not part of the project")
@@ -130,15 +131,15 @@ def test_catalogs_are_valid_against_the_standard(file: str) -> None:
 def test_catalog_vehicles_are_consistent() -> None:
     tree = etree.parse(CATALOGS / "vehicles.xosc")
     entries = tree.findall(".//Vehicle")
-    wanted = "lincoln_mkz firetruck ambulance bus nissan_patrol seat_leon tesla_model3 truck van motorbike bicycle"
-    assert set(wanted.split()) <= {entry.get("name") for entry in entries}
+    expected = "lincoln_mkz firetruck ambulance bus nissan_patrol seat_leon tesla_model3 truck van motorbike bicycle"
+    assert set(expected.split()) <= {entry.get("name") for entry in entries}
     for entry in entries:
-        center, size = entry.find(".//Center"), entry.find(".//Dimensions")
-        front, radius = entry.find(".//FrontAxle"), float(entry.find(".//FrontAxle").get("wheelDiameter")) / 2
-        # Both wheels stand inside the box.
-        reach = float(center.get("x")) + float(size.get("length")) / 2
-        assert float(front.get("positionX")) + radius <= reach + 0.02, entry.get("name")
-        assert float(center.get("x")) - float(size.get("length")) / 2 <= 0.02 - radius, entry.get("name")
-        assert float(center.get("z")) == pytest.approx(float(size.get("height")) / 2, abs=1e-3)
+        (center,), (size,), (front,) = (entry.findall(f".//{tag}") for tag in ("Center", "Dimensions", "FrontAxle"))
+        radius = float(front.attrib["wheelDiameter"]) / 2
+        # Both axles are inside the box.
+        reach = float(center.attrib["x"]) + float(size.attrib["length"]) / 2
+        assert float(front.attrib["positionX"]) + radius <= reach + 0.02, entry.get("name")
+        assert float(center.attrib["x"]) - float(size.attrib["length"]) / 2 <= 0.02 - radius, entry.get("name")
+        assert float(center.attrib["z"]) == pytest.approx(float(size.attrib["height"]) / 2, abs=1e-3)
         known = {prop.get("name") for prop in entry.findall(".//Property")}
         assert known - {"eidrive.shape", "eidrive.color"} <= set(PROPERTIES)

@@ -1,4 +1,4 @@
-"""pybullet's notice about its build is kept from standard error, and nothing else is."""
+"""Tests of the pybullet import, which suppresses only the build message of pybullet."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
 
 
-def test_nothing_is_printed() -> None:
+def test_import_prints_nothing() -> None:
     done = run("import eidrive_scenario.world.world")
     assert (done.stdout, done.stderr) == ("", "")
 
 
-def test_other_output_passes() -> None:
+def test_import_passes_other_output() -> None:
     done = run(
         "import os, sys\n"
         "sys.stderr.write('before ')\n"

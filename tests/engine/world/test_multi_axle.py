@@ -1,9 +1,10 @@
-"""Vehicles with more than two axles: read from the file, seen in pictures, turning by the slip of each axle."""
+"""Tests of vehicles with more than two axles: specification, mesh, and turning by the slip of each axle."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def at(x: float, steering: float = 0.0) -> ExtraAxle:
 
 
 def steady_curvature(spec: ActorSpec, speed: float, steering: float) -> float:
-    """Yaw rate over speed [1/m] of the steady turn at a speed that is held."""
+    """Return yaw rate over speed [1/m] of the steady turn at constant speed."""
     track = track_of(VehicleParameters.of(spec), STEP)
     demand = track.demand(Control(steering=steering), 1.0, 0.0)
     left = rate = 0.0
@@ -45,14 +46,14 @@ def steady_curvature(spec: ActorSpec, speed: float, steering: float) -> float:
 
 
 def equivalent_wheelbase(spec: ActorSpec, steering: float = 0.005) -> float:
-    """Steering angle over curvature, which is linear in the square of the speed, at a standstill."""
+    """Return steering angle over curvature at standstill, extrapolated linearly in the square of the speed."""
     slow, fast = 6.0, 9.0
     one, two = (math.tan(steering) / steady_curvature(spec, speed, steering) for speed in (slow, fast))
     return one - (two - one) * slow**2 / (fast**2 - slow**2)
 
 
 def xml(category: str, front: bool, *additional: float, steering: float = 0.1) -> model.Vehicle:
-    axle = {"position_z": 0.5, "track_width": 1.9, "wheel_diameter": 1.0}
+    axle: dict[str, Any] = {"position_z": 0.5, "track_width": 1.9, "wheel_diameter": 1.0}
     return model.Vehicle(
         name="semi", vehicle_category=model.VehicleCategory(category), mass=18_000.0,
         bounding_box=model.BoundingBox(
@@ -67,7 +68,7 @@ def xml(category: str, front: bool, *additional: float, steering: float = 0.1) -
     )  # fmt: skip
 
 
-def test_additional_axles_are_read_as_they_stand() -> None:
+def test_actor_spec_has_additional_axles() -> None:
     spec = actor_spec("Truck", xml("truck", True, -1.4, 3.4))
     assert spec.wheelbase == 4.8
     assert spec.extra_axles == (ExtraAxle(-1.4, 1.9, 0.5, 0.1), ExtraAxle(3.4, 1.9, 0.5, 0.1))
@@ -76,8 +77,8 @@ def test_additional_axles_are_read_as_they_stand() -> None:
     assert trailer.wheelbase == 0.0
 
 
-def test_load_and_stiffness_are_shared_in_the_groups() -> None:
-    """One axle in front carries 0.55 to the 0.45 of each of the two behind; these lie 0.7 m behind the rear axle."""
+def test_axles_of_a_group_share_load_and_stiffness() -> None:
+    """The front axle has a share of 0.55, each of the two rear axles 0.45. Their mean is 0.7 m behind the rear axle."""
     p = VehicleParameters.of(with_axles(at(-1.4)))
     assert p.weight_front == pytest.approx(0.55 / 1.45)
     assert (p.wheelbase, p.rear) == pytest.approx((5.5, -0.7))
@@ -90,8 +91,8 @@ def test_load_and_stiffness_are_shared_in_the_groups() -> None:
 
 
 @pytest.mark.parametrize("spread", [1.4, 2.6])
-def test_a_tandem_turns_on_the_equivalent_wheelbase(spread: float) -> None:
-    """Winkler 1998: L' = L (1 + T/L² (1 + C_rear / C_front)), T the mean square place in the tandem."""
+def test_tandem_has_equivalent_wheelbase_of_winkler(spread: float) -> None:
+    """Winkler 1998: L' = L (1 + T/L² (1 + C_rear / C_front)), where T is the mean square position in the tandem."""
     spec = with_axles(at(-spread))
     p = VehicleParameters.of(spec)
     tandem = (spread / 2) ** 2
@@ -101,10 +102,10 @@ def test_a_tandem_turns_on_the_equivalent_wheelbase(spread: float) -> None:
     assert equivalent_wheelbase(TRUCK) == pytest.approx(4.8, rel=2e-3)
 
 
-def test_the_turning_wheelbase_of_a_vehicle_in_a_file() -> None:
-    """What scripted vehicles keep to that follow a trajectory as they can."""
+def test_turning_wheelbase_of_a_vehicle() -> None:
+    """Scripted vehicles use this wheelbase when they follow a trajectory with vehicle dynamics."""
     assert turning_wheelbase(xml("truck", True)) == 4.8
-    assert turning_wheelbase(xml("truck", True, -1.4)) == pytest.approx(4.8)  # its maxSteering is 0.1
+    assert turning_wheelbase(xml("truck", True, -1.4)) == pytest.approx(4.8)  # The maxSteering is 0.1.
     assert turning_wheelbase(xml("trailer", False, -1.4)) == 0.0
     fixed = xml("truck", True, -1.4, steering=0.0)
     assert turning_wheelbase(fixed) == pytest.approx(5.5 * (1.0 + 0.7**2 / 5.5**2 * (1.0 + 18 * 0.9 / (14 * 0.55))))
@@ -112,16 +113,19 @@ def test_the_turning_wheelbase_of_a_vehicle_in_a_file() -> None:
     assert largest_curvature(xml("truck", True)) == pytest.approx(math.tan(0.7) / 4.8)
 
 
-def test_an_axle_that_steers_rolls_about_the_same_point() -> None:
-    """A steered axle behind turns the other way and one in front the same way: the truck turns as on two axles."""
+def test_steered_additional_axle_rolls_about_the_common_point() -> None:
+    """A steered axle at the rear turns in the opposite direction, one at the front in the same direction.
+
+    The truck then turns like one with two axles.
+    """
     for x in (-1.6, 3.2):
         assert equivalent_wheelbase(with_axles(at(x, steering=0.5))) == pytest.approx(4.8, rel=2e-3)
-    # As far as it may steer: with next to nothing it is a fixed one.
+    # With a very small maximum angle the axle behaves like a fixed one.
     held, fixed = (equivalent_wheelbase(with_axles(at(-1.6, steering=angle)), 0.02) for angle in (1e-6, 0.0))
     assert held == pytest.approx(fixed, rel=5e-3)
 
 
-def test_it_comes_to_rest_in_a_turn_and_stays() -> None:
+def test_multi_axle_vehicle_stops_in_a_turn_and_stays() -> None:
     spec = with_axles(at(-1.4), at(-2.8), at(3.4, steering=0.5))
     with World(dt=0.05) as world:
         world.add(spec, Placement(0.0, 0.0, speed=8.0), driven=True)
@@ -138,17 +142,16 @@ def test_it_comes_to_rest_in_a_turn_and_stays() -> None:
 
 
 def tires(spec: ActorSpec) -> set[tuple[float, float, float]]:
-    """Place, radius and outer face of each pair of wheels, of the reference point's frame."""
+    """Return position, radius and outer face of each pair of wheels in the frame of the reference point."""
     parts = actor_mesh(spec)["tire"]
     points = parts[parts[..., 1].min(axis=1) > 0.0].reshape(-1, 3)
     order = np.sort(points[:, 0])
     cuts = np.flatnonzero(np.diff(order) > 0.25)
-    found = set()
+    found: set[tuple[float, float, float]] = set()
     for low, high in zip([order[0], *order[cuts + 1]], [*order[cuts], order[-1]], strict=True):
         wheel = points[(points[:, 0] >= low) & (points[:, 0] <= high)]
-        found.add(
-            tuple(round(float(n), 2) for n in ((low + high) / 2 + spec.offset[0], (high - low) / 2, wheel[:, 1].max()))
-        )
+        place, radius, face = (low + high) / 2 + spec.offset[0], (high - low) / 2, wheel[:, 1].max()
+        found.add((round(float(place), 2), round(float(radius), 2), round(float(face), 2)))
     return found
 
 
@@ -156,8 +159,8 @@ def tires(spec: ActorSpec) -> set[tuple[float, float, float]]:
     ("shape", "side"),
     [("truck", (1.6 + 0.55) / 2), ("firetruck", (1.6 + 0.55) / 2), ("bus", 0.998 * 1.25), ("van", 0.965 * 1.25)],
 )
-def test_pictures_show_each_axle_where_it_is(shape: str, side: float) -> None:
-    """On its own track, with twin tires; under the skirts of a bus or a van, in the skin, where it is seen."""
+def test_mesh_has_wheels_at_each_axle(shape: str, side: float) -> None:
+    """Wheels are at their track widths, with twin tires, below the skirts of a bus or a van and visible in the skin."""
     small = ExtraAxle(-1.4, 1.6, 0.4)
     spec = replace(with_axles(small), shape=shape)
     two = tires(replace(TRUCK, shape=shape))
@@ -166,7 +169,7 @@ def test_pictures_show_each_axle_where_it_is(shape: str, side: float) -> None:
     assert added == pytest.approx((-1.4, 0.4, side), abs=0.006)
 
 
-def test_a_trailer_has_the_axles_of_its_file_and_no_cab() -> None:
+def test_trailer_mesh_has_its_axles_and_no_cab() -> None:
     spec = actor_spec("Trailer", xml("semitrailer", False, -1.3))
     assert {place for place, *_ in tires(spec)} == {0.0, -1.3}
     assert "glass" not in actor_mesh(spec)

@@ -1,4 +1,4 @@
-"""The renderer: coverage, depth, sun, shadows, fog, night, wet roads."""
+"""Tests of the renderer: coverage, depth, sun, shadows, fog, night, wet roads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PINHOLE = Pinhole.of_fov(160, 120, math.radians(80))
 
 
 def looking(yaw: float, z: float = 1.5, x: float = 0.0, y: float = 0.0, pitch: float = 0.0) -> np.ndarray:
-    """A camera that looks along a heading, downwards by `pitch`."""
+    """Return the pose of a camera with a heading, directed downwards by `pitch`."""
     forward = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)])
     right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
     pose = np.eye(4)
@@ -42,7 +42,7 @@ def inside(corners: np.ndarray, x: float, y: float) -> bool:
     return all(s > 0 for s in signs) or all(s < 0 for s in signs)
 
 
-def test_pixels_whose_centers_lie_inside_are_covered() -> None:
+def test_triangle_covers_pixels_with_centers_inside() -> None:
     rng = np.random.default_rng(1)
     corners = rng.uniform(-5.0, 25.0, (40, 3, 2))
     nearness = np.repeat(rng.uniform(0.1, 1.0, 40)[None], 3, axis=0)
@@ -54,8 +54,10 @@ def test_pixels_whose_centers_lie_inside_are_covered() -> None:
         assert shown[pixel] == nearest
 
 
-def test_neighbors_neither_overlap_nor_leave_gaps() -> None:
-    """A fan of triangles around a point, with corners on pixel centers too: each center inside belongs to one."""
+def test_adjacent_triangles_neither_overlap_nor_leave_gaps() -> None:
+    """A fan of triangles around a point, also with corners on pixel centers: each center inside belongs to one
+    triangle.
+    """
     ring = np.array([(2.5, 2.5), (17.5, 3.5), (18.2, 14.5), (9.5, 17.5), (1.5, 12.5)])
     hub = np.array([9.5, 9.5])
     triangles = np.array([[hub, ring[k], ring[(k + 1) % 5]] for k in range(5)])
@@ -71,8 +73,8 @@ def test_neighbors_neither_overlap_nor_leave_gaps() -> None:
         assert len(covered) == 0 or np.all(np.diff(covered) == 1)
 
 
-def test_large_triangles_cover_what_small_ones_do() -> None:
-    """Triangles of thousands of pixels, thin tips among them, against all centers of pixels one by one."""
+def test_large_triangles_cover_the_same_pixels_as_small_ones() -> None:
+    """Triangles of thousands of pixels, some with thin tips, are compared with all pixel centers individually."""
     rng = np.random.default_rng(3)
     gap_in_its_tip = [(94.18172651875673, 149.27757363317045), (20.45740141210438, 28.0104538720336), (36.576, 287.222)]
     corners = np.concatenate([rng.uniform(-150.0, 400.0, (25, 3, 2)), [gap_in_its_tip]])
@@ -94,7 +96,7 @@ def test_large_triangles_cover_what_small_ones_do() -> None:
     np.testing.assert_allclose(shown.nearness, best, rtol=1e-5)
 
 
-def test_nearness_is_that_of_the_plane() -> None:
+def test_nearness_equals_that_of_the_plane() -> None:
     corners = np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]])
     nearness = np.array([[0.1], [0.5], [0.3]])
     cover = rasterize(corners[:, :1], corners[:, 1:], nearness, 20, 20)
@@ -103,8 +105,8 @@ def test_nearness_is_that_of_the_plane() -> None:
     np.testing.assert_allclose(cover.nearness[lines, columns], 0.1 + 0.4 * x / 20 + 0.2 * y / 20, rtol=1e-5)
 
 
-def test_clear_noon_and_dusk_have_the_light_of_the_tables() -> None:
-    """Sun at 90 degrees: 127.5 klx exp(-0.21) = 103.3 klx across its rays and 16.3 klx of sky."""
+def test_daylight_at_noon_and_dusk_equals_tables() -> None:
+    """Sun at 90 degrees: 127.5 klx exp(-0.21) = 103.3 klx across its rays, and 16.3 klx of sky light."""
     noon = daylight(Weather(sun_elevation=90.0, cloud_cover=0.0, visual_range=1e9))
     assert float(noon.sun @ LUMA) == pytest.approx(103_350, rel=1e-3)
     assert float(noon.sky @ LUMA) == pytest.approx(16_300, rel=1e-3)
@@ -118,8 +120,8 @@ def test_clear_noon_and_dusk_have_the_light_of_the_tables() -> None:
     assert not overcast.sun.any()
 
 
-def test_a_clear_sky_gives_the_ground_its_light() -> None:
-    """The dome's luminance times cosine, summed over its solid angle, is the sky's illuminance."""
+def test_dome_luminance_integrates_to_sky_illuminance() -> None:
+    """The luminance of the dome times cosine, integrated over its solid angle, is the illuminance of the sky."""
     weather = Weather(cloud_cover=0.0, visual_range=1e9)
     axis = (np.arange(SIZE) - (SIZE - 1) / 2) / ((SIZE - 2) / 2)
     square = axis[None, :] ** 2 + axis[:, None] ** 2
@@ -129,8 +131,8 @@ def test_a_clear_sky_gives_the_ground_its_light() -> None:
     assert given == pytest.approx(float(daylight(weather).clear @ LUMA), rel=0.02)
 
 
-def test_the_side_towards_the_sun_is_brighter(world: World) -> None:
-    """A house, from south and north, in the morning: what faces the sun gets it."""
+def test_wall_towards_the_sun_is_brighter(world: World) -> None:
+    """A house is seen from south and north in the morning."""
     world.add_building("house", (0.0, 0.0, 5.0), (10.0, 10.0, 10.0), color=(0.7, 0.7, 0.7))
     world.set_weather(Weather(sun_azimuth=180.0, sun_elevation=30.0, cloud_cover=0.0))
     south = world.radiance(looking(math.pi / 2, 5.0, y=-25.0), PINHOLE).luminance[40:80, 60:100]
@@ -139,8 +141,10 @@ def test_the_side_towards_the_sun_is_brighter(world: World) -> None:
 
 
 @pytest.mark.parametrize(("azimuth", "side"), [(180.0, 1.0), (0.0, -1.0)])
-def test_the_shadow_of_a_house_falls_away_from_the_sun(world: World, azimuth: float, side: float) -> None:
-    """10 m high, the sun at 45 degrees: the shadow is 10 m long; 4 m from the wall it is dark and 14 m from it not."""
+def test_shadow_of_a_house_points_away_from_the_sun(world: World, azimuth: float, side: float) -> None:
+    """At a height of 10 m and a sun elevation of 45 degrees the shadow is 10 m long: dark at 4 m, lit at 14 m from
+    the wall.
+    """
     world.add_building("house", (0.0, 0.0, 5.0), (30.0, 10.0, 10.0))
     world.set_weather(Weather(sun_azimuth=azimuth, sun_elevation=45.0, cloud_cover=0.0))
     above = looking(math.pi / 2, 60.0, pitch=math.pi / 2 - 1e-6)
@@ -154,7 +158,7 @@ def test_the_shadow_of_a_house_falls_away_from_the_sun(world: World, azimuth: fl
     assert ground(-side * 9.0) > 0.8 * ground(side * 19.0)
 
 
-def test_vehicles_throw_shadows_and_dim_the_ground_below_them(world: World, car: CarFactory) -> None:
+def test_vehicles_cast_shadows_and_darken_the_ground_below(world: World, car: CarFactory) -> None:
     world.set_weather(Weather(sun_azimuth=180.0, sun_elevation=35.0, cloud_cover=0.0))
     pose = looking(math.pi / 2, 12.0, y=-6.0, x=1.35, pitch=0.9)
     before = brightness(world.radiance(pose, PINHOLE).luminance)
@@ -163,16 +167,15 @@ def test_vehicles_throw_shadows_and_dim_the_ground_below_them(world: World, car:
     after = brightness(seen.luminance)
     shaded = (after < 0.5 * before) & (seen.segmentation < 0)
     assert shaded.sum() > 30
-    # The shadow lies beyond the car (1.5 m / tan 35 degrees = 2.1 m), that is further up in the picture.
+    # The shadow is behind the car (1.5 m / tan 35 degrees = 2.1 m), thus higher in the image.
     assert np.nonzero(shaded)[0].mean() < np.nonzero(seen.segmentation == 0)[0].mean()
 
 
 @pytest.mark.parametrize("visual_range", [40.0, 100.0, 300.0])
-def test_fog_is_koschmieder_s_law_on_distance(world: World, visual_range: float) -> None:
-    """L = L0 exp(-3.912 d / V) + La (1 - exp(-3.912 d / V)) along the ground, which mirrors nothing."""
-    light = {"cloud_cover": 1.0, "headlights": "off"}
-    clear = Weather(visual_range=1e9, **light)
-    fog = Weather(visual_range=visual_range, **light)
+def test_luminance_in_fog_follows_koschmieder(world: World, visual_range: float) -> None:
+    """L = L0 exp(-3.912 d / V) + La (1 - exp(-3.912 d / V)) along the ground, which does not reflect."""
+    clear = Weather(visual_range=1e9, cloud_cover=1.0, headlights="off")
+    fog = Weather(visual_range=visual_range, cloud_cover=1.0, headlights="off")
     world.set_weather(clear)
     bare = world.radiance(looking(0.0), PINHOLE)
     world.set_weather(fog)
@@ -185,7 +188,7 @@ def test_fog_is_koschmieder_s_law_on_distance(world: World, visual_range: float)
     np.testing.assert_allclose(foggy.luminance[seen], expected, rtol=2e-3)
 
 
-def test_night_is_dark_and_lamps_make_it_lighter(world: World, car: CarFactory) -> None:
+def test_lamps_brighten_the_night(world: World, car: CarFactory) -> None:
     world.add(car("Ego"), Placement(0.0, 0.0))
     ahead = looking(0.0, 1.3, x=4.0)
     lower = np.s_[70:100, 60:100]
@@ -203,8 +206,10 @@ def test_night_is_dark_and_lamps_make_it_lighter(world: World, car: CarFactory) 
     assert street > lit
 
 
-def test_low_beam_has_its_cut_off() -> None:
-    """Brightest just under the cut-off, and above it at most what the regulation lets into oncoming eyes."""
+def test_low_beam_has_a_cut_off() -> None:
+    """The maximum is just below the cut-off. Above it the value is at most that for oncoming drivers in the
+    regulation.
+    """
     straight = np.zeros(1)
     below = float(intensity(straight, np.array([-0.022]), False)[0])
     assert below == pytest.approx(LOW_BEAM, rel=0.05)
@@ -212,16 +217,15 @@ def test_low_beam_has_its_cut_off() -> None:
     assert float(intensity(straight, np.array([0.0]), True)[0]) > 50_000
 
 
-def test_headlamps_light_a_wall_by_the_inverse_square(world: World, car: CarFactory) -> None:
-    """Two lamps of the car before a white wall, 20 m away: each pixel shows 2 I cos / (pi d²) of its point on
-    the wall."""
+def test_headlamps_illuminate_a_wall_by_inverse_square_law(world: World, car: CarFactory) -> None:
+    """Two lamps of the car illuminate a white wall 20 m ahead: each pixel shows 2 I cos / (pi d²) of its point."""
     spec = car("Ego")
     world.add(spec, Placement(0.0, 0.0))
     lamp = np.array([3.6, 0.0, 0.675])
     world.add_building("wall", (lamp[0] + 21.0, 0.0, 2.0), (2.0, 40.0, 4.0), color=(1.0, 1.0, 1.0))
     world.set_weather(Weather(sun_elevation=-30.0, cloud_cover=0.0, visual_range=1e9))
     height, eye = 0.55, 8.0
-    lines, columns = (part.astype(float) for part in np.mgrid[57:60, 70:90])  # the plinth of the wall is 0.5 m high
+    lines, columns = (part.astype(float) for part in np.mgrid[57:60, 70:90])  # The plinth of the wall is 0.5 m high.
     away = lamp[0] + 20.0 - eye
     y = -(columns + 0.5 - PINHOLE.center_x) / PINHOLE.focal * away
     z = height - (lines + 0.5 - PINHOLE.center_y) / PINHOLE.focal * away
@@ -232,9 +236,10 @@ def test_headlamps_light_a_wall_by_the_inverse_square(world: World, car: CarFact
     np.testing.assert_allclose(seen, expected, rtol=0.02)
 
 
-def test_a_wet_road_mirrors_a_bright_wall(world: World) -> None:
-    """Seen at a low angle, the road before a white wall is lighter than when dry, and darker than when dry far from
-    anything: it takes the light of what stands there."""
+def test_wet_road_reflects_a_bright_wall(world: World) -> None:
+    """At a low angle, the wet road is brighter in front of a white wall than the dry one, and darker far from
+    objects.
+    """
     world.add_building("wall", (30.0, 0.0, 10.0), (2.0, 200.0, 20.0), color=(0.9, 0.1, 0.1))
     overcast = Weather(cloud_cover=1.0, visual_range=1e9)
     at = np.s_[66:72, 60:100]
@@ -245,7 +250,7 @@ def test_a_wet_road_mirrors_a_bright_wall(world: World) -> None:
     assert wet[0] / wet[1] > 1.5 * dry[0] / dry[1]
 
 
-def test_the_far_end_of_depth(world: World) -> None:
+def test_depth_beyond_far_plane_is_infinite(world: World) -> None:
     seen = world.radiance(looking(0.0), Pinhole.of_fov(160, 120, math.radians(80), 0.1, 30.0))
     finite = np.isfinite(seen.depth)
     assert seen.depth[finite].max() <= 30.0
@@ -253,7 +258,7 @@ def test_the_far_end_of_depth(world: World) -> None:
     assert (seen.segmentation[~finite] == -1).all()
 
 
-def test_radiance_is_the_same_every_time(car: CarFactory) -> None:
+def test_radiance_is_deterministic(car: CarFactory) -> None:
     def take() -> bytes:
         with World() as world:
             world.add(car("A"), Placement(8.0, 1.0, yaw=0.4))

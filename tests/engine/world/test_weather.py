@@ -1,4 +1,4 @@
-"""Weather: settings, presets, what follows for air and road, and what an Environment becomes."""
+"""Tests of weather: settings, presets, effects on air and road, and conversion of Environment."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from eidrive_scenario.world.environment_weather import solar_position, weather_f
 from eidrive_scenario.world.weather import Weather, load_weather
 
 
-def test_presets_are_what_their_names_say() -> None:
+def test_presets_have_weather_of_their_names() -> None:
     assert names("weather") == ["foggy_morning", "midnight", "storm", "sunny"]
     sunny, midnight = load_weather("sunny"), load_weather("midnight")
     storm, fog = load_weather("storm"), load_weather("foggy_morning")
@@ -30,14 +30,14 @@ def test_presets_are_what_their_names_say() -> None:
     assert 0 < fog.sun_elevation < 15
 
 
-def test_koschmieder() -> None:
-    """Along the visual range, 2 % of the contrast is left."""
+def test_extinction_leaves_two_percent_contrast_at_visual_range() -> None:
+    """At the visual range, 2 % of the contrast is left."""
     fog = Weather(visual_range=80.0)
     assert math.exp(-fog.extinction * 80.0) == pytest.approx(0.02)
     assert fog.fog_extinction == pytest.approx(3.912 / 80.0, rel=1e-4)
 
 
-def test_rain_and_snow_attenuate_as_itu_r_p_1814_has_it() -> None:
+def test_rain_and_snow_attenuation_equals_itu_r_p_1814() -> None:
     """25 mm/h of rain: 1.076 · 25^0.67 = 9.30 dB/km; 2 mm/h of dry snow: 5.5253 · 2^1.38 = 14.38 dB/km."""
     rain = Weather(precipitation="rain", precipitation_intensity=25.0)
     assert rain.precipitation_extinction == pytest.approx(9.30 * math.log(10) / 10 / 1000, rel=1e-3)
@@ -45,21 +45,21 @@ def test_rain_and_snow_attenuate_as_itu_r_p_1814_has_it() -> None:
     assert snow.precipitation_extinction == pytest.approx(14.38 * math.log(10) / 10 / 1000, rel=1e-3)
 
 
-def test_grip() -> None:
+def test_friction_scale_by_wetness_and_snow() -> None:
     assert Weather().friction_scale == 1.0
     assert Weather(wetness=1.0).friction_scale == pytest.approx(0.59)
     assert Weather(wetness=1.0, friction=0.9).friction_scale == 0.9
     assert Weather(precipitation="snow", precipitation_intensity=1.0).friction_scale == pytest.approx(0.235)
 
 
-def test_the_sun_stands_where_the_settings_say() -> None:
+def test_sun_direction_follows_azimuth_and_elevation() -> None:
     assert Weather(sun_azimuth=0.0, sun_elevation=0.0).sun_direction == pytest.approx((0.0, 1.0, 0.0))
     assert Weather(sun_azimuth=90.0, sun_elevation=30.0).sun_direction == pytest.approx(
         (math.cos(math.pi / 6), 0.0, 0.5)
     )
 
 
-def test_mistakes_name_file_and_line(tmp_path: Path) -> None:
+def test_invalid_weather_file_is_an_error_with_line(tmp_path: Path) -> None:
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text("cloud_cover: 1.4\nvisual_rage: 50\nprecipitation: hail\n")
     with pytest.raises(SettingError) as caught:
@@ -78,7 +78,7 @@ def test_mistakes_name_file_and_line(tmp_path: Path) -> None:
         load_weather("sunni", origin="--weather")
 
 
-def test_an_environment_becomes_a_weather() -> None:
+def test_weather_from_complete_environment() -> None:
     weather = weather_from_environment(
         Environment(
             name="Wet",
@@ -111,7 +111,7 @@ def test_an_environment_becomes_a_weather() -> None:
     )
 
 
-def test_what_an_environment_does_not_say_is_as_usual() -> None:
+def test_weather_from_empty_environment_is_default() -> None:
     assert weather_from_environment(Environment()) == Weather(friction=1.0)
     assert weather_from_environment(Environment(friction=0.0)).friction_scale > 0.0
     assert (
@@ -121,12 +121,12 @@ def test_what_an_environment_does_not_say_is_as_usual() -> None:
     assert weather_from_environment(Environment(precipitation="dry", precipitation_share=0.2)).precipitation == "none"
 
 
-def test_shares_of_sunlight_as_scenario_runner_s_files_write_them() -> None:
+def test_sun_intensity_up_to_one_is_a_share() -> None:
     weather = weather_from_environment(Environment(sun_azimuth=0.0, sun_elevation=1.31, illuminance=0.85))
     assert (weather.sun_share, weather.sun_illuminance) == (0.85, None)
 
 
-def test_a_sun_past_the_zenith_comes_down_on_the_other_side() -> None:
+def test_sun_elevation_beyond_zenith_is_on_the_opposite_side() -> None:
     assert weather_from_environment(
         Environment(sun_azimuth=0.0, sun_elevation=math.pi / 2)
     ).sun_elevation == pytest.approx(90.0)
@@ -136,9 +136,11 @@ def test_a_sun_past_the_zenith_comes_down_on_the_other_side() -> None:
     assert weather_from_environment(Environment(sun_azimuth=0.0, sun_elevation=-1.1)).lamps_on
 
 
-def test_the_sun_by_the_clock() -> None:
-    """Noon of a solstice at 48 degrees north: 90 - 48 ± 23.45 degrees high in the south; at an equinox it rises in the
-    east at six."""
+def test_solar_position_at_solstices_and_equinox() -> None:
+    """At noon of a solstice at 48 degrees north the sun is 90 - 48 ± 23.45 degrees high in the south.
+
+    At an equinox it rises in the east at six.
+    """
     assert solar_position(datetime(2026, 6, 21, 12)) == pytest.approx((180.0, 65.45), abs=0.1)
     assert solar_position(datetime(2026, 12, 21, 12)) == pytest.approx((180.0, 18.55), abs=0.1)
     azimuth, elevation = solar_position(datetime(2026, 3, 22, 6))
@@ -150,8 +152,8 @@ def test_the_sun_by_the_clock() -> None:
 
 
 @pytest.mark.parametrize("grip", [1.0, 0.5, 0.2])
-def test_a_slippery_road_lengthens_the_way_to_a_stop(car: Callable[..., ActorSpec], grip: float) -> None:
-    """From 12 m/s with full brakes (8 m/s²), or with what the tires give (grip · 9.81 m/s²): v² / 2 a."""
+def test_braking_distance_grows_on_slippery_road(car: Callable[..., ActorSpec], grip: float) -> None:
+    """From 12 m/s with full brakes (8 m/s²), or with the grip of the tires (grip · 9.81 m/s²): v² / 2 a."""
     with World() as world:
         world.set_weather(Weather(friction=grip))
         world.add(car("Ego"), Placement(0.0, 0.0, speed=12.0), driven=True)
@@ -160,7 +162,7 @@ def test_a_slippery_road_lengthens_the_way_to_a_stop(car: Callable[..., ActorSpe
         assert world.view().position[0, 0] == pytest.approx(12.0**2 / 2 / min(8.0, grip * 9.81), rel=0.05)
 
 
-def test_weather_is_the_world_s() -> None:
+def test_set_weather_changes_weather_and_friction() -> None:
     with World() as world:
         assert world.weather == Weather()
         world.set_weather(load_weather("storm"))

@@ -1,4 +1,4 @@
-"""Collisions: what is reported, and what they do to driven cars."""
+"""Tests of collisions: reports, and effects on driven cars."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import pytest
 
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.view import Contact
 
 CarFactory = Callable[..., ActorSpec]
 
 
-def approach(world: World, ticks: int, speed: float, start: float) -> list:
-    """Move the scripted A along x; returns (tick, contact) of all contacts."""
+def approach(world: World, ticks: int, speed: float, start: float) -> list[tuple[int, Contact]]:
+    """Move the scripted A along x and return (tick, contact) of all contacts."""
     found = []
     for tick in range(1, ticks + 1):
         world.step({"A": Placement(start + tick * speed * 0.05, 0.0, speed=speed)}, {})
@@ -22,11 +23,11 @@ def approach(world: World, ticks: int, speed: float, start: float) -> list:
     return found
 
 
-def test_scripted_boxes_touch_once(world: World, car: CarFactory) -> None:
+def test_contact_of_scripted_boxes_is_reported_once(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(20.0, 0.5))
     found = approach(world, 60, 10.0, 0.0)
-    # The gap of 15.5 m closes by half a meter per tick.
+    # The gap of 15.5 m decreases by half a meter per tick.
     assert len(found) == 1
     tick, contact = found[0]
     assert tick in (31, 32)
@@ -37,19 +38,19 @@ def test_scripted_boxes_touch_once(world: World, car: CarFactory) -> None:
     assert contact.position[2] == pytest.approx(0.75)
 
 
-def test_passing_by_at_ten_centimeters_is_no_contact(world: World, car: CarFactory) -> None:
+def test_gap_of_ten_centimeters_is_no_contact(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(20.0, 1.9))
     assert approach(world, 80, 10.0, 0.0) == []
 
 
-def test_a_bridge_above_is_no_contact(world: World, car: CarFactory) -> None:
+def test_actor_on_a_bridge_above_is_no_contact(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(20.0, 0.0, 5.0))
     assert approach(world, 80, 10.0, 0.0) == []
 
 
-def test_parting_and_meeting_again_counts_twice(world: World, car: CarFactory) -> None:
+def test_second_contact_after_separation_is_reported(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0))
     world.add(car("B"), Placement(5.0, 0.0))
     counts = []
@@ -59,8 +60,8 @@ def test_parting_and_meeting_again_counts_twice(world: World, car: CarFactory) -
     assert counts == [1, 0, 0, 1]
 
 
-def test_bodies_that_rest_upon_each_other_still_touch(world: World, car: CarFactory) -> None:
-    """They stand still for a while in between, and then one moves on inside the other."""
+def test_resting_contact_is_reported_once(world: World, car: CarFactory) -> None:
+    """The bodies stand still for a while, and then one moves on inside the other."""
     world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(20.0, 0.0))
     assert len(approach(world, 33, 10.0, 0.0)) == 1
@@ -70,7 +71,7 @@ def test_bodies_that_rest_upon_each_other_still_touch(world: World, car: CarFact
         assert world.view().contacts == ()
 
 
-def test_many_actors_by_the_sweep(world: World, car: CarFactory) -> None:
+def test_contacts_of_many_actors_equal_pairwise_search(world: World, car: CarFactory) -> None:
     for index in range(40):
         world.add(car(f"P{index}"), Placement(8.0 * index, 0.0))
     world.add(car("A"), Placement(8.0 * 17, -6.0))
@@ -82,10 +83,10 @@ def test_many_actors_by_the_sweep(world: World, car: CarFactory) -> None:
 
 
 def test_standing_car_is_pushed_by_a_scripted_one(world: World, car: CarFactory) -> None:
-    """Nothing stops the scripted car, so that the other leaves at its speed, and a little more by restitution."""
+    """The scripted car keeps its speed, so that the other leaves at this speed plus an effect of restitution."""
     world.add(car("A"), Placement(-10.0, 0.0, speed=8.0))
     world.add(car("B"), Placement(0.0, 0.0), driven=True)
-    contacts = []
+    contacts: list[Contact] = []
     fastest = 0.0
     for tick in range(1, 40):
         world.step({"A": Placement(-10.0 + 0.4 * tick, 0.0, speed=8.0)}, {"B": Control()})
@@ -116,7 +117,7 @@ def test_two_driven_cars_share_the_momentum(world: World, car: CarFactory) -> No
     assert after.contacts[0].impact_speed == pytest.approx(before.speed[0], rel=0.02)
 
 
-def test_a_blow_off_center_spins_the_car(world: World, car: CarFactory) -> None:
+def test_off_center_impact_spins_the_car(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(3.2, -12.0, yaw=math.pi / 2, speed=12.0))
     world.add(car("B"), Placement(0.0, 0.0), driven=True)
     for tick in range(1, 30):
@@ -125,7 +126,7 @@ def test_a_blow_off_center_spins_the_car(world: World, car: CarFactory) -> None:
             break
     last = tick
     view = world.view()
-    # Hit at its front from the right: it turns to the left and is pushed to the left.
+    # An impact at the front from the right turns the car to the left and pushes it to the left.
     assert view.yaw_rate[1] > 0.5
     assert view.velocity[1, 1] > 0.5
     for tick in range(last + 1, last + 120):
@@ -137,8 +138,8 @@ def test_a_blow_off_center_spins_the_car(world: World, car: CarFactory) -> None:
     assert (settled.pitch[1], settled.roll[1]) == (0.0, 0.0)
 
 
-def test_a_car_that_passes_buildings_meets_the_last_one(world: World, car: CarFactory) -> None:
-    """Near to walls and far from them in turn; one that is put up on the way counts at once."""
+def test_car_passes_buildings_and_collides_with_the_last_one(world: World, car: CarFactory) -> None:
+    """The car is near to walls and far from them in turn. A building that is added on the way has effect at once."""
     for x in (30.0, 60.0, 90.0):
         world.add_building(f"Row {x:g}", (x, 9.0, 5.0), (12.0, 12.0, 10.0))
     world.add(car("Ego"), Placement(0.0, 0.0, speed=20.0), driven=True)
@@ -152,14 +153,14 @@ def test_a_car_that_passes_buildings_meets_the_last_one(world: World, car: CarFa
     assert world.view().position[0, 0] < 124.0
 
 
-def test_a_building_stops_a_car(world: World, car: CarFactory) -> None:
+def test_building_stops_a_car(world: World, car: CarFactory) -> None:
     world.add_building("Town hall", (25.0, 0.0, 5.0), (10.0, 20.0, 10.0))
     world.add(car("Ego"), Placement(0.0, 0.0, speed=10.0), driven=True)
-    contacts = []
+    contacts: list[Contact] = []
     for _ in range(60):
         world.step({}, {"Ego": Control()})
         contacts += world.view().contacts
     assert [(contact.first, contact.second) for contact in contacts] == [("Ego", "Town hall")]
     assert contacts[0].impact_speed == pytest.approx(10.0, rel=0.05)
-    # The front, 3.6 m ahead of the rear axle, does not get past the wall at 20 m.
+    # The front, 3.6 m ahead of the rear axle, does not pass the wall at 20 m.
     assert world.view().position[0, 0] + 3.6 <= 20.05

@@ -1,4 +1,4 @@
-"""Meshes: closed skins that look outwards, inside the box that they show."""
+"""Tests of meshes: closed skins with outward faces inside the bounding box."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AXLES = {
 
 
 def volume(triangles: np.ndarray) -> float:
-    """Of a closed skin, positive where it looks outwards (divergence theorem)."""
+    """Return the volume of a closed skin, positive for outward faces (divergence theorem)."""
     return float(np.einsum("ki,ki->", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6)
 
 
@@ -55,18 +55,18 @@ def spec_of(shape: str) -> ActorSpec:
         (lambda: solids.mirrored(solids.box((1, 2, 3), (2, 3, 4))), 24.0),
     ],
 )
-def test_solids_are_closed_and_look_outwards(solid: Callable[[], np.ndarray], expected: float) -> None:
+def test_solids_are_closed_with_outward_faces(solid: Callable[[], np.ndarray], expected: float) -> None:
     assert volume(solid()) == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_each_shape_fills_its_box_and_keeps_to_it(shape: str) -> None:
+def test_each_shape_fills_its_box(shape: str) -> None:
     mesh = actor_mesh(spec_of(shape))
     points = np.concatenate([triangles.reshape(-1, 3) for triangles in mesh.values()])
     length, width, height = SIZES[shape]
     low, high = points.min(axis=0), points.max(axis=0)
     half = np.array([length / 2, width / 2, 0.0])
-    # Lamps, mirrors, hands and the like may stand out by a few centimeters.
+    # Lamps, mirrors, hands and similar parts may protrude by a few centimeters.
     assert (low >= -half - np.array([0.12, 0.12, 0.02])).all(), low
     assert (high <= half + np.array([0.12, 0.12, height + 0.03])).all(), high
     assert high[2] - low[2] >= 0.95 * height
@@ -75,18 +75,18 @@ def test_each_shape_fills_its_box_and_keeps_to_it(shape: str) -> None:
     assert all(volume(triangles) >= -1e-6 for material, triangles in mesh.items() if material == "paint")
 
 
-def test_every_shape_has_a_builder_and_every_material_a_color() -> None:
+def test_all_shapes_have_meshes_and_all_materials_colors() -> None:
     assert set(BUILDERS) == set(SHAPES)
     for shape in SHAPES:
         assert set(actor_mesh(spec_of(shape))) <= {*MATERIALS, "paint"}
     assert set(building((20.0, 10.0, 9.0))) <= {*MATERIALS, "wall"}
 
 
-def test_meshes_are_made_once_for_each_size() -> None:
+def test_meshes_are_cached_by_size() -> None:
     assert actor_mesh(spec_of("car")) is actor_mesh(spec_of("car"))
 
 
-def test_paint_goes_by_name() -> None:
+def test_paint_depends_on_the_name() -> None:
     assert paint("Ego", "car") == paint("Ego", "car")
     assert len({paint(f"Car {index}", "car") for index in range(40)}) == len(PAINTS)
     assert paint("Ego", "firetruck") == MATERIALS["red"]

@@ -1,4 +1,4 @@
-"""Scripted actors, the view, and the world's own bookkeeping."""
+"""Tests of scripted actors, views, and names in the world."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from eidrive_scenario.world.physics.engine import substeps_per_tick
 CarFactory = Callable[..., ActorSpec]
 
 
-def test_scripted_actors_stand_exactly_where_they_are_placed(world: World, car: CarFactory) -> None:
+def test_scripted_actors_have_exactly_their_placements(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(1.1, 2.2, 0.3, 0.4, 0.01, -0.02, speed=7.0))
     placement = Placement(1.3, 2.25, 0.3, 0.5, 0.02, -0.01, speed=6.5)
     world.step({"A": placement}, {})
@@ -34,13 +34,13 @@ def test_velocity_follows_speed_and_displacement(world: World, car: CarFactory) 
     assert first.acceleration[0].tolist() == [0.0, 0.0, 0.0]
     world.step({"A": Placement(0.51, 0.05, speed=10.4)}, {})
     view = world.view()
-    # Along the heading the stated speed, across it the distance over dt.
+    # The velocity along the heading is the stated speed, the lateral one the distance over dt.
     assert view.velocity[0] == pytest.approx((10.4, 1.0, 0.0))
     assert view.acceleration[0] == pytest.approx((8.0, 20.0, 0.0))
 
 
-def test_who_goes_where_it_points_has_the_tangent_for_its_velocity(world: World, car: CarFactory) -> None:
-    """Round a circle of 50 m at 10 m/s: 0.2 rad/s, 2 m/s² to the middle; the chord of a step lags by half of it."""
+def test_placement_without_lateral_motion_has_tangential_velocity(world: World, car: CarFactory) -> None:
+    """A circle of 50 m at 10 m/s has 0.2 rad/s and 2 m/s² to the center; the chord of a step lags by half of it."""
     world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
     for number in (1, 2):
         angle = 0.01 * number
@@ -57,7 +57,7 @@ def test_yaw_rate_wraps(world: World, car: CarFactory) -> None:
     assert world.view().yaw_rate[0] == pytest.approx(0.02 / 0.05)
 
 
-def test_teleport_leaves_no_trace_in_velocity(world: World, car: CarFactory) -> None:
+def test_teleport_does_not_affect_velocity(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0, speed=5.0))
     world.step({"A": Placement(100.0, 50.0, yaw=math.pi / 2, speed=3.0, teleport=True)}, {})
     view = world.view()
@@ -66,7 +66,7 @@ def test_teleport_leaves_no_trace_in_velocity(world: World, car: CarFactory) -> 
     assert view.yaw_rate[0] == 0.0
 
 
-def test_without_a_placement_an_actor_stands(world: World, car: CarFactory) -> None:
+def test_scripted_actor_without_placement_stands(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(1.0, 2.0, speed=5.0))
     world.step({}, {})
     view = world.view()
@@ -74,7 +74,7 @@ def test_without_a_placement_an_actor_stands(world: World, car: CarFactory) -> N
     assert view.speed[0] == 0.0
 
 
-def test_rows_follow_the_order_of_entry(world: World, car: CarFactory) -> None:
+def test_rows_follow_the_order_of_addition(world: World, car: CarFactory) -> None:
     for name in ("C", "A", "B"):
         world.add(car(name), Placement(10.0 * ord(name), 0.0))
     world.remove("A")
@@ -86,19 +86,19 @@ def test_rows_follow_the_order_of_entry(world: World, car: CarFactory) -> None:
     assert view.size.shape == view.offset.shape == (3, 3)
 
 
-def test_an_empty_world_has_an_empty_view(world: World) -> None:
+def test_empty_world_has_an_empty_view(world: World) -> None:
     world.step({}, {})
     assert world.view().position.shape == (0, 3)
     assert len(world.view().names) == 0
 
 
-def test_the_view_is_frozen(world: World, car: CarFactory) -> None:
+def test_view_is_immutable(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0))
     with pytest.raises(ValueError, match="read-only"):
         world.view().position[0, 0] = 1.0
 
 
-def test_names_must_be_known_and_unique(world: World, car: CarFactory) -> None:
+def test_unknown_and_duplicate_names_are_errors(world: World, car: CarFactory) -> None:
     world.add(car("Ego"), Placement(0.0, 0.0))
     with pytest.raises(SimulationError, match="already"):
         world.add(car("Ego"), Placement(9.0, 0.0))
@@ -107,17 +107,17 @@ def test_names_must_be_known_and_unique(world: World, car: CarFactory) -> None:
 
 
 @pytest.mark.parametrize(("dt", "rate", "count"), [(0.05, 200.0, 10), (0.01, 200.0, 2), (0.03, 200.0, 6), (0.1, 60, 6)])
-def test_whole_physics_steps_per_tick(dt: float, rate: float, count: int) -> None:
+def test_substeps_per_tick_of_a_multiple(dt: float, rate: float, count: int) -> None:
     assert substeps_per_tick(dt, rate) == count
 
 
 @pytest.mark.parametrize(("dt", "rate"), [(0.033, 200.0), (0.001, 200.0), (0.0, 200.0)])
-def test_broken_physics_steps_are_refused(dt: float, rate: float) -> None:
-    with pytest.raises(SettingError, match="whole number"):
+def test_substeps_per_tick_of_a_fraction_is_an_error(dt: float, rate: float) -> None:
+    with pytest.raises(SettingError, match="is an integer of at least 1"):
         World(dt=dt, physics_rate=rate)
 
 
-def test_handing_over_keeps_motion_and_row(world: World, car: CarFactory) -> None:
+def test_set_driven_keeps_motion_and_row(world: World, car: CarFactory) -> None:
     world.add(car("Ego"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(0.0, 50.0))
     world.set_driven("Ego", True)
@@ -132,7 +132,7 @@ def test_handing_over_keeps_motion_and_row(world: World, car: CarFactory) -> Non
     assert world.view().position[0].tolist() == [20.0, 0.0, 0.0]
 
 
-def test_distance_is_between_the_boxes(world: World, car: CarFactory) -> None:
+def test_distance_is_measured_between_boxes(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0))
     world.add(car("B"), Placement(10.0, 0.0))
     world.add(car("C"), Placement(10.0, 4.8, yaw=math.pi))
@@ -141,7 +141,7 @@ def test_distance_is_between_the_boxes(world: World, car: CarFactory) -> None:
 
 
 def run(seed_speed: float, car: CarFactory, worlds: int) -> list[np.ndarray]:
-    """The last positions of a pushed-about scene in several worlds that take turns."""
+    """Return the last positions of a scene with collisions in several worlds that are stepped alternately."""
     opened = [World(dt=0.05) for _ in range(worlds)]
     for world in opened:
         world.add(car("Ego"), Placement(0.0, 0.0, speed=seed_speed), driven=True)
@@ -158,14 +158,14 @@ def run(seed_speed: float, car: CarFactory, worlds: int) -> list[np.ndarray]:
     return results
 
 
-def test_two_worlds_agree_bit_by_bit_and_do_not_disturb_each_other(car: CarFactory) -> None:
+def test_concurrent_worlds_are_identical_and_independent(car: CarFactory) -> None:
     alone = run(15.0, car, 1)[0]
     for result in run(15.0, car, 3):
         assert result.tobytes() == alone.tobytes()
     assert run(15.1, car, 1)[0].tobytes() != alone.tobytes()
 
 
-def test_looking_changes_nothing(car: CarFactory) -> None:
+def test_views_rays_and_images_do_not_change_the_run(car: CarFactory) -> None:
     def play(look: bool) -> bytes:
         with World(dt=0.05) as world:
             world.add(car("Ego"), Placement(0.0, 0.0, speed=12.0), driven=True)
@@ -181,7 +181,7 @@ def test_looking_changes_nothing(car: CarFactory) -> None:
 
 
 @pytest.mark.parametrize("dt", [100.005, 1e300, 1e308, math.inf, math.nan, -1e300])
-def test_substeps_per_tick_of_an_immense_tick_are_refused(dt: float) -> None:
-    """They are taken at once: a run would not return."""
+def test_substeps_per_tick_of_an_immense_tick_is_an_error(dt: float) -> None:
+    """All steps are computed in one call, so that the run would not return."""
     with pytest.raises(SettingError, match="give a dt of at most 100 s"):
         substeps_per_tick(dt, 200.0)

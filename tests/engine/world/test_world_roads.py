@@ -1,4 +1,4 @@
-"""Driven cars on slopes, rays over hills, buildings from the map."""
+"""Tests of driven cars on slopes, rays over hills, and buildings of the map."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def slope(grade: float) -> str:
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
-def test_a_car_follows_the_slope(car: CarFactory, heading: float) -> None:
+def test_driven_car_follows_the_slope(car: CarFactory, heading: float) -> None:
     along = np.array([math.cos(heading), math.sin(heading)])
     aside = np.array([math.sin(heading), -math.cos(heading)])
     with World(road(slope(0.05), heading)) as world:
@@ -58,7 +58,7 @@ def test_a_car_follows_the_slope(car: CarFactory, heading: float) -> None:
         assert abs(view.position[0, :2] @ aside - 4.0) < 1e-3
 
 
-def test_gravity_pulls_along_the_slope_and_the_brake_holds(car: CarFactory) -> None:
+def test_gravity_accelerates_on_slope_and_brake_holds(car: CarFactory) -> None:
     free = {"drag_area": 0, "rolling_resistance": 0}
     with World(road(slope(0.08))) as world:
         world.add(car("Rolls", **free), Placement(200.0, -2.0), driven=True)
@@ -71,17 +71,17 @@ def test_gravity_pulls_along_the_slope_and_the_brake_holds(car: CarFactory) -> N
     assert view.position[1, 0] == pytest.approx(200.0, abs=1e-3)
 
 
-def test_a_bank_rolls_the_car(car: CarFactory) -> None:
+def test_superelevation_rolls_the_car(car: CarFactory) -> None:
     with World(road(bank=0.06)) as world:
         world.add(car(), Placement(50.0, -4.0, yaw=math.pi, speed=5.0), driven=True)
         world.step({}, {})
         view = world.view()
-    # Against the direction of the road, what lifted the left now lifts the right.
+    # Against the direction of the road, the superelevation that raised the left side raises the right side.
     assert view.roll[0] == pytest.approx(-0.06, abs=1e-3)
     assert view.position[0, 2] == pytest.approx(-4.0 * math.tan(0.06), rel=0.02)
 
 
-def test_a_crest_hides_what_is_behind_it(car: CarFactory) -> None:
+def test_crest_blocks_line_of_sight(car: CarFactory) -> None:
     crest = '<elevation s="0" a="0" b="0.1" c="0" d="0"/><elevation s="100" a="10" b="-0.1" c="0" d="0"/>'
     with World(road(crest)) as world:
         world.add(car("Behind"), Placement(150.0, -4.0, 5.0))
@@ -91,7 +91,7 @@ def test_a_crest_hides_what_is_behind_it(car: CarFactory) -> None:
         assert ground.position[0, 2] == pytest.approx(6.0, abs=0.05)
 
 
-def test_a_building_of_the_map_stands_in_the_way() -> None:
+def test_building_of_the_map_blocks_rays() -> None:
     place = 's="50" t="20" zOffset="0" hdg="0"'
     house = f'<object id="7" type="building" name="School" {place} length="20" width="10" height="9"/>'
     with World(road(objects=house)) as world:
@@ -100,7 +100,7 @@ def test_a_building_of_the_map_stands_in_the_way() -> None:
     assert hits.position[0] == pytest.approx((50.0, 15.0, 3.0), abs=1e-3)
 
 
-def test_the_picture_shows_road_and_verge() -> None:
+def test_image_shows_road_and_verge() -> None:
     pose = np.array([[0.0, 0.0, 1.0, 10.0], [-1.0, 0.0, 0.0, -4.0], [0.0, -1.0, 0.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
     with World(road()) as world:
         picture = world.camera(pose, 160, 120, math.radians(90))
@@ -108,5 +108,5 @@ def test_the_picture_shows_road_and_verge() -> None:
     assert max(middle) - min(middle) < 15
     assert left[1] > left[0] + 10
     assert left[1] > left[2] + 10
-    # Flat ground 2 m below at the middle of row 115, 35.5 lines below the axis, with a focal length of 80.
+    # Flat ground 2 m below at the center of row 115, 35.5 lines below the axis, with a focal length of 80.
     assert picture.depth[115, 80] == pytest.approx(2.0 * 80 / 55.5, rel=0.01)

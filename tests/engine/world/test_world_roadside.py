@@ -1,4 +1,4 @@
-"""Traffic lights, signs and lamps in pictures: what is lit where, whose it is, and what nobody sees."""
+"""Tests of traffic lights, signs and lamps in images: luminance, labels and visibility."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
 
 
 def looking(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
-    """A level camera."""
+    """Return the pose of a level camera."""
     pose = np.eye(4)
     pose[:3, 0] = (math.sin(yaw), -math.cos(yaw), 0.0)
     pose[:3, 1] = (0.0, 0.0, -1.0)
@@ -66,7 +66,7 @@ def street() -> Any:
 
 
 def lit_lamps(world: World, state: str, signal: str = "L", time: float = 0.0) -> list[str]:
-    """Colors of the thirds (or halves) of a light's head that shine, from the top."""
+    """Return the colors of the lit thirds (or halves) of a signal head from the top."""
     while world.time < time - 1e-9:
         world.step({}, {})
     world.set_display_state({signal: state}, {})
@@ -95,31 +95,31 @@ def lit_lamps(world: World, state: str, signal: str = "L", time: float = 0.0) ->
         ("some state", ["", "", ""]),
     ],
 )
-def test_the_lamps_of_a_light_shine_by_its_state(street: World, state: str, expected: list[str]) -> None:
+def test_lamps_are_lit_by_signal_state(street: World, state: str, expected: list[str]) -> None:
     assert lit_lamps(street, state) == expected
 
 
-def test_a_light_for_pedestrians_has_two_lamps_and_unset_ones_are_dark(street: World) -> None:
+def test_pedestrian_light_has_two_lamps_that_are_dark_without_state(street: World) -> None:
     assert lit_lamps(street, "off;on", "P") == ["", "green"]
     assert lit_lamps(street, "red", "P") == ["red", ""]
     street.set_display_state({}, {})
     assert lit_lamps(street, "off") == ["", "", ""]
 
 
-def test_a_flashing_lamp_is_dark_every_other_half_second(street: World) -> None:
+def test_flashing_lamp_is_dark_half_of_each_second(street: World) -> None:
     assert [lit_lamps(street, "flashing", time=time)[1] for time in (0.0, 0.25, 0.6, 1.1)] == [
         *("yellow", "yellow", "", "yellow")
     ]
 
 
-def test_the_segmentation_tells_signals_apart(street: World) -> None:
+def test_segmentation_separates_signals(street: World) -> None:
     assert set(street.signal_labels.values()) == {"L", "P", "S"}
     assert max(street.signal_labels) == -10
     shot = picture(street, 15.0, -3.0, 2.4)
     assert set(np.unique(shot.segmentation)) == {-1, *street.signal_labels}
 
 
-def test_from_behind_a_sign_is_bare_metal(street: World) -> None:
+def test_back_of_a_sign_is_gray(street: World) -> None:
     label = next(label for label, name in street.signal_labels.items() if name == "S")
 
     def redness(shot: Any) -> float:
@@ -158,12 +158,12 @@ def signal(
         (signal("R2-1", country="US", value=35.0), SignFace("board", "white", "black", "35")),
     ],
 )
-def test_signs_by_country_and_number(given: Signal, face: SignFace) -> None:
+def test_sign_face_by_country_and_number(given: Signal, face: SignFace) -> None:
     assert sign_face(given) == face
 
 
 @pytest.mark.parametrize("face", [STOP, YIELD, PRIORITY, NO_ENTRY, WARNING, OTHER])
-def test_a_sign_fits_its_size_and_faces_the_traffic(face: SignFace) -> None:
+def test_sign_mesh_has_its_size_and_faces_the_traffic(face: SignFace) -> None:
     parts = np.concatenate(list(sign(face, 0.6, 0.9).values()))
     assert parts[..., 1].min() >= -0.301
     assert parts[..., 1].max() <= 0.301
@@ -179,7 +179,7 @@ def test_a_sign_fits_its_size_and_faces_the_traffic(face: SignFace) -> None:
 
 
 def tail(world: World) -> np.ndarray:
-    """Mean color of the left half, and of the right half, of the car's rear where it is brightest."""
+    """Return the mean colors of the brightest area in the left and the right half of the rear of the car."""
     shot = picture(world, 0.0, 0.0, 1.0)
     rows, columns = np.nonzero(shot.segmentation == 0)
     halves = []
@@ -209,7 +209,7 @@ def test_brake_lights_brighten_both_sides(world: World, gray: ActorSpec) -> None
     assert tail(world) == pytest.approx(dark, abs=3.0)
 
 
-def test_an_indicator_flashes_on_its_side(world: World, gray: ActorSpec) -> None:
+def test_indicator_flashes_on_its_side(world: World, gray: ActorSpec) -> None:
     world.add(gray, Placement(8.0, 0.0))
     dark = tail(world)[:, 1]
     world.set_display_state({}, lights(LightState("indicatorLeft", "flashing")))
@@ -221,7 +221,7 @@ def test_an_indicator_flashes_on_its_side(world: World, gray: ActorSpec) -> None
     assert tail(world)[0, 1] == pytest.approx(dark[0], abs=3.0)
 
 
-def test_low_beam_lights_the_road_at_night_by_itself_or_by_the_scenario(world: World, gray: ActorSpec) -> None:
+def test_low_beam_is_on_at_night_automatically_or_by_the_scenario(world: World, gray: ActorSpec) -> None:
     world.add(gray, Placement(0.0, 0.0))
     world.set_weather(Weather(sun_elevation=-30.0, street_lighting=1.0))
 
@@ -240,10 +240,10 @@ def _pinhole() -> Pinhole:
     return Pinhole.of_fov(400, 300, math.radians(60))
 
 
-# Who sees whom
+# Visibility
 
 
-def test_an_actor_without_graphics_is_in_no_picture(world: World, gray: ActorSpec) -> None:
+def test_actor_without_graphics_is_not_drawn(world: World, gray: ActorSpec) -> None:
     world.add(gray, Placement(8.0, 0.0))
     assert (picture(world, 0.0, 0.0, 1.0).segmentation == 0).any()
     world.set_display_state({}, {"Ego": Appearance(visibility=Visibility(graphics=False))})
@@ -251,7 +251,7 @@ def test_an_actor_without_graphics_is_in_no_picture(world: World, gray: ActorSpe
     assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
 
 
-def test_an_actor_that_sensors_do_not_see_lets_rays_pass(world: World, gray: ActorSpec) -> None:
+def test_rays_pass_actor_hidden_from_sensors(world: World, gray: ActorSpec) -> None:
     world.add(gray, Placement(8.0, 0.0))
     world.set_display_state({}, {"Ego": Appearance(visibility=Visibility(sensors=False))})
     assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == -2
@@ -261,7 +261,7 @@ def test_an_actor_that_sensors_do_not_see_lets_rays_pass(world: World, gray: Act
     assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
 
 
-def test_a_view_without_some_actors(world: World, car: CarFactory) -> None:
+def test_view_without_some_actors(world: World, car: CarFactory) -> None:
     for number, name in enumerate(("A", "B", "C")):
         world.add(car(name), Placement(10.0 * number, 0.0))
     less = world.view().without({"B", "nobody"})
@@ -276,14 +276,14 @@ def test_a_view_without_some_actors(world: World, car: CarFactory) -> None:
     ("motion", "tall"),
     [("", 1.8), ("standing", 1.8), ("lying", 0.3), ("sitting", 1.4), ("crawling", 0.75), ("unknown", 1.8)],
 )
-def test_people_are_as_tall_as_their_posture(motion: str, tall: float) -> None:
+def test_pedestrian_height_depends_on_posture(motion: str, tall: float) -> None:
     spec = ActorSpec("Anna", "pedestrian", "pedestrian", (0.6, 0.5, 1.8), (0.0, 0.0, 0.9))
     points = np.concatenate(list(actor_mesh(spec, motion).values())).reshape(-1, 3)
     assert points[:, 2].max() - points[:, 2].min() == pytest.approx(tall, abs=0.15)
     assert points[:, 2].min() == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_posture_shows_in_the_picture(world: World) -> None:
+def test_posture_is_visible_in_image(world: World) -> None:
     spec = ActorSpec("Anna", "pedestrian", "pedestrian", (0.6, 0.5, 1.8), (0.0, 0.0, 0.9))
     world.add(spec, Placement(8.0, 0.0, yaw=math.pi / 2))
 

@@ -1,4 +1,4 @@
-"""Driven cars that nothing can touch move without pybullet: as they would with it, and as long as nothing can."""
+"""Comparison of driven cars that move without pybullet with cars that move in pybullet."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ HILL = """<OpenDRIVE>
 
 
 def wild_ride(tick: int) -> Control:
-    """Throttle, curves to both sides, a full brake, reverse."""
+    """Return throttle, curves to both sides, a full brake, and reverse."""
     if tick < 60:
         return Control(throttle=0.8, steering=0.05 * math.sin(0.3 * tick))
     if tick < 120:
@@ -51,7 +51,7 @@ def watch_all(
 
 
 def ride(spec: ActorSpec, roads: RoadNetwork | None) -> np.ndarray:
-    """(ticks, 14) all that the view says of the car."""
+    """Return all values of the view of the car (ticks, 14)."""
     rows = []
     with World(roads, dt=0.05) as world:
         world.add(spec, Placement(12.0, -4.0, yaw=0.6, speed=3.0), driven=True)
@@ -64,17 +64,17 @@ def ride(spec: ActorSpec, roads: RoadNetwork | None) -> np.ndarray:
 
 
 @pytest.mark.parametrize("hilly", [False, True])
-def test_the_same_with_and_without_pybullet(car: CarFactory, hilly: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_motion_without_pybullet_equals_pybullet(car: CarFactory, hilly: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     roads = RoadNetwork.parse(HILL) if hilly else None
     without = ride(car(), roads)
     monkeypatch.setattr(Physics, "_within_reach", watch_all)
     inside = ride(car(), roads)
     assert np.ptp(without[:, 9]) > math.pi
-    # pybullet turns a body that leans on a slope by the gyroscopic moment of its made-up inertia, some 1e-6 rad a step.
+    # pybullet rotates a body on a slope by the gyroscopic moment of its substitute inertia, some 1e-6 rad per step.
     assert without == pytest.approx(inside, abs=1e-3 if hilly else 1e-9)
 
 
-def test_nobody_is_watched_but_near_others(car: CarFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cars_use_pybullet_only_near_others(car: CarFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     watched: list[bool] = []
     find = Physics._within_reach
 
@@ -94,13 +94,13 @@ def test_nobody_is_watched_but_near_others(car: CarFactory, monkeypatch: pytest.
             gaps.append(world.distance("Ego", "Parked"))
             world.step({}, {"Ego": Control(throttle=0.1)})
         assert world.view().contacts == ()
-    # 0.8 m lie between them as the one passes the other, at half a meter a tick.
+    # The gap is 0.8 m while one car passes the other, at half a meter per tick.
     assert min(gaps) == pytest.approx(0.8)
     assert all(seen for gap, seen in zip(gaps, watched, strict=True) if gap <= 0.81)
     assert not any(seen for gap, seen in zip(gaps, watched, strict=True) if gap > 1.2)
 
 
-def test_a_parked_car_stays_and_sets_off_when_it_is_told(car: CarFactory) -> None:
+def test_parked_car_stays_until_throttle(car: CarFactory) -> None:
     with World(dt=0.05) as world:
         world.add(car(), Placement(3.0, 1.0, yaw=0.7), driven=True)
         for _ in range(20):

@@ -1,4 +1,4 @@
-"""The dimness under and close around bodies, where they keep the sky's light from the ground."""
+"""Contact shadows: reduced sky light below and beside bodies."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from eidrive_scenario.world.render.model import MeshInstance
 from eidrive_scenario.world.render.rasterization import Cover
 
 _LEAST = 0.12
-"""Share of the sky's light in the middle below a body."""
+"""Share of sky light below the center of a body."""
 _REACH = 0.9
-"""How far around a body the ground is dimmed [m]."""
+"""Distance from a body within which the ground is darkened [m]."""
 _INSET = 0.35
-"""How far under its edge it is darkest [m]."""
+"""Distance from the edge to the darkest line below a body [m]."""
 _NEAR_GROUND = 0.12
-"""How far from the level of a body's foot ground may lie to be dimmed [m]."""
+"""Maximum height difference between the base of a body and darkened ground [m]."""
 _FEWEST_PIXELS = 10.0
 
 
@@ -30,18 +30,18 @@ class _Window(NamedTuple):
     columns: slice
 
 
-def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.bool_], eye: CameraView) -> Floats:
-    """(H, W) share of the sky's light that bodies leave to the ground that the pixels show; `upright` by triangle."""
-    share = np.ones(eye.shape, dtype=np.float32)
+def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.bool_], view: CameraView) -> Floats:
+    """Return the share (H, W) of sky light on the ground in the pixels; `upright` by triangle."""
+    share = np.ones(view.shape, dtype=np.float32)
     for body in bodies:
         half = body.model.half
-        middle = body.rotation @ np.array([*body.model.center[:2], 0.0]) + body.position - eye.place
+        middle = body.rotation @ np.array([*body.model.center[:2], 0.0]) + body.position - view.place
         away = math.sqrt(float(middle @ middle))
-        if 2.0 * float(half[0]) * eye.pinhole.focal < _FEWEST_PIXELS * away:
+        if 2.0 * float(half[0]) * view.pinhole.focal < _FEWEST_PIXELS * away:
             continue
-        window = _window(middle, body, half, eye)
+        window = _window(middle, body, half, view)
         if window is not None:
-            _dim(share[window], window, middle, body, cover, upright, eye)
+            _dim(share[window], window, middle, body, cover, upright, view)
     return share
 
 
@@ -52,16 +52,16 @@ def _dim(
     body: MeshInstance,
     cover: Cover,
     upright: NDArray[np.bool_],
-    eye: CameraView,
+    view: CameraView,
 ) -> None:
-    """What one body leaves in its window of the picture."""
+    """Multiply the share of sky light of one body in its window of the image."""
     triangle = cover.triangle[window]
     rows = np.flatnonzero(upright[triangle] & (triangle >= 0))
     if not len(rows):
         return
     far = np.float32(1.0) / cover.nearness[window].ravel()[rows]
-    own_x, own_y = (part.reshape(eye.shape)[window].ravel()[rows] for part in (eye.x, eye.y))
-    x, y, z = (ray * far for ray in eye.rays(own_x, own_y))
+    own_x, own_y = (part.reshape(view.shape)[window].ravel()[rows] for part in (view.x, view.y))
+    x, y, z = (ray * far for ray in view.rays(own_x, own_y))
     level = np.flatnonzero(np.abs(z - np.float32(middle[2])) < _NEAR_GROUND)
     rows, dx, dy = rows[level], x[level] - np.float32(middle[0]), y[level] - np.float32(middle[1])
     half = body.model.half
@@ -77,13 +77,13 @@ def _dim(
     share[lines, columns] = np.minimum(share[lines, columns], np.float32(_LEAST) + np.float32(1.0 - _LEAST) * rise)
 
 
-def _window(middle: Array, body: MeshInstance, half: Array, eye: CameraView) -> _Window | None:
-    """The part of the picture that the dimmed ground around a body can fill; None if it is out of the picture."""
-    pinhole = eye.pinhole
+def _window(middle: Array, body: MeshInstance, half: Array, view: CameraView) -> _Window | None:
+    """Return the window of the image around the darkened ground of a body; None if it is outside."""
+    pinhole = view.pinhole
     signs = np.array([(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)], dtype=float)
     reach = np.array([half[0] + _REACH, half[1] + _REACH, 0.0])
     corners = (signs * reach) @ body.rotation.T + middle
-    corners = _ahead(corners @ eye.pose[:3, :3], pinhole.near)
+    corners = _ahead(corners @ view.pose[:3, :3], pinhole.near)
     if not len(corners):
         return None
     x, y, depth = corners.T
@@ -96,7 +96,7 @@ def _window(middle: Array, body: MeshInstance, half: Array, eye: CameraView) -> 
 
 
 def _ahead(corners: Array, near: float) -> Array:
-    """Return the part (M, 3) of a polygon (N, 3) in the camera's frame that is not nearer than the near plane."""
+    """Return the part (M, 3) of a polygon (N, 3) in the camera frame beyond the near plane."""
     if (corners[:, 2] >= near).all():
         return corners
     found = []

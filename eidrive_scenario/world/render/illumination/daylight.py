@@ -1,4 +1,4 @@
-"""The light of sun and sky, by the weather."""
+"""Light of sun and sky by the weather."""
 
 from __future__ import annotations
 
@@ -12,31 +12,34 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.weather import EXTINCTION_AT_RANGE, Weather
 
 LUMA = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance of linear sRGB (IEC 61966-2-1)."""
+"""Luminance weights of linear sRGB (IEC 61966-2-1)."""
 RAYLEIGH = 0.008735 * np.array([0.610, 0.550, 0.465]) ** -4.08
 """Optical depth of pure air for red, green, blue (Leckner 1978, with wavelengths in µm)."""
 HAZE = 0.05 * np.array([0.610, 0.550, 0.465]) ** -1.3
-"""The same of a clear day's aerosol (Ångström, turbidity 0.05)."""
+"""Optical depth of the aerosol of a clear day (Ångström, turbidity 0.05)."""
 TWILIGHT = ((0.0, 800.0), (-6.0, 3.4), (-12.0, 0.0083), (-18.0, 0.00065))
-"""Illuminance on the ground [lx] by the sun's elevation [degrees] (RCA Electro-Optics Handbook, 1974)."""
+"""Illuminance of the ground [lx] by the elevation of the sun [degrees] (RCA Electro-Optics Handbook, 1974)."""
 NIGHT_GLOW = 0.02
-"""Of a town's sky at night [lx]: 18 mag/arcsec², a bright suburb."""
+"""Illuminance of a town sky at night [lx]: 18 mag/arcsec², a bright suburb."""
 GROUND_ALBEDO = 0.12
 THICKENING = 50.0
-"""Clouds that give this much rain let half as much light through as others [mm/h]."""
+"""Rain intensity at which clouds transmit half as much light as without rain [mm/h]."""
 CLEAR_AIR = EXTINCTION_AT_RANGE / 20_000.0
-"""Extinction that the formulas for clear and cloudy days have in them [1/m]."""
+"""Extinction that the formulas of clear and cloudy days include [1/m]."""
 WHITENING = 300.0
-"""Length of the way on which light in thick air is scattered again and again [m]."""
+"""Path length over which light in thick air is scattered many times [m]."""
 FOG_HEIGHT = 120.0
-"""Of the layer of thick air that light from above passes [m]."""
+"""Height of the layer of thick air for light from above [m]."""
 
 
 class Daylight(NamedTuple):
-    """sun       light across the sun's rays (3,) [lx], as it reaches the ground; `towards` unit vector to the sun
+    """Light of sun and sky.
+
+    sun       light across the rays of the sun (3,) [lx] at the ground
+    towards   unit vector to the sun
     sky       light of the whole sky on level ground (3,) [lx]
-    clear, clouds  what the clear and the covered part of the sky give of `sky` (3,) [lx]
-    ground    light on level ground of all (3,) [lx]
+    clear, clouds  parts of `sky` by the clear and the covered sky (3,) [lx]
+    ground    total light on level ground (3,) [lx]
     air       luminance of thick air (3,) [cd/m²]
     """
 
@@ -51,9 +54,12 @@ class Daylight(NamedTuple):
 
 @lru_cache(maxsize=64)
 def daylight(weather: Weather) -> Daylight:
-    """Clear days by IES, Calculation of daylight availability (1984): sun 127.5 klx exp(-0.21 / sin h), sky
-    0.8 + 15.5 sin½ h klx. Under clouds the light of both falls to 1 - 0.75 c^3.4 (Kasten and Czeplak 1980), the sun's
-    share with the clear part of the sky. In fog the rest of the sun's beam is scattered, half of it downwards.
+    """Return the light of sun and sky.
+
+    Clear days by IES, Calculation of daylight availability (1984): sun 127.5 klx exp(-0.21 / sin h), sky
+    0.8 + 15.5 sin½ h klx. Under clouds the light of both decreases to 1 - 0.75 c^3.4 (Kasten and Czeplak 1980), and the
+    share
+    of the sun with the clear part of the sky. In fog the rest of the sun beam is scattered, half of it downwards.
     """
     towards = np.array(weather.sun_direction)
     height = float(towards[2])
@@ -91,27 +97,27 @@ def daylight(weather: Weather) -> Daylight:
     ground = sky + sun * max(height, 0.0)
     lamps = weather.street_lighting * np.array([1.0, 0.86, 0.62])
     air = (sky + 0.5 * sun * max(height, 0.0) + 0.25 * lamps) / math.pi
-    # Light that drops have scattered many times has lost the sky's blue.
+    # Light that drops have scattered many times has lost the blue of the sky.
     white = math.exp(-WHITENING * max(weather.extinction - CLEAR_AIR, 0.0))
     air = white * air + (1.0 - white) * float(air @ LUMA) * np.array([0.985, 1.0, 1.03])
     return Daylight(sun, towards, sky, clear_light, cloud_light, ground, air)
 
 
 def _twilight(elevation: float) -> float:
-    """[lx]; log-linear between the table's elevations."""
+    """Return the illuminance [lx], log-linear between the elevations of the table."""
     angles, values = zip(*reversed(TWILIGHT), strict=True)
     return math.exp(float(np.interp(elevation, angles, np.log(values))))
 
 
 def _sunlight_color(elevation: float) -> Array:
-    """Linear sRGB of luminance 1: what air and haze leave (air mass by Kasten and Young 1989)."""
+    """Return linear sRGB of luminance 1 after air and haze (air mass by Kasten and Young 1989)."""
     height = max(elevation, 0.0)
     mass = 1.0 / (math.sin(math.radians(height)) + 0.50572 * (height + 6.07995) ** -1.6364)
     return _unit(np.exp(-np.minimum(mass, 12.0) * (RAYLEIGH + HAZE)))
 
 
 def _low(elevation: float) -> float:
-    """How much a low sun colors clouds, in [0, 1]."""
+    """Return the weight in [0, 1] of the color of a low sun on clouds."""
     return float(np.clip(1.0 - abs(elevation - 2.0) / 10.0, 0.0, 1.0))
 
 

@@ -1,4 +1,4 @@
-"""The light of headlamps in a picture, found for every second pixel both ways and taken over by its neighbors."""
+"""Light of headlamps in an image, computed for every second pixel in both directions and interpolated."""
 
 from __future__ import annotations
 
@@ -16,48 +16,48 @@ from eidrive_scenario.world.render.illumination import lamps
 from eidrive_scenario.world.render.rasterization import Cover
 
 _BESIDE_THE_CAMERA = 4.0
-"""Lamps as near as this send light along the camera's own rays, so that sheeting returns it there [m]."""
+"""Maximum distance of lamps that illuminate along the rays of the camera, so that sheeting returns the light [m]."""
 _SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 
 class Lamplight(NamedTuple):
-    """Light on the surfaces that the pixels (P,) show, and light across the rays of lamps beside the camera [lx]."""
+    """Light on the surfaces in pixels (P,), and light across the rays of lamps beside the camera [lx]."""
 
     received: Floats
     across: Floats
 
 
-def lamplight(beams: Sequence[lamps.Beam], cover: Cover, surfaces: Surfaces, eye: CameraView) -> Lamplight | None:
-    """Return the light of all beams; None if the picture shows nothing."""
+def lamplight(beams: Sequence[lamps.Beam], cover: Cover, surfaces: Surfaces, view: CameraView) -> Lamplight | None:
+    """Return the light of all beams; None if the image is empty."""
     triangle = cover.triangle[::2, ::2]
     seen = triangle >= 0
     if not seen.any():
         return None
-    numbers = np.arange(cover.triangle.size).reshape(eye.shape)[::2, ::2][seen]
+    numbers = np.arange(cover.triangle.size).reshape(view.shape)[::2, ::2][seen]
     far = np.float32(1.0) / cover.nearness.ravel()[numbers]
-    x, y, z = (ray * far for ray in eye.rays(eye.x[numbers], eye.y[numbers]))
+    x, y, z = (ray * far for ray in view.rays(view.x[numbers], view.y[numbers]))
     normals = surfaces.normal[:, triangle[seen]]
     canvas = lamps.Canvas(x, y, z, (normals[0], normals[1], normals[2]), lamps.numbered(seen))
     sampled = lamps.Sample.of(canvas)
     received, across = (np.zeros(len(numbers), dtype=np.float32) for _ in range(2))
     for beam in beams:
-        shone = lamps.shine(beam, eye.place, canvas, sampled)
+        shone = lamps.shine(beam, view.place, canvas, sampled)
         if shone is not None:
             rows, onto, straight = shone
             received[rows] += onto
-            if float(np.linalg.norm(beam.position - eye.place)) < _BESIDE_THE_CAMERA:
+            if float(np.linalg.norm(beam.position - view.place)) < _BESIDE_THE_CAMERA:
                 across[rows] += straight
     with np.errstate(divide="ignore"):
-        distance = eye.length.reshape(eye.shape) / cover.nearness
+        distance = view.length.reshape(view.shape) / cover.nearness
     received, across = (_spread(part, seen, distance).ravel() for part in (received, across))
     return Lamplight(received, across)
 
 
 def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats:
-    """Return values of those of every second pixel both ways that show something, for all pixels (H, W).
+    """Return values of every second pixel in both directions for all pixels (H, W).
 
-    A pixel whose sample had none takes the greatest beside it; one that lies nearer or farther than the sample's point
-    takes the least, so that light does not spill over edges.
+    A pixel whose sample is empty uses the maximum of its neighbors. A pixel at another depth than the sample uses the
+    minimum, so that light does not leak over edges.
     """
     grid = np.full(seen.shape, np.float32(-1.0))
     grid[seen] = values
@@ -74,6 +74,6 @@ def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats
 
 
 def _doubled(grid: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return a grid of every second pixel both ways, at all pixels."""
+    """Return a grid of every second pixel in both directions at all pixels."""
     found: Floats = np.repeat(np.repeat(grid, 2, axis=0)[: shape[0]], 2, axis=1)[:, : shape[1]]
     return found

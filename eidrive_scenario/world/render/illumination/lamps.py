@@ -1,4 +1,4 @@
-"""Light of vehicles' lamps on what stands before them."""
+"""Light of vehicle lamps on objects ahead."""
 
 from __future__ import annotations
 
@@ -11,29 +11,32 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array, Floats
 
 REACH = 70.0
-"""Where the light of a lamp is forgotten [m]."""
+"""Maximum range of the light of a lamp [m]."""
 _WIDTH, _HEIGHT = 1.2, 0.6
-"""Tangents of the angles to the axis beyond which it is forgotten."""
+"""Maximum tangents of the angles to the axis of a lamp."""
 _STRIDE = 4
-"""Of so many lines and columns one is looked at first, to find where the light goes."""
+"""Distance between the lines and columns of the sample that locates the lit area."""
 _FINE = 200
-"""Steps of the table of intensities per unit of the tangent sideways; twice as many upwards."""
+"""Steps of the intensity table per unit of the lateral tangent; twice as many vertically."""
 _COLUMNS = round(2 * _WIDTH * _FINE) + 1
 LOW_BEAM = 24_000.0
-"""Greatest luminous intensity of one lamp on low beam [cd]; in UN Regulation No. 112, class B, the brightest part lies
-0.57 to 1.3 degrees below the horizon, with at most 50,000 cd."""
+"""Maximum luminous intensity of one lamp on low beam [cd].
+
+In UN Regulation No. 112, class B, the brightest part is 0.57 to 1.3 degrees below the horizon with at most 50,000 cd.
+"""
 HIGH_BEAM = 60_000.0
 CUT_OFF = -0.0100
 """Tangent of the angle of the cut-off: 1 % below the horizon."""
 ABOVE_CUT_OFF = 350.0
-"""What goes above it [cd]: the regulation allows 625 cd to oncoming eyes (B50L: 350 cd)."""
+"""Luminous intensity above the cut-off [cd]. The regulation permits 625 cd to oncoming drivers (B50L: 350 cd)."""
 _WARM = (1.06, 1.0, 0.82)
 
 
 class Beam(NamedTuple):
-    """Two headlamps as one: position (3,), axes (3, 3) as columns forward, left, up in the world, share of brightness.
+    """Pair of headlamps as one beam: position (3,), axes (3, 3) as columns forward, left, up in the world, brightness
+    share.
 
-    own   whether the camera is on this vehicle, so that reflective sheeting returns the light to it
+    own  whether the camera is on this vehicle, so that reflective sheeting returns the light to it
     """
 
     position: Array
@@ -43,8 +46,9 @@ class Beam(NamedTuple):
 
 
 class Canvas(NamedTuple):
-    """Points (n,) relative to the camera [m] with the normals of their surfaces; where each pixel's point is: the index
-    (H, W) among them, or -1."""
+    """Points (n,) relative to the camera [m] with the normals of their surfaces, and the index (H, W) of each pixel
+    or -1.
+    """
 
     x: Floats
     y: Floats
@@ -54,14 +58,14 @@ class Canvas(NamedTuple):
 
 
 def numbered(shown: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return (H, W) the numbers of the pixels that show something, line by line from 0 on; -1 for the rest."""
+    """Return consecutive indices (H, W) of the pixels with a triangle, line by line from 0; -1 for the rest."""
     found = np.full(shown.shape, -1, dtype=np.int32)
     found[shown] = np.arange(int(shown.sum()), dtype=np.int32)
     return found
 
 
 class Sample(NamedTuple):
-    """Every few pixels' points of a canvas, and the lines and columns of these pixels."""
+    """Sample of the points of a canvas, with the lines and columns of these pixels."""
 
     x: Floats
     y: Floats
@@ -71,17 +75,22 @@ class Sample(NamedTuple):
 
     @classmethod
     def of(cls, canvas: Canvas) -> Sample:
-        """Return every _STRIDE-th pixel both ways."""
+        """Return every _STRIDE-th pixel in both directions."""
         some = canvas.where[::_STRIDE, ::_STRIDE]
         line, column = np.nonzero(some >= 0)
         rows = some[line, column]
         return cls(canvas.x[rows], canvas.y[rows], canvas.z[rows], line, column)
 
 
-def shine(beam: Beam, eye: Array, canvas: Canvas, sample: Sample) -> tuple[NDArray[np.intp], Floats, Floats] | None:
-    """Illuminance of points before a pair of lamps, seen from `eye` (3,): the rows of the points that get any, their
-    illuminance, and that across the beam [lx]. Where the light ends is looked for in the sample first."""
-    place = (beam.position - eye).astype(np.float32)
+def shine(
+    beam: Beam, viewpoint: Array, canvas: Canvas, sample: Sample
+) -> tuple[NDArray[np.intp], Floats, Floats] | None:
+    """Return the illuminance of points by a pair of lamps: rows of the lit points, illuminance, illuminance across the
+    beam [lx].
+
+    The camera is at `viewpoint` (3,). The extent of the light is searched in the sample first.
+    """
+    place = (beam.position - viewpoint).astype(np.float32)
     axes = beam.axes.astype(np.float32)
     some = _within(place, axes, sample.x, sample.y, sample.z)[0]
     if not len(some):
@@ -106,8 +115,10 @@ def shine(beam: Beam, eye: Array, canvas: Canvas, sample: Sample) -> tuple[NDArr
 def _within(
     place: Floats, axes: Floats, x: Floats, y: Floats, z: Floats
 ) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats, Floats]:
-    """The rows of the points that the lamps may reach, where these lie from the lamps in the world's axes, how far
-    ahead they lie, and the tangents of the angles to the axis, sideways and upwards."""
+    """Return the rows of the points in range of the lamps, their positions relative to the lamps in world axes, their
+    distances
+    ahead, and the tangents of the lateral and vertical angles to the axis.
+    """
     (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = axes
     dx, dy, dz = x - place[0], y - place[1], z - place[2]
     ahead = dx * fx + dy * fy + dz * fz
@@ -129,7 +140,9 @@ def _table(high: bool) -> Floats:
 
 
 def intensity(aside: Array, above: Array, high: bool) -> Array:
-    """Of one lamp [cd], by the tangents of the angles to its axis: a hot spot under the cut-off, and a wide carpet."""
+    """Return the intensity of one lamp [cd] by the tangents of the angles: a hot spot below the cut-off and a wide
+    base.
+    """
     below = CUT_OFF - above
     spot = np.exp(-((aside / 0.20) ** 2) - ((below - 0.012) / 0.045) ** 2)
     carpet = np.exp(-((aside / 0.55) ** 2) - (below / 0.16) ** 2)
@@ -142,5 +155,5 @@ def intensity(aside: Array, above: Array, high: bool) -> Array:
 
 
 def color() -> Floats:
-    """Of the light, linear sRGB."""
+    """Return the color of the light, linear sRGB."""
     return np.array(_WARM, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Which points the sun reaches: a picture of the scene as the sun sees it."""
+"""Shadows of the sun by a shadow map."""
 
 from __future__ import annotations
 
@@ -16,23 +16,24 @@ from eidrive_scenario.world.render.model import MeshInstance
 from eidrive_scenario.world.render.rasterization import greatest
 
 REACH = 80.0
-"""How far from the camera shadows are drawn [m]."""
+"""Maximum distance of shadows from the camera [m]."""
 _COARSEST, _FINEST = 256, 640
-"""Pixels of the sun's picture along its longer side; between these, a little more than the camera's has across."""
+"""Minimum and maximum size of the shadow map in pixels along its longer side, slightly more than that of the camera."""
 _SLACK = 0.04
-"""A point must lie this far behind what the sun sees before it is in shadow [m]; more for large pixels."""
+"""Minimum depth of a point behind the lit surface for shadow [m]; more for large pixels."""
 _LOWEST = 0.035
-"""Sine of the lowest sun that throws shadows."""
+"""Minimum sine of the elevation of the sun for shadows."""
 _DEPTH = 200.0
-"""How far beyond the farthest corner of the view the sun's picture reaches [m]."""
+"""Range of the shadow map beyond the farthest corner of the view [m]."""
 
 
 @dataclass(frozen=True)
 class ShadowGrid:
-    """A grid across the sun's rays over what a camera sees.
+    """Grid across the rays of the sun over the view of a camera.
 
-    axes (2, 3) of the grid and `towards` (3,) in the world, low, high (2,) its ends [m], width, height [px] and scale
-    [px/m], base [m] of heights along the rays; all relative to `eye`, the camera
+    axes (2, 3) of the grid and `towards` (3,) in the world; low, high (2,) are its bounds [m]; width, height [px];
+    scale
+    [px/m]; base [m] of heights along the rays. All are relative to `origin`, the camera position.
     """
 
     axes: Array
@@ -43,10 +44,10 @@ class ShadowGrid:
     height: int
     scale: float
     base: float
-    eye: Array
+    origin: Array
 
     def cells(self, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
-        """Column and row of points relative to the camera, from the middle of the first cell on."""
+        """Return column and row of points relative to the camera, counted from the center of the first cell."""
         (ax, ay, az), (bx, by, bz) = self.axes.astype(np.float32)
         start, scale = self.low.astype(np.float32), np.float32(self.scale)
         column = (ax * x + ay * y + az * z - start[0]) * scale - np.float32(0.5)
@@ -54,16 +55,16 @@ class ShadowGrid:
         return column, row
 
     def numbers(self, x: Floats, y: Floats, z: Floats) -> NDArray[np.int32]:
-        """Return the cells (n,) from whose middles on points lie, line by line; -1 beyond the grid."""
+        """Return the cells (n,) of points, counted between cell centers line by line; -1 outside the grid."""
         column, row = (np.floor(part) for part in self.cells(x, y, z))
         within = (column >= 0) & (column < self.width - 1) & (row >= 0) & (row < self.height - 1)
         found: NDArray[np.int32] = np.where(within, row * np.float32(self.width) + column, -1.0).astype(np.int32)
         return found
 
     def drawn(self, casters: Sequence[MeshInstance]) -> ShadowMap:
-        """What these bodies shade.
+        """Return the shadow map of bodies.
 
-        It shows the sides that turn away from the sun: those facing it lie above, and so do not shade themselves.
+        It contains the sides that face away from the sun: the sides that face it are above and do not shade themselves.
         """
         found = [corners for caster in casters if (corners := _away(caster, self)) is not None]
         if not found:
@@ -74,7 +75,7 @@ class ShadowGrid:
         )
         across, up = (across - self.low[0]) * self.scale, (up - self.low[1]) * self.scale
         found_heights, line, column = greatest(across, up, level - self.base, self.width, self.height)
-        # A margin of one cell, where nothing is, belongs to it: points are looked up between four cells.
+        # An empty margin of one cell is included, as points are interpolated between four cells.
         rows, columns = found_heights.shape
         top, left = max(line - 1, 0), max(column - 1, 0)
         bottom, right = min(line + rows + 1, self.height), min(column + columns + 1, self.width)
@@ -86,7 +87,7 @@ class ShadowGrid:
 
 @dataclass(frozen=True)
 class ShadowMap:
-    """Heights (h, w) along the sun's rays of what it meets first, in a window of the grid; nothing is beyond."""
+    """Heights (h, w) along the rays of the sun of the first surface in a window of the grid; outside there is none."""
 
     grid: ShadowGrid
     heights: Floats
@@ -95,13 +96,14 @@ class ShadowMap:
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """Lines and columns of the grid."""
+        """Lines and columns in the grid."""
         height, width = self.heights.shape
         return slice(self.top, self.top + height), slice(self.left, self.left + width)
 
     def lit(self, x: Floats, y: Floats, z: Floats) -> Floats | None:
-        """(n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid. None if all of
-        it reaches all of them."""
+        """Return the share of the sun (n,) at points relative to the camera [m], 1 outside the grid; None if all are
+        fully lit.
+        """
         height, width = self.heights.shape
         column, row = self.grid.cells(x, y, z)
         left, top = np.floor(column), np.floor(row)
@@ -131,8 +133,7 @@ class ShadowMap:
 
     @cached_property
     def _highest(self) -> Floats:
-        """(h · w,) the greatest of the four cells between whose middles a point lies; -inf at the last line and
-        column."""
+        """Maximum of the four cells around a point (h · w,); -inf in the last line and column."""
         heights = self.heights
         found = np.full_like(heights, -np.inf)
         pairs = np.maximum(heights[:-1], heights[1:])
@@ -140,8 +141,11 @@ class ShadowMap:
         return found.ravel()
 
     def over(self, still: Floats) -> tuple[ShadowMap, NDArray[np.bool_]]:
-        """Together with the heights (height, width) of what stands still; and the cells (height · width + 1,) for whose
-        points that makes a difference: from the middle of a cell to that of the next. The last one stands for none."""
+        """Return this map combined with the heights (height, width) of static objects, and the cells that change
+        points.
+
+        The cells (height · width + 1,) extend between cell centers. The last one represents points outside the grid.
+        """
         heights = still.copy()
         window = self.window
         np.maximum(heights[window], self.heights, out=heights[window])
@@ -151,26 +155,26 @@ class ShadowMap:
         return ShadowMap(self.grid, heights, 0, 0), np.append(around.ravel(), False)
 
 
-def shadow_grid(towards: Array, eye: CameraView) -> ShadowGrid | None:
-    """Return the grid for the part of the world that a camera sees; None if the sun is too low."""
+def shadow_grid(towards: Array, view: CameraView) -> ShadowGrid | None:
+    """Return the grid for the view of a camera; None if the sun is too low."""
     if towards[2] < _LOWEST:
         return None
     first = np.cross(towards, (0.0, 0.0, 1.0) if abs(towards[2]) < 0.99 else (1.0, 0.0, 0.0))
     first /= np.linalg.norm(first)
     axes = np.stack([first, np.cross(towards, first)])
-    seen = _seen_ground(eye)
+    seen = _seen_ground(view)
     flat = seen @ axes.T
     low, high = flat.min(axis=0) - 0.5, flat.max(axis=0) + 0.5
-    pixels = min(max(1.2 * eye.pinhole.width, _COARSEST), _FINEST)
+    pixels = min(max(1.2 * view.pinhole.width, _COARSEST), _FINEST)
     scale = min(pixels / float((high - low).max()), 20.0)
     width, height = (max(math.ceil(extent * scale), 2) for extent in (high - low).tolist())
     base = float((seen @ towards).min()) - _DEPTH
-    return ShadowGrid(axes, towards, low, high, width, height, scale, base, eye.place)
+    return ShadowGrid(axes, towards, low, high, width, height, scale, base, view.place)
 
 
-def _seen_ground(eye: CameraView) -> Array:
-    """(M, 3) points, relative to the camera, around the part of the view within reach, near the ground and above."""
-    pinhole, pose = eye.pinhole, eye.pose
+def _seen_ground(view: CameraView) -> Array:
+    """Return points (M, 3) relative to the camera around the view within reach, near the ground and above."""
+    pinhole, pose = view.pinhole, view.pose
     columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
     rows = np.array([0.0, 0.5, 1.0]) * pinhole.height
     rays = np.array([((c - pinhole.center_x) / pinhole.focal, (r - pinhole.center_y) / pinhole.focal, 1.0)
@@ -191,16 +195,18 @@ def _seen_ground(eye: CameraView) -> Array:
 
 
 def _away(caster: MeshInstance, grid: ShadowGrid) -> Array | None:
-    """Corners (3 · K, 3), relative to the camera, of a body's triangles that turn away from the sun; None if none of
-    them can shade the grid."""
-    model, axes, eye, low, high = caster.model, grid.axes, grid.eye, grid.low, grid.high
-    center = caster.rotation @ model.center + caster.position - eye
+    """Return the corners (3 · K, 3) relative to the camera of the triangles of a body that face away from the sun.
+
+    The result is None if none of them can cast a shadow on the grid.
+    """
+    model, axes, origin, low, high = caster.model, grid.axes, grid.origin, grid.low, grid.high
+    center = caster.rotation @ model.center + caster.position - origin
     flat = axes @ center
     if (flat + model.radius < low).any() or (flat - model.radius > high).any():
         return None
     sun = (caster.rotation.T @ grid.towards).astype(np.float32)
     if model.cells is not None:
-        flat = (model.cells.center @ caster.rotation.T + caster.position - eye) @ axes.T
+        flat = (model.cells.center @ caster.rotation.T + caster.position - origin) @ axes.T
         radius = model.cells.radius[:, None]
         within = (flat + radius >= low) & (flat - radius <= high)
         rows = model.cells.rows(within[:, 0] & within[:, 1])
@@ -210,5 +216,5 @@ def _away(caster: MeshInstance, grid: ShadowGrid) -> Array | None:
     rows = rows[model.normals[rows] @ sun < 0.0]
     if not len(rows):
         return None
-    corners: NDArray[np.float64] = model.triangles[rows].reshape(-1, 3) @ caster.rotation.T + (caster.position - eye)
+    corners: NDArray[np.float64] = model.triangles[rows].reshape(-1, 3) @ caster.rotation.T + (caster.position - origin)
     return corners

@@ -1,4 +1,4 @@
-"""The sky as a picture of its dome: brightness by CIE's standard sky, clouds by noise."""
+"""Sky as an image of its dome: luminance by the CIE standard sky, clouds by noise."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from eidrive_scenario.world.render.illumination.daylight import CLEAR_AIR, FOG_H
 from eidrive_scenario.world.weather import Weather
 
 SIZE = 512
-"""Pixels of the dome's picture along each side."""
+"""Pixels of the dome image along each side."""
 _CLEAR = (-1.0, -0.32, 10.0, -3.0, 0.45)
 _OVERCAST = (4.0, -0.7, 0.0, -1.0, 0.0)
 """Coefficients a to e of the CIE standard general sky (CIE S 011 / ISO 15469), types 12 and 1."""
 _CLOUD_HEIGHT = 1.0
 _NIGHT_CLOUDS = 0.3
-"""How much of clouds can be made out at night, when a town lights sky and clouds alike."""
+"""Visibility of clouds at night, when a town illuminates sky and clouds alike."""
 
 
 def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
-    """The dome's light (…, 3) in directions given by the parts (H, W) of unit vectors; below the horizon that at it."""
+    """Return the light (…, 3) of the dome in directions of unit vector components (H, W), at least at the horizon."""
     level = np.maximum(z, np.float32(0.0))
     scale = np.float32((SIZE - 2) / 2) / (np.float32(1.0) + level)
     middle = np.float32((SIZE - 1) / 2)
@@ -34,10 +34,11 @@ def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
 
 @lru_cache(maxsize=16)
 def dome(weather: Weather) -> Floats:
-    """Return (SIZE, SIZE, 3) luminance [cd/m²]: column and row are x / (1 + z) and y / (1 + z) of the direction.
+    """Return the luminance (SIZE, SIZE, 3) [cd/m²]; column and row are x / (1 + z) and y / (1 + z) of the direction.
 
-    The clear and the covered part each give the ground the light that `daylight` says. Towards the horizon the dome
-    fades into the air before it.
+    The clear and the covered part illuminate the ground as `daylight` states. Towards the horizon the dome fades into
+    the air
+    in front of it.
     """
     light = daylight(weather)
     x, y, z = _directions()
@@ -64,16 +65,16 @@ def dome(weather: Weather) -> Floats:
     ) / math.pi
     above = above + (1.0 - weather.cloud_cover) * np.maximum(lit_from_above - above, 0.0)
     mixed = whole + (above * color_clouds * relief[..., None] - whole) * share[..., None]
-    # Thick air before the sky: as far as the layer reaches in that direction.
+    # Thick air in front of the sky extends to the height of the layer in this direction.
     fog = max(weather.extinction - CLEAR_AIR, 0.0)
     through = np.exp(-fog * FOG_HEIGHT / np.maximum(z, 0.004))[..., None]
-    picture: Floats = (mixed * through + light.air * (1.0 - through)).astype(np.float32)
-    picture.flags.writeable = False
-    return picture
+    image: Floats = (mixed * through + light.air * (1.0 - through)).astype(np.float32)
+    image.flags.writeable = False
+    return image
 
 
 def horizon(weather: Weather) -> Array:
-    """Return (3,) mean luminance just above the horizon [cd/m²]: the color into which distance fades."""
+    """Return the mean luminance (3,) just above the horizon [cd/m²], the color of large distances."""
     return _horizon(weather).copy()
 
 
@@ -88,7 +89,7 @@ def _horizon(weather: Weather) -> Array:
 
 @lru_cache(maxsize=1)
 def _directions() -> tuple[Array, Array, Array]:
-    """Unit vectors of the dome's pixels; outside its circle those of the horizon."""
+    """Return the unit vectors of the pixels of the dome; those of the horizon outside its circle."""
     axis = (np.arange(SIZE) - (SIZE - 1) / 2) / ((SIZE - 2) / 2)
     u, v = np.meshgrid(axis, axis)
     reach = np.hypot(u, v)
@@ -100,7 +101,7 @@ def _directions() -> tuple[Array, Array, Array]:
 
 
 def _cie(coefficients: tuple[float, ...], x: Array, y: Array, z: Array, sun: Array) -> Array:
-    """Relative luminance of the CIE standard general sky; a sun below the horizon counts as on it."""
+    """Return the relative luminance of the CIE standard general sky. A sun below the horizon is moved to it."""
     a, b, c, d, e = coefficients
     towards = sun.copy()
     towards[2] = max(towards[2], 0.0)
@@ -113,7 +114,7 @@ def _cie(coefficients: tuple[float, ...], x: Array, y: Array, z: Array, sun: Arr
 
 
 def _scaled(relative: Array, z: Array, illuminance: float) -> Array:
-    """Luminance [cd/m²] that gives level ground this light [lx]."""
+    """Return the luminance [cd/m²] that gives this illuminance on level ground [lx]."""
     axis = (np.arange(SIZE) - (SIZE - 1) / 2) / ((SIZE - 2) / 2)
     inside = np.hypot(*np.meshgrid(axis, axis)) <= 1.0
     solid_angle = (1.0 + z) ** 2 / ((SIZE - 2) / 2) ** 2
@@ -124,7 +125,7 @@ def _scaled(relative: Array, z: Array, illuminance: float) -> Array:
 
 @lru_cache(maxsize=8)
 def _clouds(cover: float) -> tuple[Array, Array]:
-    """Where clouds hide the sky, in [0, 1], and how bright they are against their mean."""
+    """Return the cloud cover in [0, 1] and the brightness of clouds relative to their mean."""
     if cover <= 0.0:
         return np.zeros((SIZE, SIZE)), np.ones((SIZE, SIZE))
     x, y, z = _directions()
@@ -142,7 +143,7 @@ def _clouds(cover: float) -> tuple[Array, Array]:
 
 
 def _noise(u: Array, v: Array) -> Array:
-    """Smooth noise of zero mean: octaves of a table drawn once, repeated without seam."""
+    """Return smooth noise of zero mean: octaves of a table, periodic without a seam."""
     total = np.zeros_like(u)
     for octave in range(5):
         scale = 3.2 * 2.1**octave

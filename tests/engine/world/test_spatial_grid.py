@@ -1,4 +1,4 @@
-"""Things looked for by squares of the ground."""
+"""Tests of the spatial grid."""
 
 import numpy as np
 import pytest
@@ -15,12 +15,12 @@ def houses() -> SpatialGrid[tuple[float, float]]:
 
 
 @pytest.mark.parametrize("reach", [0.0, 5.0, 299.0, 301.0, 1500.0])
-def test_all_within_reach_are_among_those_around(houses: SpatialGrid[tuple[float, float]], reach: float) -> None:
+def test_query_contains_all_objects_within_reach(houses: SpatialGrid[tuple[float, float]], reach: float) -> None:
     near = {place for place in houses.query(-40.0, 12.0, 1e7) if np.hypot(place[0] + 40.0, place[1] - 12.0) <= reach}
     around = set(houses.query(-40.0, 12.0, reach))
     assert near <= around
     assert all(max(abs(x + 40.0), abs(y - 12.0)) <= reach + 4.0 + 20.0 for x, y in around)
 
 
-def test_an_endless_reach_costs_no_more_than_what_there_is(houses: SpatialGrid[tuple[float, float]]) -> None:
+def test_query_with_infinite_reach_visits_occupied_cells_only(houses: SpatialGrid[tuple[float, float]]) -> None:
     assert len(set(houses.query(0.0, 0.0, 1e12))) == 300

@@ -1,4 +1,4 @@
-"""Pictures of a camera that stands still, whose scenery is kept, are those that are drawn anew: bit by bit."""
+"""Comparison of images with and without the scenery cache of stationary cameras, bit by bit."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ WAITING = look_at((1.9, -0.2, 1.35), (22.0, 0.1, 1.15))
 
 @pytest.fixture
 def streets() -> Iterator[tuple[World, World]]:
-    """The same crossing twice."""
+    """Two worlds with the same crossing."""
     with street() as one, street() as other:
         yield one, other
 
 
 def pictures(worlds: tuple[World, World], pose: np.ndarray, ignore: tuple[str, ...]) -> tuple[Radiance, Radiance]:
-    """Of the first world, which may keep what it likes, and of the second, which may keep nothing."""
+    """Return the images of the first world, with cache, and of the second, without cache."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Renderer, "MOST_KEPT", 0)
         anew = worlds[1].radiance(pose, PINHOLE, ignore=ignore)
@@ -46,17 +46,17 @@ def assert_same(one: Radiance, other: Radiance) -> None:
 
 
 def kept_scenery(world: World) -> int:
-    """Of how many cameras it is kept."""
+    """Return the number of cameras with cached scenery."""
     assert world._visuals is not None
     return len(world._visuals._renderer._kept)
 
 
 @pytest.mark.parametrize("weather", names("weather"))
 @pytest.mark.parametrize(("pose", "ignore"), [(MAST, ()), (WAITING, ("Ego",))], ids=["mast", "waiting"])
-def test_traffic_is_drawn_into_kept_scenery(
+def test_traffic_is_drawn_into_cached_scenery(
     streets: tuple[World, World], pose: np.ndarray, ignore: tuple[str, ...], weather: str
 ) -> None:
-    """Cars move, turn and leave the picture; one brakes, which lights its lamps; the camera's own car only shades."""
+    """Cars move, turn and leave the image; one brakes with lit lamps; the car of the camera only casts a shadow."""
     before = None
     for tick in range(5):
         for world in streets:
@@ -74,7 +74,7 @@ def test_traffic_is_drawn_into_kept_scenery(
     assert kept_scenery(streets[0]) == 1
 
 
-def test_many_moving_cameras_do_not_make_it_forget_one_that_stands(streets: tuple[World, World]) -> None:
+def test_cache_keeps_stationary_camera_among_moving_ones(streets: tuple[World, World]) -> None:
     world = streets[0]
     for tick in range(3):
         for number in range(Renderer.MOST_KEPT + 6):
@@ -83,8 +83,8 @@ def test_many_moving_cameras_do_not_make_it_forget_one_that_stands(streets: tupl
     assert kept_scenery(world) == 1
 
 
-def test_what_changes_the_scenery_is_seen(streets: tuple[World, World]) -> None:
-    """A new house, another weather and an actor that leaves, each after pictures that showed the same."""
+def test_cache_is_updated_after_changes_of_scenery(streets: tuple[World, World]) -> None:
+    """A new house, another weather and a removed actor, each after images with the same content."""
 
     def twice() -> Radiance:
         for _ in range(3):
@@ -106,8 +106,8 @@ def test_what_changes_the_scenery_is_seen(streets: tuple[World, World]) -> None:
     assert len(set(looks)) == len(looks)
 
 
-def test_without_sun_or_actors_nothing_is_missing(world: World, car: CarFactory) -> None:
-    """An empty plain under clouds, then a car: the kept picture of nothing but ground takes it in."""
+def test_cache_of_empty_scene_draws_new_actor(world: World, car: CarFactory) -> None:
+    """The scene is an empty plain under clouds, then a car is added to the cached image of the ground."""
     world.set_weather(load_weather("sunny").model_copy(update={"cloud_cover": 1.0}))
     empty = [world.radiance(WAITING, PINHOLE) for _ in range(3)]
     assert_same(empty[0], empty[2])
