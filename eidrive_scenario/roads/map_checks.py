@@ -65,64 +65,66 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
     name = f"road {road.id!r}"
     spans = "geometries that overlap or leave a gap in s"
     if abs(curves[0].s) > JUMP:
-        what = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
-        yield MapWarning(GEOMETRY_GAP, spans, what, "start it at s=0", curves[0].line)
+        message = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
+        yield MapWarning(GEOMETRY_GAP, spans, message, "start it at s=0", curves[0].line)
     for one, other in pairwise(curves):
         if one.line is not None and one.line == other.line:
             continue
         missing = other.s - one.s - one.length
         if abs(missing) > JUMP:
-            how = "ends before the next one starts" if missing > 0.0 else "overlaps the next one"
-            what = f"{name}: the geometry at s = {one.s:g} m {how}, by {abs(missing):.3g} m"
-            yield MapWarning(GEOMETRY_GAP, spans, what, "set s to the sum of the preceding lengths", other.line)
+            relation = "ends before the next one starts" if missing > 0.0 else "overlaps the next one"
+            message = f"{name}: the geometry at s = {one.s:g} m {relation}, by {abs(missing):.3g} m"
+            yield MapWarning(GEOMETRY_GAP, spans, message, "set s to the sum of the preceding lengths", other.line)
             continue
         end, start = one.at(one.length), other.at(0.0)
         apart = math.hypot(start.x - end.x, start.y - end.y)
         turn = abs(wrap_angle(start.h - end.h))
         if apart > JUMP:
-            what = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
+            message = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
             hint = "start each geometry at the end of its predecessor"
-            yield MapWarning(GEOMETRY_GAP, "such jumps", what, hint, other.line)
+            yield MapWarning(GEOMETRY_GAP, "such jumps", message, hint, other.line)
         elif KINK < turn < CORNER:
-            what = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
+            message = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
             yield MapWarning(
                 HEADING_DISCONTINUITY,
                 "such kinks",
-                what,
+                message,
                 "start each geometry with the final heading of its predecessor",
                 other.line,
             )
     over = curves[-1].s + curves[-1].length - road.length
     if abs(over) > JUMP:
         there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
-        what = f"{name} has length {road.length:g} m, but its geometry ends {there}"
-        yield MapWarning(GEOMETRY_GAP, "lengths that differ from the geometry", what, "correct the length", road.line)
+        message = f"{name} has length {road.length:g} m, but its geometry ends {there}"
+        yield MapWarning(
+            GEOMETRY_GAP, "lengths that differ from the geometry", message, "correct the length", road.line
+        )
 
 
 def _tilts(road: Road) -> Iterator[MapWarning]:
     for start, tilt, *_ in road.superelevation.pieces:
         if abs(tilt) > STEEP:
-            what = f"road {road.id!r} is tilted by {tilt:.3g} rad at s = {start:g} m"
-            yield MapWarning(ROAD_SURFACE, "such tilts", what, "give <superelevation> in radians", road.line)
+            message = f"road {road.id!r} is tilted by {tilt:.3g} rad at s = {start:g} m"
+            yield MapWarning(ROAD_SURFACE, "such tilts", message, "give <superelevation> in radians", road.line)
 
 
 def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning]:
-    sound = lane.width.is_constant and NARROW <= lane.width.value(0.0) <= WIDE
-    if lane.id == 0 or (sound and lane.width_from <= JUMP):
+    is_valid = lane.width.is_constant and NARROW <= lane.width.value(0.0) <= WIDE
+    if lane.id == 0 or (is_valid and lane.width_from <= JUMP):
         return
     name = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
     if lane.width_from > JUMP:
         until = "" if math.isinf(lane.width_from) else f" before its sOffset {lane.width_from:g}"
-        what = f"{name} has no width{until}"
-        yield MapWarning(LANE_WIDTH, "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
+        message = f"{name} has no width{until}"
+        yield MapWarning(LANE_WIDTH, "lanes without a width", message, 'give a <width> at sOffset="0"', lane.line)
     widths = list(_extremes(lane, section.length))
     least, most = min(widths), max(widths)
     if least < NARROW:
-        what = f"{name} becomes {least:.3g} m wide"
-        yield MapWarning(LANE_WIDTH, "negative widths", what, "give widths of at least 0", lane.line)
+        message = f"{name} becomes {least:.3g} m wide"
+        yield MapWarning(LANE_WIDTH, "negative widths", message, "give widths of at least 0", lane.line)
     if most > WIDE:
-        what = f"{name} becomes {most:.3g} m wide"
-        yield MapWarning(LANE_WIDTH, "implausible widths", what, "correct its coefficients", lane.line)
+        message = f"{name} becomes {most:.3g} m wide"
+        yield MapWarning(LANE_WIDTH, "implausible widths", message, "correct its coefficients", lane.line)
 
 
 def _extremes(lane: Lane, length: float) -> Iterator[float]:
@@ -155,14 +157,14 @@ def _end(roads: Mapping[str, Road], road: Road, link: RoadLink | None, side: int
     yield from _broken(road, end_section(road, side), side, facing.lanes, f"the {link.contact} of road {other.id!r}")
 
 
-def _broken(road: Road, section: LaneSection, side: int, there: Mapping[int, Lane], where: str) -> Iterator[MapWarning]:
+def _broken(road: Road, section: LaneSection, side: int, known: Mapping[int, Lane], where: str) -> Iterator[MapWarning]:
     for lane in section.lanes.values():
         for number in lane.successors if side > 0 else lane.predecessors:
-            if number not in there:
+            if number not in known:
                 word = "successor" if side > 0 else "predecessor"
-                what = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
-                hint = "known: " + ", ".join(map(str, sorted(there)))
-                yield MapWarning(LANE_LINK, "links to lanes that do not exist", what, hint, lane.line)
+                message = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
+                hint = "known: " + ", ".join(map(str, sorted(known)))
+                yield MapWarning(LANE_LINK, "links to lanes that do not exist", message, hint, lane.line)
 
 
 def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
@@ -187,13 +189,13 @@ def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
 
 def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | None) -> MapWarning:
     name = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
-    what = f"{name} has no successor although the road continues"
+    message = f"{name} has no successor although the road continues"
     if link is not None:
-        what += f" in {link.element_type} {link.element_id!r}"
+        message += f" in {link.element_type} {link.element_id!r}"
     if link is not None and link.element_type == "junction":
         hint = "add a <laneLink> from it to a <connection>"
-        return MapWarning(LANE_LINK, "lanes without a successor at junctions", what, hint, lane.line)
-    return MapWarning(LANE_LINK, "lanes without a successor", what, "link it or reduce its width to 0", lane.line)
+        return MapWarning(LANE_LINK, "lanes without a successor at junctions", message, hint, lane.line)
+    return MapWarning(LANE_LINK, "lanes without a successor", message, "link it or reduce its width to 0", lane.line)
 
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
@@ -209,8 +211,8 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
         apart = math.hypot(u - x, v - y)
         if apart > JUMP:
             names = f"lane {one.lane.lane} of road {road.id!r} and lane {other.lane.lane} of road {beyond.id!r}"
-            what = f"{names} are linked but their ends are {apart:.3g} m apart"
-            yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", what, "make their ends meet", lane.line)
+            message = f"{names} are linked but their ends are {apart:.3g} m apart"
+            yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", message, "make their ends meet", lane.line)
 
 
 class RoadEnd(NamedTuple):
@@ -248,31 +250,33 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     ends = [link for link in (incoming.predecessor, incoming.successor) if link is not None]
     touches = any(link.element_type == "junction" and link.element_id == junction.id for link in ends)
     if junction.type == "default" and not touches:
-        what = f"{name} comes from road {incoming.id!r}, which does not end at the junction"
+        message = f"{name} comes from road {incoming.id!r}, which does not end at the junction"
         hint = "link that road to the junction, or correct incomingRoad"
-        yield MapWarning(rule, "connections from roads that do not end at the junction", what, hint, connection.line)
+        yield MapWarning(rule, "connections from roads that do not end at the junction", message, hint, connection.line)
     if junction.type == "default" and connecting.junction_id != junction.id:
-        what = f"{name} uses road {connecting.id!r}, which does not belong to the junction"
+        message = f"{name} uses road {connecting.id!r}, which does not belong to the junction"
         hint = f"give that road junction={junction.id!r}, or correct connectingRoad"
-        yield MapWarning(rule, "connections over roads of no or another junction", what, hint, connection.line)
+        yield MapWarning(rule, "connections over roads of no or another junction", message, hint, connection.line)
     side, other_side = (
         side_at(incoming, junction, connecting, connection.contact),
         1 if connection.contact == "end" else -1,
     )
-    here, there = end_section(incoming, side).lanes, end_section(connecting, other_side).lanes
+    incoming_lanes, connecting_lanes = end_section(incoming, side).lanes, end_section(connecting, other_side).lanes
     driven = [
-        (n, m) for n, m in connection.lane_links if n in here and m in there and here[n].drivable and there[m].drivable
+        (n, m)
+        for n, m in connection.lane_links
+        if n in incoming_lanes and m in connecting_lanes and incoming_lanes[n].drivable and connecting_lanes[m].drivable
     ]
     if driven and all(incoming.directions[n] == -side and connecting.directions[m] == other_side for n, m in driven):
-        what = f"{name} is opposite to the traffic of roads {incoming.id!r} and {connecting.id!r}"
+        message = f"{name} is opposite to the traffic of roads {incoming.id!r} and {connecting.id!r}"
         hint = 'swap them; for left-hand traffic give the roads rule="LHT"'
-        yield MapWarning(rule, "connections opposite to the traffic", what, hint, connection.line)
+        yield MapWarning(rule, "connections opposite to the traffic", message, hint, connection.line)
     for number, target in connection.lane_links:
-        for lane, known, road in ((number, here, incoming), (target, there, connecting)):
+        for lane, known, road in ((number, incoming_lanes, incoming), (target, connecting_lanes, connecting)):
             if lane not in known:
-                what = f"{name} links lane {lane} of road {road.id!r}, which does not exist there"
+                message = f"{name} links lane {lane} of road {road.id!r}, which does not exist there"
                 hint = "known: " + ", ".join(map(str, sorted(known)))
-                yield MapWarning(rule, "links of lanes that do not exist", what, hint, connection.line)
-    if not connection.lane_links and not set(here) & set(there) - {0}:
-        what = f"{name} links no lane"
-        yield MapWarning(rule, "connections without lanes", what, "add a <laneLink>", connection.line)
+                yield MapWarning(rule, "links of lanes that do not exist", message, hint, connection.line)
+    if not connection.lane_links and not set(incoming_lanes) & set(connecting_lanes) - {0}:
+        message = f"{name} links no lane"
+        yield MapWarning(rule, "connections without lanes", message, "add a <laneLink>", connection.line)

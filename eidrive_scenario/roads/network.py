@@ -179,8 +179,7 @@ class RoadNetwork(RoadAttributes):
         """Return the lane location of a point, or None if no road is within `reach` [m].
 
         With a previous location as `hint`, that road and its successors and predecessors have priority if the point is
-        on
-        one of their lanes. A road user that crosses a junction thus remains on its connecting road.
+        on one of their lanes. A road user that crosses a junction thus remains on its connecting road.
         """
         if hint is not None and hint.road in self.roads:
             near = locate_near(self.roads, self.links, x, y, hint)
@@ -236,8 +235,7 @@ class RoadNetwork(RoadAttributes):
         """Return the cheapest route over lanes from start to end. Raise RouteError if there is none.
 
         `costs` holds one cost function for each leg: to each location of `via`, and to the end. None means the length,
-        which
-        is also the default.
+        which is also the default.
         """
         stops = [start, *via, end]
         wanted = costs if costs is not None else [None] * (len(stops) - 1)
@@ -253,8 +251,7 @@ class RoadNetwork(RoadAttributes):
         """Return the distances from a to b ahead and to the left [m] in road coordinates, or None.
 
         They refer to the driving direction of the lane of a, and are negative for behind and right. They are measured
-        along
-        connected roads, or along `route`. The result is None if the roads are not connected or the route misses a
+        along connected roads, or along `route`. The result is None if the roads are not connected or the route misses a
         location.
         """
         if route is None:

@@ -2,9 +2,8 @@
 
 Each file is a crossing of two straight streets with the lanes of one site of the paper. The ego vehicle starts at the
 origin and drives along x; y points left. Lengths are in meters. Connecting roads follow lane centers: straight for
-every
-lane, right from the outermost lane, left from the innermost. A turn is a line, then clothoid, arc and clothoid, so that
-the curvature is continuous.
+every lane, right from the outermost lane, left from the innermost. A turn is a line, then clothoid, arc and clothoid,
+so that the curvature is continuous.
 """
 
 from __future__ import annotations

@@ -28,8 +28,7 @@ class Locator:
     """Locator of points in road and lane coordinates.
 
     A point belongs to the road with the nearest lane center. If it is on none of the lanes of that road, the roads of
-    the
-    next samples are tried. The result is the road that contains the point, or else the nearest one.
+    the next samples are tried. The result is the road that contains the point, or else the nearest one.
     """
 
     def __init__(self, tables: RoadTables) -> None:

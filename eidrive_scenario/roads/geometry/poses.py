@@ -71,15 +71,15 @@ def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: f
     rise = sideways * sin + t * cos * twist
     ahead, left = -t * sin * steep, t * cos
     along = speed * (1.0 - curvature * left) - rise * steep - t * sin * steeper
-    aside = sideways * cos - t * sin * twist + curvature * speed * ahead
+    lateral = sideways * cos - t * sin * twist + curvature * speed * ahead
     climb = slope + rise * level - t * sin * slope * steeper
     along = max(along, LEAST_STRETCH)
     # The normal of the surface is the product of the tangent and the t-axis, which is (-sin·steep, cos, sin·level).
-    nx, ny = aside * sin * level - climb * cos, -climb * sin * steep - along * sin * level
-    nz = along * cos + aside * sin * steep
-    left_z = nx * aside - ny * along
-    lean = math.atan2(left_z, nz * math.sqrt(along * along + aside * aside + climb * climb))
-    return Tangent(ahead, left, z + t * sin * level, along, aside, climb, lean)
+    nx, ny = lateral * sin * level - climb * cos, -climb * sin * steep - along * sin * level
+    nz = along * cos + lateral * sin * steep
+    left_z = nx * lateral - ny * along
+    lean = math.atan2(left_z, nz * math.sqrt(along * along + lateral * lateral + climb * climb))
+    return Tangent(ahead, left, z + t * sin * level, along, lateral, climb, lean)
 
 
 def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pose:

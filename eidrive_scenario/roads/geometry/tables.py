@@ -81,8 +81,8 @@ class RoadTables:
         section = self.section_of(road, s)
         left, right = self.left_count[section], self.right_count[section]
         row = self.first_lane[section] + np.where(lane >= 0, np.minimum(lane, left), left + np.minimum(-lane, right))
-        wrong = self.lane_id[row] != lane
-        for n in np.flatnonzero(wrong):
+        invalid = self.lane_id[row] != lane
+        for n in np.flatnonzero(invalid):
             # Gaps in lane ids violate the standard but occur, so that lanes are found by id.
             end = self.first_lane[section[n]] + left[n] + right[n] + 1
             near = np.flatnonzero(self.lane_id[self.first_lane[section[n]] : end] == lane[n])
@@ -106,9 +106,9 @@ class RoadTables:
 
     def check(self, road: Integers, s: Array) -> None:
         """Raise PositionError for the first position beyond the ends of its road."""
-        wrong = np.flatnonzero((s < -BEYOND) | (s > self.length[road] + BEYOND))
-        if wrong.size:
-            first = wrong[0]
+        invalid = np.flatnonzero((s < -BEYOND) | (s > self.length[road] + BEYOND))
+        if invalid.size:
+            first = invalid[0]
             raise off_road(self.roads[road[first]], float(s[first]))
 
     def road_poses(self, road: Integers, s: Array, t: Array) -> Poses:
@@ -171,12 +171,12 @@ class RoadTables:
         ahead, left = -t * sin * steep, t * cos
         along = speed * (1.0 - curvature * left) - rise * steep - t * sin * steeper
         along = np.maximum(along, LEAST_STRETCH)
-        aside = sideways * cos - t * sin * twist + curvature * speed * ahead
+        lateral = sideways * cos - t * sin * twist + curvature * speed * ahead
         climb = slope + rise * level - t * sin * slope * steeper
-        nx, ny = aside * sin * level - climb * cos, -climb * sin * steep - along * sin * level
-        nz = along * cos + aside * sin * steep
-        lean = np.arctan2(nx * aside - ny * along, nz * np.sqrt(along * along + aside * aside + climb * climb))
-        return ahead, left, z + t * sin * level, along, aside, climb, lean
+        nx, ny = lateral * sin * level - climb * cos, -climb * sin * steep - along * sin * level
+        nz = along * cos + lateral * sin * steep
+        lean = np.arctan2(nx * lateral - ny * along, nz * np.sqrt(along * along + lateral * lateral + climb * climb))
+        return ahead, left, z + t * sin * level, along, lateral, climb, lean
 
     def stretch_at(self, road: Integers, s: Array, t: Array, curvature: Array, speed: Array) -> Array:
         """Return the meters ahead per meter of s at constant t (N,) on roads with superelevation."""

@@ -175,8 +175,7 @@ def poly3(
     """Return the curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
 
     The arc length is integrated by Gauss-Legendre quadrature. Each cubic has the points and tangents of the curve at
-    both
-    ends (Hermite), so that the error decreases with the fourth power of its length and is far below a millimeter.
+    both ends (Hermite), so that the error decreases with the fourth power of its length and is far below a millimeter.
     """
     a, b, c, d = v
 

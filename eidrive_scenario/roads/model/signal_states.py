@@ -45,8 +45,7 @@ def lamps(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> tuple[tuple[st
     """Return the color and mode (on, off, flashing) of each lamp in a state from top to bottom.
 
     A state may list another number of lamps than the type of the light; the list then has priority. All lamps are off
-    in an
-    unsupported state.
+    in an unsupported state.
     """
     modes = _listed(state)
     if modes is not None and (len(modes) > 1 or len(colors) == 1):

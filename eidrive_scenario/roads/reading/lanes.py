@@ -135,14 +135,14 @@ def _read_section(
     for side, sign in (("left", 1), ("center", 0), ("right", -1)):
         for element in section.iterfind(f"{side}/lane"):
             number = collector.integer(element, "id")
-            wrong = (number > 0) - (number < 0) != sign
+            is_misplaced = (number > 0) - (number < 0) != sign
             message = f"lane {number} is listed under <{side}>"
             hint = "left lanes have ids above 0, the center lane 0, right lanes ids below 0"
-            if wrong and number and sign:
+            if is_misplaced and number and sign:
                 # Links and positions refer to the id.
                 kind = "lanes under the wrong side"
                 collector.report_warning(element, LANE_SIDE, kind, f"{message}; its id determines the side", hint)
-            elif wrong:
+            elif is_misplaced:
                 collector.report_error(element, message, hint)
                 continue
             if number in found:

@@ -30,8 +30,7 @@ class RoadDistances:
         """Return the distances from a to b ahead and to the left in the driving direction of the lane of a [m].
 
         They are measured along the reference lines of the chain of roads that `by` selects. Behind and right are
-        negative.
-        The result is None if no chain of roads connects the locations.
+        negative. The result is None if no chain of roads connects the locations.
         """
         found = self.placed(a, b, by)
         return None if found is None else found[:2]

@@ -72,10 +72,8 @@ class Movement:
         """Return the location `distance` [m] further in the driving direction (backwards if negative), or None.
 
         The distance is measured on the path at the offset of the location. Where the lane forks, the branch is selected
-        by
-        the route, else by `choose`, else it is the straightest one. If the lane ends, the result is None, or the end of
-        the
-        lane with `to_end`.
+        by the route, else by `choose`, else it is the straightest one. If the lane ends, the result is None, or the end
+        of the lane with `to_end`.
         """
         road = self._roads[location.road]
         section, lane = lane_at(road, location.lane, location.s)
@@ -170,16 +168,16 @@ class Movement:
             return None
         other = road.sections[index]
         s = section.end if direction > 0 else section.s
-        here = lane_t(road, section, lane, s)[0]
+        center = lane_t(road, section, lane, s)[0]
         choices = [
-            (abs(lane_t(road, other, candidate, s)[0] - here), number)
+            (abs(lane_t(road, other, candidate, s)[0] - center), number)
             for number, candidate in other.lanes.items()
             if candidate.side == lane.side and candidate.drivable == lane.drivable
         ]
         if not choices:
             return None
         number = min(choices)[1]
-        return LaneKey(road.id, index, number), here - lane_t(road, other, other.lanes[number], s)[0]
+        return LaneKey(road.id, index, number), center - lane_t(road, other, other.lanes[number], s)[0]
 
 
 def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, direction: int) -> tuple[LaneSection, Lane]:

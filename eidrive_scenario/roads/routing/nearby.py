@@ -16,9 +16,9 @@ def locate_near(
 ) -> LaneLocation | None:
     """Return the lane location of a point on the road of `hint` or on an adjacent one, or None if it is on neither."""
     road = roads[hint.road]
-    here = _on(road, x, y, hint.s)
-    if here is not None:
-        return here
+    location = _on(road, x, y, hint.s)
+    if location is not None:
+        return location
     for direction in (driving_direction(road, hint.lane), -driving_direction(road, hint.lane)):
         last = len(road.sections) - 1 if direction > 0 else 0
         ways = links.beyond(LaneKey(road.id, last, hint.lane), direction) if hint.lane else ()

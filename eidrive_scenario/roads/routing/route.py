@@ -139,27 +139,26 @@ class Route:
         for number, leg in enumerate(self.legs):
             low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
             if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
-                mine = np.flatnonzero(owner == number)
-                order = places[mine] * leg.direction
-                return float(np.interp(location.s * leg.direction, order, along[mine]))
+                on_leg = np.flatnonzero(owner == number)
+                order = places[on_leg] * leg.direction
+                return float(np.interp(location.s * leg.direction, order, along[on_leg]))
         return None
 
     def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:
         """Return the distances from a to b ahead and to the left along the reference lines of the route [m].
 
         They refer to the driving direction of the lane of a. A closed route gives the shorter way round. The result is
-        None
-        if the route misses a location.
+        None if the route misses a location.
         """
-        here, there = self._passes(a), self._passes(b)
-        if here is None or there is None:
+        pass_a, pass_b = self._passes(a), self._passes(b)
+        if pass_a is None or pass_b is None:
             return None
-        sense = here[1] * driving_direction(self.roads[a.road], a.lane)
-        along = there[0] - here[0]
+        sense = pass_a[1] * driving_direction(self.roads[a.road], a.lane)
+        along = pass_b[0] - pass_a[0]
         if self.closed:
             total = sum(abs(leg.s_end - leg.s) for leg in self.legs)
             along = (along + 0.5 * total) % total - 0.5 * total
-        return along * sense, (b.t * there[1] - a.t * here[1]) * sense
+        return along * sense, (b.t * pass_b[1] - a.t * pass_a[1]) * sense
 
     def _passes(self, location: LaneLocation) -> tuple[float, int] | None:
         """Return the length of reference lines up to a location and the direction of travel there, or None.
@@ -211,9 +210,9 @@ class Route:
         for number in self._later(visit):
             if self._visits[number][0] == road and (following := self.passes(number + 1)) is not None:
                 lanes = self._visits[(number + 1) % len(self._visits)][1]
-                there = [branch for branch in branches if branch.lane.road == following]
-                if there:
-                    return next((branch for branch in there if branch.lane in lanes), there[0])
+                candidates = [branch for branch in branches if branch.lane.road == following]
+                if candidates:
+                    return next((branch for branch in candidates if branch.lane in lanes), candidates[0])
         for exact in (True, False):
             for name, lanes in self._visits:
                 for branch in branches:
