@@ -39,10 +39,9 @@ class Fleet:
     """Cars on the lanes of a road network.
 
     Each car follows the center of its lane with the Intelligent Driver Model and slows down for bends. It selects
-    branches
-    by a separate stream of random numbers (seed, name). It enters a junction only if the lanes in conflict are free and
-    its traffic light permits it. Lanes are changed by MOBIL. A car at the end of the lanes leaves and is listed in
-    `departed`.
+    branches by a separate stream of random numbers (seed, name). It enters a junction only if the lanes in conflict are
+    free and its traffic light permits it. Lanes are changed by MOBIL. A car at the end of the lanes leaves and is
+    listed in `departed`.
     """
 
     def __init__(
@@ -226,8 +225,7 @@ class Fleet:
         """Move by dt and return the placements. Actors in `view` outside the fleet are obstacles.
 
         Without a view the positions of the last `observe` are used. Cars that left in this step are in `departed` and
-        not in
-        the result.
+        not in the result.
         """
         self.departed = frozenset()
         self._ticks += 1

@@ -1,7 +1,7 @@
 """MOBIL: minimizing overall braking induced by lane changes.
 
-Kesting, Treiber and Helbing, General lane-changing model MOBIL for car-following models, Transportation Research
-Record 1999 (2007) 86.
+Kesting, Treiber and Helbing, General lane-changing model MOBIL for car-following models, Transportation Research Record
+1999 (2007) 86.
 """
 
 from __future__ import annotations

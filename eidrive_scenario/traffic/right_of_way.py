@@ -42,10 +42,8 @@ class RightOfWay:
         """Grant passages through junctions to approaching cars.
 
         There must be space behind the junction. Lanes in conflict with one of `moving`, which moving foreign actors
-        overlap,
-        are not granted, nor are lanes that delay a car with priority. A car that a traffic light stops before the
-        junction
-        loses its passage.
+        overlap, are not granted, nor are lanes that delay a car with priority. A car that a traffic light stops before
+        the junction loses its passage.
         """
         self._follow(cars, lights, begins)
         distance = self._distances(cars, begins)

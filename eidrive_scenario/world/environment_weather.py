@@ -21,8 +21,7 @@ HEAVY_RAIN = 50.0
 """Intensity of a share of 1 in files of OpenSCENARIO 1.0, whose precipitation has no unit [mm/h]."""
 FULL_SUN = 1.0
 """Maximum intensity of the sun that is a share of the illuminance by its elevation, as in many files. A higher one is
-in
-lux, as in the standard.
+in lux, as in the standard.
 """
 WET_BY_RAIN = 0.5
 """Default wetness of a road in rain."""
@@ -39,7 +38,7 @@ def weather_from_environment(environment: Environment, time: float = 0.0) -> Wea
 
     Angles follow the standard: azimuth of the sun from north (y) over east (x), direction of the wind from x over y.
     """
-    said: dict[str, Any] = {
+    values: dict[str, Any] = {
         "name": environment.name,
         "friction": min(max(environment.friction, LEAST_FRICTION), 2.0),
         "wind_direction": _degrees(environment.wind_direction),
@@ -48,15 +47,15 @@ def weather_from_environment(environment: Environment, time: float = 0.0) -> Wea
         "cloud_cover": _CLOUDS.get(environment.clouds or ""),
         "wetness": _WETNESS.get(environment.wetness or ""),
     }
-    said |= _sun(environment, time)
+    values |= _sun(environment, time)
     amount = environment.precipitation_intensity
     if amount is None and environment.precipitation_share is not None:
         amount = HEAVY_RAIN * environment.precipitation_share
     if environment.precipitation in ("rain", "snow") and amount:
-        said |= {"precipitation": environment.precipitation, "precipitation_intensity": min(amount, 500.0)}
-        if said["wetness"] is None and environment.precipitation == "rain":
-            said["wetness"] = WET_BY_RAIN
-    return Weather(**{key: value for key, value in said.items() if value is not None})
+        values |= {"precipitation": environment.precipitation, "precipitation_intensity": min(amount, 500.0)}
+        if values["wetness"] is None and environment.precipitation == "rain":
+            values["wetness"] = WET_BY_RAIN
+    return Weather(**{key: value for key, value in values.items() if value is not None})
 
 
 def solar_position(moment: datetime, latitude: float = LATITUDE) -> tuple[float, float]:
@@ -67,10 +66,10 @@ def solar_position(moment: datetime, latitude: float = LATITUDE) -> tuple[float,
     declination = math.radians(23.45) * math.sin(2.0 * math.pi * (284 + moment.timetuple().tm_yday) / 365.0)
     hours = moment.hour + moment.minute / 60.0 + moment.second / 3600.0
     turn = math.radians(15.0 * (hours - 12.0))
-    here = math.radians(latitude)
-    up = math.sin(here) * math.sin(declination) + math.cos(here) * math.cos(declination) * math.cos(turn)
+    phi = math.radians(latitude)
+    up = math.sin(phi) * math.sin(declination) + math.cos(phi) * math.cos(declination) * math.cos(turn)
     east = -math.cos(declination) * math.sin(turn)
-    north = math.cos(here) * math.sin(declination) - math.sin(here) * math.cos(declination) * math.cos(turn)
+    north = math.cos(phi) * math.sin(declination) - math.sin(phi) * math.cos(declination) * math.cos(turn)
     return math.degrees(math.atan2(east, north)) % 360.0, math.degrees(math.asin(max(-1.0, min(1.0, up))))
 
 

@@ -69,19 +69,17 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
     """Return the specification of the actor `name` by its Vehicle, Pedestrian or MiscObject.
 
     The shape is the Property `eidrive.shape`, or else follows from the category, the name and the 3D model. The paint
-    is the
-    Property `eidrive.color` (`#rrggbb`). Some catalogs omit the box by dimensions of 0; these are replaced by defaults
-    of
-    the shape. Raise ScenarioError with the line of an invalid Property or dimension.
+    is the Property `eidrive.color` (`#rrggbb`). Some catalogs omit the box by dimensions of 0; these are replaced by
+    defaults of the shape. Raise ScenarioError with the line of an invalid Property or dimension.
     """
     properties = {entry.name: entry.value for entry in entity.properties.property} if entity.properties else {}
     shape = _shape(entity, properties)
     dimensions, center = entity.bounding_box.dimensions, entity.bounding_box.center
     given = (dimensions.length, dimensions.width, dimensions.height)
     if min(given) < 0.0:
-        what = f"the bounding box of {name!r} is {given[0]:g} x {given[1]:g} x {given[2]:g} m"
+        message = f"the bounding box of {name!r} is {given[0]:g} x {given[1]:g} x {given[2]:g} m"
         raise ScenarioError(
-            Diagnostic(what, "give length, width and height above 0", dimensions.source, dimensions.line)
+            Diagnostic(message, "give length, width and height above 0", dimensions.source, dimensions.line)
         )
     length, width, height = (own or usual for own, usual in zip(given, _USUAL_SIZE[shape], strict=True))
     lift = 0.0 if dimensions.height else height / 2

@@ -135,7 +135,7 @@ def load_weather(source: str | Path, *, origin: str = "") -> Weather:
     if not isinstance(data, Mapping):
         found = "nothing" if data is None else type(data).__name__
         raise SettingError(
-            Diagnostic(f"a weather is a mapping, found {found}", "write `cloud_cover: 0.5`", str(path), 1)
+            Diagnostic(f"weather is not a mapping (got {found})", "write `cloud_cover: 0.5`", str(path), 1)
         )
     weather = parse_settings(Weather, data, source=str(path), line=1, lines=lines)
     return weather if weather.name else weather.model_copy(update={"name": path.stem})

@@ -36,9 +36,8 @@ from eidrive_scenario.world.weather import Weather
 class World:
     """Actors on roads, in one pybullet client without a window.
 
-    `step` moves scripted actors exactly to their placements, and driven ones by their controls in physics steps of
-    1 / `physics_rate` seconds. All results are deterministic. Close the world after use, or use it in a `with`
-    statement;
+    `step` moves scripted actors exactly to their placements, and driven ones by their controls in physics steps of 1 /
+    `physics_rate` seconds. All results are deterministic. Close the world after use, or use it in a `with` statement;
     otherwise its client is freed by garbage collection.
 
     entities  ids of road objects that are actors, and thus no part of the scenery
@@ -250,10 +249,8 @@ class World:
         """Return the image of a camera: rgb, depth and segmentation.
 
         The camera is ideal, with automatic exposure and without noise (see `radiance` for others). pose (4, 4) camera
-        to world,
-        x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in `ignore` are not drawn. The first
-        image of
-        a world creates all meshes; a world without images never does.
+        to world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in `ignore` are not drawn.
+        The first image of a world creates all meshes; a world without images never does.
         """
         seen = self.radiance(pose, Pinhole.of_fov(width, height, fov, near, far), ignore=ignore)
         rgb = tone_map(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))

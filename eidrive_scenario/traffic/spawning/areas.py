@@ -71,8 +71,7 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
     """Return the parts of roads from the first cursor over the others to the last one.
 
     The lanes of a cursor are valid up to the next cursor. Between cursors on different roads the range follows the
-    shortest
-    chain of linked roads with all their lanes. `length` truncates the range from the first cursor on [m].
+    shortest chain of linked roads with all their lanes. `length` truncates the range from the first cursor on [m].
     Raise PositionError if a road does not exist or the roads are not linked.
     """
     ends = _links(roads)

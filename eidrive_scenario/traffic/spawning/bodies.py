@@ -143,8 +143,8 @@ class TrafficMix:
         if isinstance(entity, model.CatalogReference):
             entity = self._scenario.resolved(entity)
         if not isinstance(entity, model.Vehicle | model.Pedestrian):
-            what = f"background traffic cannot contain a  {type(entity).__name__}"
-            raise ScenarioError(Diagnostic(what, "give a Vehicle or a Pedestrian", template.source, template.line))
+            message = f"background traffic cannot contain a {type(entity).__name__}"
+            raise ScenarioError(Diagnostic(message, "give a Vehicle or a Pedestrian", template.source, template.line))
         settings = next((self._settings(one) for one in template.object_controller), DriverSettings())
         return _participant(actor_spec(entity.name, entity), settings)
 
@@ -165,8 +165,8 @@ class TrafficMix:
         weights = [float(getattr(entry, "weight")) for entry in entries]  # noqa: B009
         if min(weights) < 0.0 or not sum(weights) > 0.0:
             where = entries[0]
-            what = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are not valid weights"
-            raise ScenarioError(Diagnostic(what, "give weights of at least 0, not all 0", where.source, where.line))
+            message = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are invalid"
+            raise ScenarioError(Diagnostic(message, "give weights of at least 0, not all 0", where.source, where.line))
         return WeightedChoice(things, weights)
 
 

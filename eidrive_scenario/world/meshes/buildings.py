@@ -15,9 +15,7 @@ _PROUD = 0.03
 
 
 def building(size: Vector3) -> dict[str, Array]:
-    """Return triangles by material of a building of this length, width and height; origin at its center on the
-    ground.
-    """
+    """Return triangles by material of a building of this size; origin at its center on the ground."""
     length, width, height = size
     mesh = Mesh()
     mesh.add("wall", box((0, 0, height / 2 - 0.1), (length - 2 * _PROUD, width - 2 * _PROUD, height - 0.2)))

@@ -95,8 +95,7 @@ class Body(ABC):
         """Create the rigid body with the center of its box in the frame of the center of gravity.
 
         An immovable body is created as static and gets its huge mass afterwards. pybullet then does not integrate it,
-        but
-        collisions consider its velocity, which they ignore for a static body.
+        but collisions consider its velocity, which they ignore for a static body.
         """
         length, width, height = self.spec.size
         here = {"physicsClientId": self.client}

@@ -28,9 +28,7 @@ class Touch(NamedTuple):
 
 
 class ContactTracker:
-    """Tracker of starting contacts: overlaps of boxes at the ends of steps, and contacts that pybullet resolved
-    within.
-    """
+    """Tracker of starting contacts: overlaps of boxes at the ends of steps, and contacts in pybullet."""
 
     def __init__(self) -> None:
         self._touching: dict[tuple[str, str], None] = {}

@@ -20,8 +20,7 @@ class DrivenBody(Body):
     """Vehicle that moves by pedals, steering and collisions.
 
     If a collision is possible, pybullet integrates the motion step by step by `drive` and `read_back`. Otherwise
-    `coast`
-    computes the same without pybullet.
+    `coast` computes the same without pybullet.
     """
 
     def __init__(
@@ -52,9 +51,7 @@ class DrivenBody(Body):
         return (math.hypot(vx, vy) + abs(rate) * 2.0 * self.radius) * self._dt
 
     def teleport(self, placement: Placement) -> None:
-        """Move to the placement, rolling straight ahead with its speed. The ground determines height, pitch and
-        roll.
-        """
+        """Move to the placement, rolling straight ahead. The ground determines height, pitch and roll."""
         z, pitch, roll = self._ground.at(placement.x, placement.y, placement.yaw)
         self._pose(placement.x, placement.y, z, placement.yaw, pitch, roll)
         self.speed, self.yaw_rate, self.acceleration = placement.speed, 0.0, (0.0, 0.0, 0.0)

@@ -1,10 +1,10 @@
 """Dynamics of a driven vehicle: a single-track model with limits of tires and drivetrain.
 
-Single-track model: R. Rajamani, Vehicle Dynamics and Control, 2nd ed., Springer 2012, section 2.3, with the axle
-loads at standstill. Tire: the brush model of E. Fiala in the form of R. Hindiyeh and J. C. Gerdes, "A controller
-framework for autonomous drifting", ASME J. Dyn. Syst. Meas. Control 136 (2014). The friction circle limits its side
-force beside the longitudinal force. Drive, brakes, rolling resistance and air drag: Rajamani, ch. 4. Vehicles with more
-than two axles: `multi_axle`.
+Single-track model: R. Rajamani, Vehicle Dynamics and Control, 2nd ed., Springer 2012, section 2.3, with the axle loads
+at standstill. Tire: the brush model of E. Fiala in the form of R. Hindiyeh and J. C. Gerdes, "A controller framework
+for autonomous drifting", ASME J. Dyn. Syst. Meas. Control 136 (2014). The friction circle limits its side force beside
+the longitudinal force. Drive, brakes, rolling resistance and air drag: Rajamani, ch. 4. Vehicles with more than two
+axles: `multi_axle`.
 """
 
 from __future__ import annotations
@@ -54,8 +54,7 @@ class VehicleParameters:
     """Parameters of the single-track model, with defaults in brackets.
 
     With more than two axles, front and rear are groups of axles at their mean positions. The axles of a group carry the
-    same
-    load, as with levelling suspensions, and are alike.
+    same load, as with levelling suspensions, and are alike.
     """
 
     mass: float
@@ -100,8 +99,10 @@ class VehicleParameters:
     def of(cls, spec: ActorSpec) -> VehicleParameters:
         """Return the parameters of a vehicle. Raise SettingError if a Property is invalid."""
         if spec.wheelbase <= 0.0:
-            what = f"{spec.name!r} cannot be driven: its wheelbase is not positive"
-            raise SettingError(Diagnostic(what, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's"))
+            message = f"{spec.name!r} cannot be driven: its wheelbase is not positive"
+            raise SettingError(
+                Diagnostic(message, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's")
+            )
         axles = _axles(spec)
         front_group, rear_group = [axle.x for axle in axles if axle.front], [axle.x for axle in axles if not axle.front]
         wheelbase, rear, usual = spec.wheelbase, 0.0, 0.55
@@ -182,10 +183,8 @@ class SingleTrack:
     """Forces on one vehicle and the resulting change of its velocities over steps of `step` seconds.
 
     At low speed the slip of a tire is not defined by its ratio of velocities. There the side force is bounded by the
-    force
-    that ends the side slip of its axle within the step. The model thus passes into the kinematic one and comes to a
-    stable
-    rest, and a lateral impact is still limited by the grip of the tires.
+    force that ends the side slip of its axle within the step. The model thus passes into the kinematic one and comes to
+    a stable rest, and a lateral impact is still limited by the grip of the tires.
     """
 
     def __init__(self, parameters: VehicleParameters, step: float) -> None:

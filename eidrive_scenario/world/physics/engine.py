@@ -45,8 +45,8 @@ def substeps_per_tick(dt: float, physics_rate: float) -> int:
         raise SettingError(Diagnostic(f"a tick is {dt:g} s long", f"give a dt of at most {MAX_TICK:g} s"))
     count = round(exact)
     if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
-        what = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
-        raise SettingError(Diagnostic(what, "choose dt and the rate so that this is an integer of at least 1"))
+        message = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
+        raise SettingError(Diagnostic(message, "choose dt and the rate so that this is an integer of at least 1"))
     return count
 
 

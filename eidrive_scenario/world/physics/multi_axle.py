@@ -2,8 +2,7 @@
 
 Unsteered axles at different positions cannot all roll without slip in a turn. They resist it, and the vehicle turns as
 with a longer wheelbase (C. B. Winkler, Simplified analysis of the steady-state turning of complex vehicles, Vehicle
-System
-Dynamics 29 (1998), 141-180). Here this results from the forces.
+System Dynamics 29 (1998), 141-180). Here this results from the forces.
 """
 
 from __future__ import annotations
@@ -36,8 +35,7 @@ class MultiAxleTrack(SingleTrack):
     """`SingleTrack` for all axles of `parameters.axles`.
 
     An additional axle steers, if it can (`max_steering`), by the angle at which its wheels roll about the same point as
-    the
-    front wheels. This point is abreast of the mean position of the unsteered axles of the rear group.
+    the front wheels. This point is abreast of the mean position of the unsteered axles of the rear group.
     """
 
     def __init__(self, parameters: VehicleParameters, step: float) -> None:
@@ -120,8 +118,7 @@ def turning_wheelbase(vehicle: Vehicle) -> float:
     """Return the effective wheelbase of a vehicle at low speed [m].
 
     It is the distance between front and rear axle, more with further axles, and 0 without a front axle. Raise
-    InputError if
-    the vehicle is invalid.
+    InputError if the vehicle is invalid.
     """
     spec = actor_spec(vehicle.name, vehicle)
     if spec.wheelbase <= 0.0 or not spec.extra_axles:

@@ -119,23 +119,23 @@ def _foliage(piece: RoadObjectBody) -> Box:
 
 
 def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterator[int]:
-    here = {"physicsClientId": client}
+    in_client = {"physicsClientId": client}
     for start in range(0, len(boxes), MAX_FACES // len(_FACES)):
         table = np.array(boxes[start : start + MAX_FACES // len(_FACES)])
         vertices = _corners(table)
         faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1, 3)
         shape = create_triangle_shape(client, vertices.reshape(-1, 3), faces)
-        handle = bullet.createMultiBody(0.0, shape, useMaximalCoordinates=1, **here)
-        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
-        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)
+        handle = bullet.createMultiBody(0.0, shape, useMaximalCoordinates=1, **in_client)
+        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **in_client)
+        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **in_client)
         yield handle
 
 
 def _corners(boxes: Array) -> Array:
     """Return the corners (N, 8, 3) of boxes (N, 7)."""
-    along, aside = boxes[:, 3:4] / 2 * _SIGNS[:, 0], boxes[:, 4:5] / 2 * _SIGNS[:, 1]
+    along, lateral = boxes[:, 3:4] / 2 * _SIGNS[:, 0], boxes[:, 4:5] / 2 * _SIGNS[:, 1]
     cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
-    x, y = boxes[:, 0:1] + cos * along - sin * aside, boxes[:, 1:2] + sin * along + cos * aside
+    x, y = boxes[:, 0:1] + cos * along - sin * lateral, boxes[:, 1:2] + sin * along + cos * lateral
     low = np.stack([x, y, np.broadcast_to(boxes[:, 2:3], x.shape)], axis=2)
     return np.concatenate([low, low + boxes[:, None, 5:6] * (0.0, 0.0, 1.0)], axis=1)
 
@@ -159,5 +159,5 @@ def _gap(piece: RoadObjectBody, x: float, y: float) -> float:
     if piece.radius:
         return max(math.hypot(dx, dy) - piece.radius, 0.0)
     cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
-    along, aside = abs(cos * dx + sin * dy), abs(cos * dy - sin * dx)
-    return math.hypot(max(along - piece.length / 2, 0.0), max(aside - piece.width / 2, 0.0))
+    along, lateral = abs(cos * dx + sin * dy), abs(cos * dy - sin * dx)
+    return math.hypot(max(along - piece.length / 2, 0.0), max(lateral - piece.width / 2, 0.0))

@@ -78,11 +78,11 @@ class Scenery:
         if self._raised:
             return False
         self._raised = True
-        here = {"physicsClientId": self._client}
+        in_client = {"physicsClientId": self._client}
         if self.level or self.roads is None:
-            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **here)
+            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **in_client)
             # Without a visual shape pybullet loads a textured plane from a file, which takes 7 ms.
-            shown = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), **here)
+            shown = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), **in_client)
             self._add_static(plane, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND, shown)
             return True
         for mesh in surface_meshes(self.roads, 4.0):
@@ -129,13 +129,13 @@ class Scenery:
     def _add_static(
         self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str, shown: int = -1
     ) -> None:
-        here = {"physicsClientId": self._client}
+        in_client = {"physicsClientId": self._client}
         turn = quaternion(yaw, 0.0, 0.0)
         handle = bullet.createMultiBody(
-            0.0, shape, shown, basePosition=at, baseOrientation=turn, useMaximalCoordinates=1, **here
+            0.0, shape, shown, basePosition=at, baseOrientation=turn, useMaximalCoordinates=1, **in_client
         )
-        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
-        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)
+        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **in_client)
+        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **in_client)
         self._names[handle] = name
 
 

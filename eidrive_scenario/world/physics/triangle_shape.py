@@ -2,8 +2,7 @@
 
 `createCollisionShape` of pybullet 3.2.7 keeps two references to each vertex of `vertices`, and two to `vertices` and
 `indices`, forever. All calls therefore share one set of vertex lists, and the two sequences are emptied after each
-call: a
-call leaks two empty lists.
+call: a call leaks two empty lists.
 """
 
 from __future__ import annotations

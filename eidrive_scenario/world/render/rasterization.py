@@ -59,10 +59,8 @@ def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> C
     """Rasterize triangles given by x, y [px] and nearness (3, N) of their corners.
 
     A pixel shows the triangle of maximum nearness among those that contain its center. Nearness must be positive and
-    linear
-    in the image: 1 / depth in perspective. In a tie the later triangle wins. A center on an edge belongs to the
-    triangle
-    right of or below that edge, so that neighbors neither overlap nor leave gaps.
+    linear in the image: 1 / depth in perspective. In a tie the later triangle wins. A center on an edge belongs to the
+    triangle right of or below that edge, so that neighbors neither overlap nor leave gaps.
     """
     found = rasterize_reference(x, y, nearness, width, height)
     if found.triangle.shape == (height, width):
@@ -93,9 +91,7 @@ def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height:
 
 
 def greatest(x: Array, y: Array, nearness: Array, width: int, height: int) -> tuple[Floats, int, int]:
-    """Return the nearness in the bounding window of all triangles, 0 without a triangle, and its first line and
-    column.
-    """
+    """Return the nearness in the bounding window of triangles, 0 outside of them, and its first line and column."""
     rows = _rows(x, y, nearness, width, height)
     if rows is None:
         return np.zeros((0, 0), dtype=np.float32), 0, 0

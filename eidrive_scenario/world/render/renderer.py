@@ -35,9 +35,7 @@ _AT_ONCE = 16_384
 
 
 class Subjects(NamedTuple):
-    """Subjects of an image: ground, standing scenery that casts shadows, actors, and hidden actors that cast
-    shadows.
-    """
+    """Subjects of an image: ground, scenery that casts shadows, actors, and hidden actors that cast shadows."""
 
     ground: Sequence[MeshInstance]
     standing: Sequence[MeshInstance]
@@ -101,8 +99,7 @@ class Renderer:
     MOST_KEPT = 24
     """Maximum number of cameras with cached scenery; an image of 800 x 600 pixels takes 13 MB."""
     MOST_SHOWN = 400
-    """Maximum number of stored keys of previous images, by which stationary cameras are recognized among moving
-    ones.
+    """Maximum number of stored keys of previous images, by which stationary cameras are recognized among moving ones.
     """
 
     def __init__(self) -> None:
@@ -122,8 +119,7 @@ class Renderer:
         """Return the light that reaches a camera at `pose`.
 
         `ground` is the height of the road below it, for reflections [m]. Scenery is cached from the second image with
-        the same
-        content on.
+        the same content on.
         """
         light = daylight(weather)
         view = CameraView(pose, pinhole)

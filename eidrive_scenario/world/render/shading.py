@@ -49,8 +49,7 @@ def points_at(pixels: Pixels, cover: Cover, view: CameraView) -> Points:
 
 class Lit(NamedTuple):
     """Lighting of N triangles: luminance (3, N) by sky and street lamps, additional luminance by the sun (None: no
-    sun), sum
-    of both, and whether they face upwards (N,).
+    sun), sum of both, and whether they face upwards (N,).
     """
 
     surfaces: Surfaces
@@ -111,8 +110,7 @@ def shade(
     """Return the luminance (3, n) of points at close distance [cd/m²]: sun and sky, lamps, and emission.
 
     `place` is the position of the camera. lamplight and open_sky (n,) are those of the points; open_sky is the share of
-    sky
-    light that nearby bodies leave.
+    sky light that nearby bodies leave.
     """
     triangle = points.triangle
     finish = among.surfaces.finish[triangle]

@@ -24,8 +24,8 @@ _STEPS = 8192
 def white_level(luminance: Floats) -> float:
     """Return the luminance of an image (H, W, 3) that becomes white [cd/m²].
 
-    The mean of log luminance is mapped to a key that decreases with darkness, so that night images are dark:
-    1.03 - 2 / (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
+    The mean of log luminance is mapped to a key that decreases with darkness, so that night images are dark: 1.03 - 2 /
+    (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
     """
     sampled = np.maximum(_luma(np.ascontiguousarray(luminance[::2, ::2])), np.float32(BLACK))
     mean = math.exp(float(np.log(sampled).mean()))

@@ -60,8 +60,7 @@ def mirrored(
     """Return the image (H, W, 3) of a mirror in the plane z = ground [m, relative to the camera].
 
     light (3, n) of the visible points at positions x, y, z (n,) relative to the camera. sky (H, W, 3) is used for
-    pixels
-    without a reflected point. Only visible points are reflected.
+    pixels without a reflected point. Only visible points are reflected.
     """
     standing = np.flatnonzero(places[2] > ground + _HEIGHT)
     if not len(standing):

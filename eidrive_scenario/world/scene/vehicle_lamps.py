@@ -22,8 +22,7 @@ _WHITE: Light = (7_000.0, 6_800.0, 6_200.0)
 _PLATE: Light = (28.0, 26.0, 22.0)
 _BEACON: Light = (150.0, 700.0, 11_000.0)
 _RED_BEACON: Light = (11_000.0, 20.0, 12.0)
-"""Luminous intensities within the bounds of UN Regulations 7, 6, 38, 23, 87 and 65, divided by the areas of the
-lamps.
+"""Luminous intensities within the bounds of UN Regulations 7, 6, 38, 23, 87 and 65, divided by the areas of the lamps.
 """
 
 _SHINES: Mapping[str, tuple[tuple[str, Light], ...]] = {

@@ -61,8 +61,7 @@ def queue(
     """Return a fleet with a car, a leader and a follower.
 
     The car drives 20 m/s in the right of two lanes with a desired speed of 25 m/s. The leader drives 10 m/s. The
-    follower
-    is in the other lane.
+    follower is in the other lane.
     """
     fleet = Fleet(roads, changer=changer)
     fleet.add(car("me"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)

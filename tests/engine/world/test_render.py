@@ -142,8 +142,8 @@ def test_wall_towards_the_sun_is_brighter(world: World) -> None:
 
 @pytest.mark.parametrize(("azimuth", "side"), [(180.0, 1.0), (0.0, -1.0)])
 def test_shadow_of_a_house_points_away_from_the_sun(world: World, azimuth: float, side: float) -> None:
-    """At a height of 10 m and a sun elevation of 45 degrees the shadow is 10 m long: dark at 4 m, lit at 14 m from
-    the wall.
+    """At a height of 10 m and a sun elevation of 45 degrees the shadow is 10 m long: dark at 4 m, lit at 14 m from the
+    wall.
     """
     world.add_building("house", (0.0, 0.0, 5.0), (30.0, 10.0, 10.0))
     world.set_weather(Weather(sun_azimuth=azimuth, sun_elevation=45.0, cloud_cover=0.0))
@@ -207,9 +207,7 @@ def test_lamps_brighten_the_night(world: World, car: CarFactory) -> None:
 
 
 def test_low_beam_has_a_cut_off() -> None:
-    """The maximum is just below the cut-off. Above it the value is at most that for oncoming drivers in the
-    regulation.
-    """
+    """The maximum is just below the cut-off. Above it the regulation for oncoming drivers applies."""
     straight = np.zeros(1)
     below = float(intensity(straight, np.array([-0.022]), False)[0])
     assert below == pytest.approx(LOW_BEAM, rel=0.05)
@@ -237,9 +235,7 @@ def test_headlamps_illuminate_a_wall_by_inverse_square_law(world: World, car: Ca
 
 
 def test_wet_road_reflects_a_bright_wall(world: World) -> None:
-    """At a low angle, the wet road is brighter in front of a white wall than the dry one, and darker far from
-    objects.
-    """
+    """At a low angle, the wet road is brighter than the dry one in front of a white wall, and darker elsewhere."""
     world.add_building("wall", (30.0, 0.0, 10.0), (2.0, 200.0, 20.0), color=(0.9, 0.1, 0.1))
     overcast = Weather(cloud_cover=1.0, visual_range=1e9)
     at = np.s_[66:72, 60:100]

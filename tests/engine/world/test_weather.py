@@ -72,7 +72,7 @@ def test_invalid_weather_file_is_an_error_with_line(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match="needs `precipitation: rain`"):
         load_weather(wrong)
     wrong.write_text("- 1\n")
-    with pytest.raises(SettingError, match="a weather is a mapping"):
+    with pytest.raises(SettingError, match="weather is not a mapping"):
         load_weather(wrong)
     with pytest.raises(SettingError, match=r"--weather: no weather preset 'sunni'.*did you mean 'sunny'"):
         load_weather("sunni", origin="--weather")

@@ -56,10 +56,9 @@ class Daylight(NamedTuple):
 def daylight(weather: Weather) -> Daylight:
     """Return the light of sun and sky.
 
-    Clear days by IES, Calculation of daylight availability (1984): sun 127.5 klx exp(-0.21 / sin h), sky
-    0.8 + 15.5 sin½ h klx. Under clouds the light of both decreases to 1 - 0.75 c^3.4 (Kasten and Czeplak 1980), and the
-    share
-    of the sun with the clear part of the sky. In fog the rest of the sun beam is scattered, half of it downwards.
+    Clear days by IES, Calculation of daylight availability (1984): sun 127.5 klx exp(-0.21 / sin h), sky 0.8 + 15.5
+    sin½ h klx. Under clouds the light of both decreases to 1 - 0.75 c^3.4 (Kasten and Czeplak 1980), and the share of
+    the sun with the clear part of the sky. In fog the rest of the sun beam is scattered, half of it downwards.
     """
     towards = np.array(weather.sun_direction)
     height = float(towards[2])

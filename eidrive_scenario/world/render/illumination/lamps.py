@@ -46,8 +46,8 @@ class Beam(NamedTuple):
 
 
 class Canvas(NamedTuple):
-    """Points (n,) relative to the camera [m] with the normals of their surfaces, and the index (H, W) of each pixel
-    or -1.
+    """Points (n,) relative to the camera [m] with the normals of their surfaces, and the index (H, W) of each pixel or
+    -1.
     """
 
     x: Floats
@@ -116,8 +116,7 @@ def _within(
     place: Floats, axes: Floats, x: Floats, y: Floats, z: Floats
 ) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats, Floats]:
     """Return the rows of the points in range of the lamps, their positions relative to the lamps in world axes, their
-    distances
-    ahead, and the tangents of the lateral and vertical angles to the axis.
+    distances ahead, and the tangents of the lateral and vertical angles to the axis.
     """
     (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = axes
     dx, dy, dz = x - place[0], y - place[1], z - place[2]

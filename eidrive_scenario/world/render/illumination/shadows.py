@@ -32,8 +32,7 @@ class ShadowGrid:
     """Grid across the rays of the sun over the view of a camera.
 
     axes (2, 3) of the grid and `towards` (3,) in the world; low, high (2,) are its bounds [m]; width, height [px];
-    scale
-    [px/m]; base [m] of heights along the rays. All are relative to `origin`, the camera position.
+    scale [px/m]; base [m] of heights along the rays. All are relative to `origin`, the camera position.
     """
 
     axes: Array

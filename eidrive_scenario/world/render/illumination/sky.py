@@ -37,8 +37,7 @@ def dome(weather: Weather) -> Floats:
     """Return the luminance (SIZE, SIZE, 3) [cd/m²]; column and row are x / (1 + z) and y / (1 + z) of the direction.
 
     The clear and the covered part illuminate the ground as `daylight` states. Towards the horizon the dome fades into
-    the air
-    in front of it.
+    the air in front of it.
     """
     light = daylight(weather)
     x, y, z = _directions()
