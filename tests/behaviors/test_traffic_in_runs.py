@@ -243,7 +243,7 @@ def test_traffic_controller_properties_set_the_driver_model(run: Run) -> None:
         (swarm(more='<DirectionOfTravelDistribution same="0" opposite="0"/>'), r"shares are invalid \(got 0, 0;"),
         (swarm(more='<InitialSpeedRange lowerLimit="9" upperLimit="3"/>'), r"speed range is invalid \(got 9 to 3 m/s;"),
         (swarm(center="Egon"), "Egon"),
-        (swarm(more=distribution((0.0, PEDESTRIAN))), "are no shares"),
+        (swarm(more=distribution((0.0, PEDESTRIAN))), "are invalid; give weights of at least 0"),
         (area(2, "true", road_range(0.0, 10.0).replace('roadId="1"', 'roadId="9"', 1)), "road '9' does not exist"),
         (
             swarm(
