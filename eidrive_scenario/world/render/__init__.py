@@ -1,1 +1,1 @@
-"""Renderer: rasterization and lighting in numpy only, with identical results on all machines."""
+"""Renderer: rasterization and illumination in numpy only, with identical results on all machines."""

@@ -48,7 +48,7 @@ def points_at(pixels: Pixels, cover: Cover, view: CameraView) -> Points:
 
 
 class Lit(NamedTuple):
-    """Lighting of N triangles: luminance (3, N) by sky and street lamps, additional luminance by the sun (None: no
+    """Illumination of N triangles: luminance (3, N) by sky and street lamps, additional luminance by the sun (None: no
     sun), sum of both, and whether they face upwards (N,).
     """
 
@@ -60,7 +60,7 @@ class Lit(NamedTuple):
 
 
 def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
-    """Return the lighting of whole triangles."""
+    """Return the illumination of whole triangles."""
     nx, ny, nz = surfaces.normal
     reflected = surfaces.albedo * np.float32(1.0 / math.pi)
     up = np.float32(0.5) + np.float32(0.5) * nz
