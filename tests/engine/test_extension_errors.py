@@ -210,7 +210,7 @@ def test_planner_with_another_constructor_is_named(package: Path, tmp_path: Path
 
 
 class Watcher:
-    """An observer that raises when it is told to."""
+    """Observer that raises given exceptions."""
 
     def __init__(self, error: BaseException | None = None, close_error: BaseException | None = None) -> None:
         self.error, self.close_error = error, close_error

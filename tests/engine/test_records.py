@@ -23,20 +23,20 @@ class Record:
             raise ValueError("a number below 0")
 
 
-def test_fields_are_set_by_place_and_by_name_with_their_defaults() -> None:
+def test_fields_are_set_by_position_and_name_with_defaults() -> None:
     assert asdict(Record(1)) == {"number": 1, "name": "none", "parts": []}
     assert asdict(Record(2, "two", [3])) == {"number": 2, "name": "two", "parts": [3]}
     assert Record(number=2, parts=[3], name="two") == Record(2, "two", [3])
     assert repr(Record(1)).endswith("Record(number=1, name='none', parts=[])")
 
 
-def test_each_record_has_a_default_of_its_own() -> None:
+def test_default_factory_is_called_per_record() -> None:
     first, second = Record(1), Record(1)
     first.parts.append(5)
     assert second.parts == []
 
 
-def test_nobody_changes_a_field() -> None:
+def test_field_assignment_raises() -> None:
     record = Record(1)
     with pytest.raises(FrozenInstanceError):
         record.number = 2  # type: ignore[misc]
@@ -45,14 +45,14 @@ def test_nobody_changes_a_field() -> None:
     assert record.number == 1
 
 
-def test_what_the_class_checks_is_checked() -> None:
+def test_post_init_check_is_executed() -> None:
     with pytest.raises(ValueError, match="below 0"):
         Record(-1)
     with pytest.raises(ValueError, match="below 0"):
         replace(Record(1), number=-1)
 
 
-def test_wrong_arguments_are_refused_under_the_name_of_the_class() -> None:
+def test_wrong_arguments_raise_with_class_name() -> None:
     with pytest.raises(TypeError, match="missing 1 required positional argument: 'number'"):
         Record()  # type: ignore[call-arg]
     with pytest.raises(TypeError, match="unexpected keyword argument 'size'"):
@@ -60,13 +60,13 @@ def test_wrong_arguments_are_refused_under_the_name_of_the_class() -> None:
     assert list(inspect.signature(Record).parameters) == ["number", "name", "parts"]
 
 
-def test_it_can_be_copied_between_processes() -> None:
+def test_record_survives_pickling() -> None:
     record = Record(4, "four", [1, 2])
     assert pickle.loads(pickle.dumps(record)) == record
     assert replace(record, name="vier") == Record(4, "vier", [1, 2])
 
 
-def test_a_class_with_fields_that_are_no_parameters_is_refused() -> None:
+def test_class_with_non_init_fields_raises() -> None:
     @dataclass(frozen=True)
     class Derived:
         number: int

@@ -1,4 +1,4 @@
-"""Extensions by name, and what is told of those that are wrong."""
+"""Extensions by name, and the errors of invalid ones."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ def registry_of(**values: str) -> Registry:
     return Registry("criteria", [EntryPoint(name, value, GROUP) for name, value in values.items()])
 
 
-def test_what_is_there_is_loaded_when_it_is_asked_for() -> None:
+def test_extension_is_imported_on_load() -> None:
     known = registry_of(collision="eidrive_criteria.collision:Collision", broken="no.such.module:Thing")
     assert list(known) == ["broken", "collision"]
     assert known.load("collision").name == "collision"
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "message"),
     [
         ("no.such.module:Thing", r"\(no\.such\.module:Thing\) does not load: No module named 'no'"),
         ("eidrive_criteria.collision:Colision", "does not load: .* has no attribute 'Colision'"),
         ("eidrive_scenario.evaluation.criterion:Criterion", "lacks observe, verdict"),
     ],
 )
-def test_an_extension_that_cannot_work_is_named(value: str, told: str) -> None:
-    with pytest.raises(RegistryError, match=f"criteria 'mine' .*{told}"):
+def test_invalid_extension_is_reported_by_name(value: str, message: str) -> None:
+    with pytest.raises(RegistryError, match=f"criteria 'mine' .*{message}"):
         registry_of(mine=value).load("mine")
 
 
-def test_two_of_one_name_are_an_error_that_names_both() -> None:
+def test_duplicate_name_raises_with_both_modules() -> None:
     points = [EntryPoint("mine", value, GROUP) for value in ("one:Thing", "two:Thing")]
     with pytest.raises(RegistryError, match="two criteria are named 'mine': one:Thing and two:Thing"):
         Registry("criteria", points)
     assert list(Registry("criteria", points[:1] * 2)) == ["mine"], "one package found twice is no clash"
 
 
-def test_an_unknown_name_gets_the_nearest() -> None:
+def test_unknown_name_suggests_the_nearest() -> None:
     with pytest.raises(SettingError, match="did you mean 'collision'"):
         registry_of(collision="eidrive_criteria.collision:Collision").load("colision")
 

@@ -72,11 +72,11 @@ def test_each_setting_changes_the_hash_and_its_entry(changes: dict[str, Any], ke
     assert changed.as_json()[key] != usual.as_json()[key]
 
 
-def test_a_value_that_equals_the_default_is_no_other_setting() -> None:
+def test_value_equal_to_default_keeps_the_digest() -> None:
     assert resolve(channel="ideal", dt=0.05).digest == resolve().digest
 
 
-def test_inline_channels_are_told_apart_by_their_content() -> None:
+def test_inline_channels_differ_by_content() -> None:
     one, other = (resolve(channel=f"{{delay: {{kind: constant, seconds: {late}}}}}") for late in (0.1, 0.2))
     assert one.channel == other.channel == "custom"
     assert one.digest != other.digest
@@ -100,14 +100,14 @@ def _channel(text: str) -> Callable[[Path], Path]:
 
 
 @pytest.mark.parametrize("name", ["coop/scenario_1.xosc", "catalogs/vehicles.xosc", "roads/coop_1.xodr"])
-def test_a_changed_file_of_the_same_name_changes_the_hash(project: Path, name: str) -> None:
+def test_changed_file_of_equal_name_changes_the_digest(project: Path, name: str) -> None:
     before = resolve(project)
     path = project.parents[1] / name
     path.write_bytes(path.read_bytes().rstrip() + b"\n<!-- changed -->\n")
     assert resolve(project).digest != before.digest
 
 
-def test_a_channel_file_of_the_same_name_counts_by_its_content(project: Path) -> None:
+def test_channel_file_is_identified_by_content(project: Path) -> None:
     found = [
         resolve(project, channel=_channel(f"delay: {{kind: constant, seconds: {late}}}\n")(project))
         for late in (0.1, 0.3)
@@ -116,7 +116,7 @@ def test_a_channel_file_of_the_same_name_counts_by_its_content(project: Path) ->
     assert found[0].digest != found[1].digest
 
 
-def test_a_delay_trace_counts_by_its_content(project: Path) -> None:
+def test_delay_trace_is_identified_by_content(project: Path) -> None:
     channel = _channel("delay: {kind: trace, file: trace.csv}\n")(project)
     digests = set()
     for text in ("0.1\n0.2\n", "0.1\n0.3\n"):
@@ -133,7 +133,7 @@ def test_settings_of_a_copy_in_another_folder_are_equal(project: Path, tmp_path:
     assert resolve(copy) == resolve(project)
 
 
-def test_channels_of_later_events_enter(project: Path) -> None:
+def test_channels_of_later_events_are_resolved(project: Path) -> None:
     command = '<Action name="switch"><UserDefinedAction><CustomCommandAction type="eidrive.channel">{}'
     command += "</CustomCommandAction></UserDefinedAction></Action>\n"
     text = project.read_text(encoding="utf-8")
@@ -148,12 +148,12 @@ def test_channels_of_later_events_enter(project: Path) -> None:
     assert resolve(project, channel="ideal").later_channels == (), "an option replaces all channels of the file"
 
 
-def test_a_scenario_in_memory_counts_by_its_content() -> None:
+def test_scenario_in_memory_is_identified_by_content() -> None:
     text = PASSING_BY.read_bytes()
     assert resolve(text).digest != resolve(text.replace(b"passing", b"driving") + b" ").digest
 
 
-def test_the_hash_is_the_same_in_another_process() -> None:
+def test_digest_is_equal_in_another_process() -> None:
     code = (
         "import sys; from eidrive_scenario.simulation import *;"
         f"s = Simulation(load_for_seed({str(ONE)!r}, 1, {{}}), seed=1); print(s.resolved.digest); s.close()"
@@ -167,6 +167,6 @@ def test_canonical_json_does_not_depend_on_order() -> None:
     assert canonical_json(first) == canonical_json(second) == '{"a":{"c":"\\u00e4","d":2},"b":1}'
 
 
-def test_values_that_json_lacks_are_spelled() -> None:
+def test_nonfinite_values_are_written_as_text() -> None:
     odd = replace(ResolvedSettings(), channel_profile={"limit": float("inf"), "set": frozenset({"b", "a"})})
     assert json.loads(odd.canonical)["channel_profile"] == {"limit": "inf", "set": ["a", "b"]}

@@ -27,7 +27,7 @@ def test_seed_of_an_array_is_the_same_seed(tmp_path: Path) -> None:
     assert type(again.seed) is int
 
 
-def test_places_to_write_may_be_texts(tmp_path: Path) -> None:
+def test_output_paths_may_be_texts(tmp_path: Path) -> None:
     settings = RunSettings(time_limit=0.2)
     result = run_and_save(ONE, settings=settings, below=str(tmp_path), csv=f"{tmp_path}/motion.csv")
     assert result.recording is not None
@@ -36,7 +36,7 @@ def test_places_to_write_may_be_texts(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", ["1", 1.0, None])
-def test_seed_that_is_no_integer_is_refused(tmp_path: Path, seed: Any) -> None:
+def test_noninteger_seed_raises(tmp_path: Path, seed: Any) -> None:
     for run in (Simulation, run_file, run_and_save):
         with pytest.raises(SettingError, match=r"the seed is .*; give an integer"):
             run(ONE, seed=seed)
@@ -50,14 +50,14 @@ def test_senders_as_any_collection_give_equal_settings(senders: Any) -> None:
     assert result.settings == run_file(ONE, settings=RunSettings(cooperate=("RSU",), time_limit=0.2)).settings
 
 
-def test_senders_as_one_text_are_refused() -> None:
+def test_senders_as_single_text_raise() -> None:
     """A text is a collection too, of its letters."""
     with pytest.raises(SettingError, match="cooperate is the text 'RSU'; give a tuple of station names"):
         RunSettings(cooperate="RSU")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
-def test_time_limit_that_ends_no_run_is_refused(limit: float) -> None:
+def test_nonpositive_time_limit_raises(limit: float) -> None:
     """A run up to a time that is not a number would never end."""
     with pytest.raises(SettingError, match=r"time_limit is .*; give a positive number of seconds"):
         RunSettings(time_limit=limit)
@@ -88,7 +88,7 @@ def test_time_limit_that_ends_no_run_is_refused(limit: float) -> None:
         ("allow_torchscript", 1),
     ],
 )
-def test_settings_of_a_wrong_type_are_refused_by_name(setting: str, value: Any) -> None:
+def test_settings_of_wrong_type_raise_with_name(setting: str, value: Any) -> None:
     """`allow_torchscript="no"` is a true value to Python, and would allow weights to execute any code."""
     with pytest.raises(SettingError, match=setting):
         RunSettings(**{setting: value})

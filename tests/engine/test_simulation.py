@@ -37,7 +37,7 @@ def play(name: str = ONE, seed: int = 1, *observers: Frames, channel: str | None
     return run_file(resolve_scenario(name), seed=seed, settings=settings, observers=observers)
 
 
-def test_vehicles_take_the_wheel_in_the_order_of_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_set_driven_is_called_in_order_of_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The order of bodies in pybullet hangs on it, and that of a set differs from process to process."""
     names = [f"Car{number}" for number in range(8)]
     source = resolve_scenario(ONE)
@@ -71,7 +71,7 @@ def edited(old: str, new: str, tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_2"])
-def test_the_hidden_car_is_hit_without_cooperation_and_missed_with_it(name: str) -> None:
+def test_hidden_car_collides_without_cooperation_only(name: str) -> None:
     alone, helped = play(name, channel="none"), play(name, channel="ideal")
     assert (alone.passed, alone.exit_code) == (False, 1)
     collision = next(verdict for verdict in alone.criteria if verdict.name == "collision")
@@ -99,7 +99,7 @@ def test_ego_receives_detection_of_hidden_car_before_line_of_sight() -> None:
     assert first("detections") > 3.0
 
 
-def test_one_seed_gives_one_trace_in_any_order_and_in_another_process() -> None:
+def test_equal_seed_gives_equal_trace_in_any_order_and_process() -> None:
     first, other, again = play(seed=3).trace_hash, play(seed=4).trace_hash, play(seed=3).trace_hash
     assert first == again
     assert first != other
@@ -125,12 +125,12 @@ def test_total_loss_equals_no_cooperation_and_zero_loss_equals_ideal(tmp_path: P
     assert trace(str(clear)) == trace("ideal")
 
 
-def test_cooperation_can_be_taken_away_by_option() -> None:
+def test_cooperate_option_disables_cooperation() -> None:
     assert play(channel="ideal", cooperate=()).passed is False
     assert play(channel="ideal", cooperate=("RSU",)).passed is True
 
 
-def test_the_roadside_unit_enters_during_the_run() -> None:
+def test_added_roadside_unit_transmits_from_its_entry() -> None:
     watch = Frames()
     result = play("coop/scenario_1_late_rsu", 1, watch)
     assert "RSU" not in watch.frames[0].view
@@ -138,14 +138,14 @@ def test_the_roadside_unit_enters_during_the_run() -> None:
     assert result.passed
 
 
-def test_a_jammer_on_a_trigger_silences_the_unit(tmp_path: Path) -> None:
+def test_channel_command_of_event_loses_all_later_messages(tmp_path: Path) -> None:
     jammer = """<Action name="Jam"><UserDefinedAction><CustomCommandAction type="eidrive.channel">
         {loss: {kind: bernoulli, probability: 1.0}}</CustomCommandAction></UserDefinedAction></Action>
         <Action name="EgoSpeedsUp">"""
     path = edited('<Action name="EgoSpeedsUp">', jammer, tmp_path)
     result = run_file(path, seed=1)
     assert result.passed is False
-    # The message of the first tick was on the air before the event took place.
+    # The message of the first tick was sent before the event
     assert result.metrics["messages.received"] == 1
     assert result.metrics["messages.lost"] == result.metrics["messages.sent"] - 1 > 0
 
@@ -165,7 +165,7 @@ def test_a_jammer_on_a_trigger_silences_the_unit(tmp_path: Path) -> None:
         ("{uniform: [-0.15, 0.15]}", "{unifrom: [-0.15, 0.15]}", "did you mean 'uniform'"),
     ],
 )
-def test_a_wrong_setting_is_told_by_file_and_line_before_the_run(
+def test_invalid_setting_is_reported_with_file_and_line_before_run(
     old: str, new: str, expected: str, tmp_path: Path
 ) -> None:
     path = edited(old, new, tmp_path)
@@ -178,7 +178,7 @@ def test_a_wrong_setting_is_told_by_file_and_line_before_the_run(
     assert new.strip('"')[:8] in line or "eidrive" in line
 
 
-def test_an_unknown_detector_and_sender_are_told_with_their_option() -> None:
+def test_unknown_detector_and_sender_are_reported_with_their_option() -> None:
     with pytest.raises(InputError, match="--detector: unknown detector 'yolo'"):
         play(detector="yolo")
     with pytest.raises(InputError, match="--cooperate: no station 'RSU2'; did you mean 'RSU'"):
@@ -193,7 +193,7 @@ def test_run_without_stop_ends_at_time_limit() -> None:
     assert result.simulated_s == pytest.approx(2.0)
 
 
-def test_draws_differ_by_seed_and_given_parameters_win() -> None:
+def test_drawn_parameters_differ_by_seed_and_given_ones_override() -> None:
     path = resolve_scenario(ONE)
     one, two = load_for_seed(path, 1, {}), load_for_seed(path, 2, {})
     assert one.parameters["EgoOffset"] != two.parameters["EgoOffset"]
@@ -202,7 +202,7 @@ def test_draws_differ_by_seed_and_given_parameters_win() -> None:
     assert load_scenario(path).parameters["EgoOffset"] == "0"
 
 
-def test_observers_are_closed_once_even_when_the_run_breaks() -> None:
+def test_observers_are_closed_once_after_an_exception() -> None:
     class Breaks(Frames):
         def observe(self, frame: Frame) -> None:
             raise RuntimeError("full disk")
@@ -213,7 +213,7 @@ def test_observers_are_closed_once_even_when_the_run_breaks() -> None:
     assert watch.closed == 1
 
 
-def test_observers_are_closed_whatever_one_of_them_meets_at_it() -> None:
+def test_observers_are_closed_even_if_one_raises() -> None:
     order: list[str] = []
 
     class Closes(Frames):

@@ -35,7 +35,7 @@ def edited(tmp_path: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def test_an_environment_action_sets_light_air_and_grip(tmp_path: Path) -> None:
+def test_environment_action_sets_light_fog_and_friction(tmp_path: Path) -> None:
     with Simulation(load_scenario(edited(tmp_path, (INIT, INIT + RAIN)))) as run:
         weather = run.world.weather
         assert (weather.name, weather.cloud_cover, weather.visual_range) == ("Shower", 0.75, 800.0)
@@ -43,7 +43,7 @@ def test_an_environment_action_sets_light_air_and_grip(tmp_path: Path) -> None:
         assert run.world._friction == weather.friction_scale == 0.6
 
 
-def test_an_environment_comes_from_a_catalog(tmp_path: Path) -> None:
+def test_environment_of_catalog_is_applied(tmp_path: Path) -> None:
     place = '<EnvironmentCatalog><Directory path="../catalogs"/></EnvironmentCatalog>'
     after = "<MiscObjectCatalog>"
     path = edited(tmp_path, (INIT, INIT + FROM_CATALOG), (after, place + after))
@@ -55,14 +55,14 @@ def test_an_environment_comes_from_a_catalog(tmp_path: Path) -> None:
         assert storm.friction_scale == pytest.approx(preset.friction_scale, abs=0.01)
 
 
-def test_the_option_wins_over_the_file(tmp_path: Path) -> None:
+def test_weather_option_overrides_the_file(tmp_path: Path) -> None:
     path = edited(tmp_path, (INIT, INIT + RAIN))
     with Simulation(load_scenario(path), settings=RunSettings(weather="midnight")) as run:
         run.tick()
         assert run.world.weather == load_weather("midnight")
 
 
-def test_an_unknown_preset_is_told_before_the_run_with_everything_else(tmp_path: Path) -> None:
+def test_unknown_preset_is_reported_with_other_diagnostics_before_run(tmp_path: Path) -> None:
     wrong = tmp_path / "mine.yaml"
     wrong.write_text("name: mine\nfog: 40\n")
     scenario = load_scenario(resolve_scenario("coop/scenario_1"))
@@ -82,7 +82,7 @@ def test_an_unknown_preset_is_told_before_the_run_with_everything_else(tmp_path:
         ("{truth: {}, sky: {kind: gps}}", "gnss"),
     ],
 )
-def test_wrong_sensors_name_file_and_line(tmp_path: Path, sensors: str, complaint: str) -> None:
+def test_invalid_sensors_are_reported_with_file_and_line(tmp_path: Path, sensors: str, complaint: str) -> None:
     line = '<Property name="detector" value="oracle"/>'
     path = edited(tmp_path, (line, f'{line}\n<Property name="sensors" value="{sensors}"/>'))
     number = path.read_text().split("\n").index(f'<Property name="sensors" value="{sensors}"/>') + 1

@@ -1,4 +1,4 @@
-"""Stations that see, say and hear."""
+"""Agents of stations: perception, messages, fusion and control."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def agent(spec: ActorSpec, **settings: object) -> Agent:
     return build_agent(parsed, spec, None, seed=0, dt=DT)
 
 
-class Conversation:
+class Cooperation:
     """Ego and RSU on a channel, in the order of a run: deliver, act, send."""
 
     def __init__(self, car: ActorSpec, channel: str | None, seed: int = 0, **ego: object) -> None:
@@ -84,27 +84,27 @@ def known(step: AgentStep) -> list[Place]:
 
 
 def test_ideal_channel_delivers_detections_of_others_in_next_tick(car: ActorSpec) -> None:
-    talk = Conversation(car, "{model: composed}")
-    assert known(talk.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]) == [OPEN]
-    assert known(talk.step({"Ego": (OPEN,), "RSU": ()})["Ego"]) == [OPEN, HIDDEN]
-    assert known(talk.step({"Ego": (OPEN,), "RSU": ()})["Ego"]) == [OPEN], "an empty report is news too"
+    cooperation = Cooperation(car, "{model: composed}")
+    assert known(cooperation.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]) == [OPEN]
+    assert known(cooperation.step({"Ego": (OPEN,), "RSU": ()})["Ego"]) == [OPEN, HIDDEN]
+    assert known(cooperation.step({"Ego": (OPEN,), "RSU": ()})["Ego"]) == [OPEN], "an empty report is news too"
 
 
-def test_no_delay_and_no_loss_equal_shared_memory_of_the_tick_before(car: ActorSpec) -> None:
+def test_channel_without_delay_and_loss_equals_shared_memory_of_last_tick(car: ActorSpec) -> None:
     rng = np.random.default_rng(1)
-    talk = Conversation(car, "{loss: {kind: bernoulli, probability: 0.0}}")
+    cooperation = Cooperation(car, "{loss: {kind: bernoulli, probability: 0.0}}")
     before: tuple[Place, ...] = ()
     for _ in range(60):
         own = tuple((float(x), 0.0) for x in range(10, 10 + 10 * rng.integers(0, 3), 10))
         other = tuple((float(x), 25.0) for x in range(10, 10 + 10 * rng.integers(0, 4), 10))
-        step = talk.step({"Ego": own, "RSU": other})["Ego"]
+        step = cooperation.step({"Ego": own, "RSU": other})["Ego"]
         assert known(step) == sorted((*own, *before))
         before = other
 
 
 def test_total_loss_equals_no_cooperation_exactly(car: ActorSpec) -> None:
-    lossy = Conversation(car, "{loss: {kind: bernoulli, probability: 1.0}}")
-    alone = Conversation(car, None)
+    lossy = Cooperation(car, "{loss: {kind: bernoulli, probability: 1.0}}")
+    alone = Cooperation(car, None)
     for tick in range(30):
         seen = {"Ego": (OPEN,) if tick % 3 else (), "RSU": (HIDDEN,)}
         first, second = lossy.step(seen)["Ego"], alone.step(seen)["Ego"]
@@ -113,43 +113,43 @@ def test_total_loss_equals_no_cooperation_exactly(car: ActorSpec) -> None:
         assert first.inbox == second.inbox == ()
 
 
-def test_latency_delays_the_others_not_the_own_eyes(car: ActorSpec) -> None:
-    talk = Conversation(car, "{delay: {kind: constant, seconds: 0.3}}")
+def test_latency_delays_received_detections_only(car: ActorSpec) -> None:
+    cooperation = Cooperation(car, "{delay: {kind: constant, seconds: 0.3}}")
     for tick in range(12):
-        step = talk.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]
+        step = cooperation.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]
         assert known(step) == ([OPEN] if tick < 6 else [OPEN, HIDDEN])
 
 
-def test_own_perception_through_the_channel_is_delayed_like_the_others(car: ActorSpec) -> None:
-    talk = Conversation(car, "{delay: {kind: constant, seconds: 0.3}, own_perception: true}")
+def test_own_perception_of_channel_is_delayed_like_received_detections(car: ActorSpec) -> None:
+    cooperation = Cooperation(car, "{delay: {kind: constant, seconds: 0.3}, own_perception: true}")
     for tick in range(12):
-        step = talk.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]
+        step = cooperation.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]
         assert len(step.detections) == 1
         assert known(step) == ([] if tick < 6 else [OPEN, HIDDEN])
 
 
-def test_what_a_station_says_of_itself_is_no_object_to_it(car: ActorSpec) -> None:
-    """With own perception on the channel its awareness messages come back to it as well."""
-    talk = Conversation(car, "{model: composed, own_perception: true}", messages="cpm, cam")
+def test_own_cam_is_not_an_object_of_its_sender(car: ActorSpec) -> None:
+    """A channel with own perception returns the CAMs of a station to it as well."""
+    cooperation = Cooperation(car, "{model: composed, own_perception: true}", messages="cpm, cam")
     for _ in range(4):
-        step = talk.step({"Ego": (OPEN,)})["Ego"]
+        step = cooperation.step({"Ego": (OPEN,)})["Ego"]
     assert {received.message.kind for received in step.inbox if received.message.sender == "Ego"} == {"cpm", "cam"}
     assert known(step) == [OPEN]
 
 
-def test_a_report_is_forgotten_when_it_is_a_second_old(car: ActorSpec) -> None:
-    talk = Conversation(car, "{model: composed}")
-    talk.step({"RSU": (HIDDEN,)})
-    del talk.agents["RSU"]
-    ages = [talk.tick * DT for _ in range(30) if known(talk.step({})["Ego"])]
+def test_report_older_than_report_timeout_is_deleted(car: ActorSpec) -> None:
+    cooperation = Cooperation(car, "{model: composed}")
+    cooperation.step({"RSU": (HIDDEN,)})
+    del cooperation.agents["RSU"]
+    ages = [cooperation.tick * DT for _ in range(30) if known(cooperation.step({})["Ego"])]
     assert max(ages) == pytest.approx(1.05), "the tick counter is one on: last known at an age of 1.00 s"
-    short = Conversation(car, "{model: composed}", report_timeout=0.2)
+    short = Cooperation(car, "{model: composed}", report_timeout=0.2)
     short.step({"RSU": (HIDDEN,)})
     del short.agents["RSU"]
     assert [bool(known(short.step({})["Ego"])) for _ in range(6)] == [True] * 4 + [False] * 2
 
 
-def test_a_late_message_does_not_replace_a_newer_one(car: ActorSpec) -> None:
+def test_out_of_sequence_message_does_not_replace_newer_report(car: ActorSpec) -> None:
     ego, rsu = agent(car), agent(RSU)
     first, second = (
         rsu.act(readings(tick * DT, (30.0, -6.0), (30.0, 20.0 + tick)), (), tick * DT, None) for tick in (0, 1)
@@ -167,18 +167,18 @@ def test_a_late_message_does_not_replace_a_newer_one(car: ActorSpec) -> None:
 
 def test_cooperates_with_selects_receivers(car: ActorSpec) -> None:
     for names, expected in ((["RSU"], [HIDDEN]), (["Spectator"], []), ([], []), (None, [HIDDEN])):
-        talk = Conversation(car, "{model: composed}", cooperates_with=names)
-        talk.step({"RSU": (HIDDEN,)})
-        step = talk.step({"RSU": (HIDDEN,)})["Ego"]
+        cooperation = Cooperation(car, "{model: composed}", cooperates_with=names)
+        cooperation.step({"RSU": (HIDDEN,)})
+        step = cooperation.step({"RSU": (HIDDEN,)})["Ego"]
         assert known(step) == expected
         assert len(step.inbox) == len(expected)
 
 
 def test_outbox_contains_own_detections_only(car: ActorSpec) -> None:
     """Otherwise a box would come back to its first reporter and count twice."""
-    talk = Conversation(car, "{model: composed}")
+    cooperation = Cooperation(car, "{model: composed}")
     for _ in range(5):
-        steps = talk.step({"RSU": (HIDDEN,)})
+        steps = cooperation.step({"RSU": (HIDDEN,)})
     assert known(steps["Ego"]) == [HIDDEN]
     assert len(steps["Ego"].outbox[0].detections) == 0
     assert steps["Ego"].outbox[0].size == 121 + 35
@@ -187,27 +187,27 @@ def test_outbox_contains_own_detections_only(car: ActorSpec) -> None:
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.3, 0.6])
-def test_the_ego_does_not_stand_in_its_own_way(car: ActorSpec, latency: float) -> None:
+def test_received_box_of_ego_body_is_ignored(car: ActorSpec, latency: float) -> None:
     """The RSU sees the ego at 15 m/s; even 9 m behind where it is by now, that box is not an obstacle."""
-    talk = Conversation(car, f"{{delay: {{kind: constant, seconds: {latency}}}}}")
+    cooperation = Cooperation(car, f"{{delay: {{kind: constant, seconds: {latency}}}}}")
     for tick in range(30):
         x = 15.0 * tick * DT
         center = (x + car.offset[0], car.offset[1])
-        step = talk.step({"RSU": (center, HIDDEN)}, ego_at=(x, 0.0))["Ego"]
+        step = cooperation.step({"RSU": (center, HIDDEN)}, ego_at=(x, 0.0))["Ego"]
         assert known(step) in ([], [HIDDEN])
     assert known(step) == [HIDDEN]
 
 
-def test_a_car_close_beside_or_behind_is_not_taken_for_the_ego(car: ActorSpec) -> None:
+def test_received_box_beside_or_behind_ego_is_kept(car: ActorSpec) -> None:
     """Half a meter of air between the bodies: centers 2.3 m apart across, 5.4 m along."""
     x = car.offset[0]
     for place in ((x, 2.337), (x, -2.337), (x - 5.392, 0.0), (x + 5.392, 0.0)):
-        talk = Conversation(car, "{model: composed}")
-        talk.step({"RSU": (place,)})
-        assert len(known(talk.step({"RSU": (place,)})["Ego"])) == 1
+        cooperation = Cooperation(car, "{model: composed}")
+        cooperation.step({"RSU": (place,)})
+        assert len(known(cooperation.step({"RSU": (place,)})["Ego"])) == 1
 
 
-def test_between_two_readings_the_last_one_holds_and_then_grows_old(car: ActorSpec) -> None:
+def test_last_detections_are_used_between_readings_until_timeout(car: ActorSpec) -> None:
     ego = agent(car, report_timeout=0.1)
     counts = [
         len(ego.act(readings(tick * DT, (0.0, 0.0), OPEN, due=tick == 0), (), tick * DT, None).fused)
@@ -216,14 +216,14 @@ def test_between_two_readings_the_last_one_holds_and_then_grows_old(car: ActorSp
     assert counts == [1, 1, 1, 0, 0]
 
 
-def test_message_rate(car: ActorSpec) -> None:
+def test_message_rate_sets_the_interval_of_messages(car: ActorSpec) -> None:
     ego = agent(car, message_rate=10)
     said = [ego.act(readings(tick * DT, (0.0, 0.0)), (), tick * DT, None).outbox for tick in range(10)]
     assert [len(outbox) for outbox in said] == [1, 0] * 5
     assert [outbox[0].number for outbox in said if outbox] == [0, 1, 2, 3, 4]
 
 
-def test_what_drives_and_what_does_not(car: ActorSpec) -> None:
+def test_plan_and_control_depend_on_wheels_and_planner(car: ActorSpec) -> None:
     here = readings(0.0, (0.0, 0.0))
     mast = agent(RSU).act(here, (), 0.0, None)
     assert mast.plan is None
@@ -241,7 +241,7 @@ def test_what_drives_and_what_does_not(car: ActorSpec) -> None:
 
 
 def test_received_object_in_conflict_area_brakes_with_conflict_deceleration(car: ActorSpec) -> None:
-    talk = Conversation(
+    cooperation = Cooperation(
         car,
         "{model: composed}",
         planner="conflict_area",
@@ -250,8 +250,8 @@ def test_received_object_in_conflict_area_brakes_with_conflict_deceleration(car:
             {"conflict_area": [29, 31, 18, 22], "conflict_deceleration": 4.5}
         ),
     )
-    first = talk.step({"RSU": (HIDDEN,)})["Ego"]
-    second = talk.step({"RSU": (HIDDEN,)})["Ego"]
+    first = cooperation.step({"RSU": (HIDDEN,)})["Ego"]
+    second = cooperation.step({"RSU": (HIDDEN,)})["Ego"]
     assert first.control is not None
     assert second.control is not None
     assert first.control.brake == 0.0
@@ -259,13 +259,13 @@ def test_received_object_in_conflict_area_brakes_with_conflict_deceleration(car:
     assert second.control.throttle == 0.0
 
 
-def test_the_rig_has_what_the_detector_needs(car: ActorSpec) -> None:
+def test_rig_contains_sensors_that_the_detector_needs(car: ActorSpec) -> None:
     assert build_rig(AgentSettings(), car).due(0.0).keys() == {"truth"}
     with pytest.raises(SettingError, match="needs a sensor of kind truth"):
         build_rig(AgentSettings.model_validate({"sensors": "camera"}), car)
 
 
-def test_state_of_the_sender(car: ActorSpec) -> None:
+def test_message_contains_state_of_sender(car: ActorSpec) -> None:
     state = agent(car).act(readings(1.0, (3.0, 4.0), speed=7.0), (), 1.0, None).outbox[0].state
     assert (state.time, state.x, state.y, state.yaw, state.speed) == (1.0, 3.0, 4.0, 0.0, 7.0)
     assert math.isfinite(state.z)

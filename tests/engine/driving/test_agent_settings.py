@@ -1,4 +1,4 @@
-"""What a controller's Properties may say."""
+"""Settings of stations in the Properties of controllers."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_is_agent_controller_requires_module_eidrive() -> None:
         ("[]", ()),
     ],
 )
-def test_cooperates_with(text: str, names: tuple[str, ...] | None) -> None:
+def test_cooperates_with_accepts_names_all_and_none(text: str, names: tuple[str, ...] | None) -> None:
     assert settings(("cooperates_with", text)).cooperates_with == names
 
 
@@ -80,7 +80,7 @@ SQUARE = ((29.0, 4.5), (32.0, 4.5), (32.0, 10.5), (29.0, 10.5))
         ("[[[0, 0], [2, 0], [1, 2]], [29, 32, 4.5, 10.5]]", (((0, 0), (2, 0), (1, 2)), SQUARE)),
     ],
 )
-def test_conflict_areas(text: str, areas: object) -> None:
+def test_conflict_area_accepts_rectangles_and_polygons(text: str, areas: object) -> None:
     found = settings(("planner", "conflict_area"), ("conflict_area", text)).planner_settings
     assert found.areas == areas
     assert isinstance(found, ConflictAreaSettings)
@@ -107,7 +107,7 @@ def test_properties_of_a_planner_that_is_not_selected_are_checked_and_ignored(pl
         settings(planner, ("conflict_hold_time", "-1"))
 
 
-def test_sensors_by_kind_and_in_full() -> None:
+def test_sensors_are_given_by_kind_or_with_settings() -> None:
     plain = settings(("sensors", "truth, camera"), ("range", "60"), ("field_of_view", "120"), ("mount", "[0, 0, 5]"))
     sensors = plain.rig_sensors(frozenset({"truth"}))
     assert sensors["truth"] == TruthSettings(range=60, field_of_view=120, mount=Mount(x=0, y=0, z=5))

@@ -81,14 +81,14 @@ def test_object_is_in_area_by_its_center(car: ActorSpec) -> None:
     assert planner(car).plan(EGO, objects(0.0, (29.1, 7.0)), None, 0.0).braking == 5.0
 
 
-def test_any_of_several_areas_and_any_shape(car: ActorSpec) -> None:
+def test_object_in_any_of_several_areas_brakes(car: ActorSpec) -> None:
     rule = planner(car, conflict_area=[[29, 32, 4.5, 10.5], [[0, 0], [10, 0], [0, 10]]])
     assert rule.plan(EGO, objects(0.0, (4.0, 4.0)), None, 0.0).braking is not None
     rule = planner(car, conflict_area=[[0, 0], [10, 0], [0, 10]])
     assert rule.plan(EGO, objects(0.0, (6.0, 6.0)), None, 0.0).braking is None
 
 
-def test_inside_a_polygon_that_is_not_convex() -> None:
+def test_inside_of_concave_polygon_follows_even_odd_rule() -> None:
     arrow = ((0.0, 0.0), (4.0, 4.0), (0.0, 2.0), (-4.0, 4.0))
     assert inside(0.0, 1.0, arrow)
     assert inside(3.0, 3.2, arrow)
@@ -105,7 +105,7 @@ def test_planner_is_registered_by_entry_point() -> None:
     assert registry("planners").load("conflict_area") is ConflictAreaPlanner
 
 
-def test_object_that_hardly_exists_does_not_brake(car: ActorSpec) -> None:
+def test_object_below_min_existence_does_not_brake(car: ActorSpec) -> None:
     """Existence counts where it is estimated, else the score; 0.5 by default."""
 
     def brakes(existence: float | None, score: float = 1.0, **settings: object) -> bool:

@@ -23,7 +23,7 @@ NOTHING = Detections(0.0)
 STRAIGHT = np.column_stack([np.arange(3.0), np.zeros(3)])
 
 
-def test_pid_by_hand() -> None:
+def test_pid_output_equals_hand_calculation() -> None:
     pid = PID(Gains(2.0, 0.5, 0.1), low=-10.0, high=10.0, dt=0.1)
     assert pid.update(1.0) == pytest.approx(2.0 + 0.5 * 0.1)
     assert pid.update(2.0) == pytest.approx(4.0 + 0.5 * 0.3 + 0.1 * 10.0)
@@ -32,14 +32,14 @@ def test_pid_by_hand() -> None:
     assert pid.update(1.0) == pytest.approx(2.05)
 
 
-def test_the_integral_does_not_wind_up_at_a_limit() -> None:
+def test_pid_integral_at_output_limit_is_constant() -> None:
     """An error of 10 for 20 s would give an integral of 200; it stands still, so the output turns at once."""
     pid = PID(Gains(1.0, 1.0), low=-1.0, high=1.0, dt=0.1)
     assert {pid.update(10.0) for _ in range(200)} == {1.0}
     assert pid.update(-0.5) == pytest.approx(-0.55)
 
 
-def test_the_integral_learns_near_the_target_only() -> None:
+def test_pid_integral_outside_band_is_constant() -> None:
     pid = PID(Gains(1.0, 1.0), low=-10.0, high=10.0, dt=0.1, band=1.0)
     assert pid.update(5.0) == 5.0
     assert pid.update(5.0) == 5.0
@@ -47,7 +47,7 @@ def test_the_integral_learns_near_the_target_only() -> None:
     assert pid.update(1.0) == pytest.approx(1.2)
 
 
-def test_two_regulators_share_nothing(car: ActorSpec) -> None:
+def test_two_controllers_have_separate_state(car: ActorSpec) -> None:
     first, second = PidController(car, 0.05), PidController(car, 0.05)
     assert first._speed is not first._direction
     assert first._speed is not second._speed
@@ -65,7 +65,7 @@ def drive(vehicle: Any, route: RoutePlanner, goal: Goal | None, seconds: float) 
         vehicle.drive(controller.control(ego, route.plan(ego, NOTHING, goal, vehicle.time)))
 
 
-def test_the_target_speed_is_reached_within_the_limits_and_kept(car: ActorSpec, vehicle: Any) -> None:
+def test_target_speed_is_reached_within_limits_and_kept(car: ActorSpec, vehicle: Any) -> None:
     ego = vehicle()
     drive(ego, planner(car, target_speed=8.0), None, 12.0)
     speeds = np.array([speed for _, _, speed in ego.track])
@@ -76,7 +76,7 @@ def test_the_target_speed_is_reached_within_the_limits_and_kept(car: ActorSpec, 
     assert max(abs(y) for _, y, _ in ego.track) < 1e-6
 
 
-def test_a_lower_goal_brakes_within_the_limits(car: ActorSpec, vehicle: Any) -> None:
+def test_lower_target_speed_brakes_within_limits(car: ActorSpec, vehicle: Any) -> None:
     ego, route = vehicle(speed=15.0), planner(car)
     drive(ego, route, None, 2.0)
     assert ego.speed == pytest.approx(15.0, rel=0.01), "without a target the first speed is kept"
@@ -86,7 +86,7 @@ def test_a_lower_goal_brakes_within_the_limits(car: ActorSpec, vehicle: Any) -> 
     assert ego.speed == pytest.approx(5.0, rel=0.03)
 
 
-def test_it_stops_at_the_destination_and_stays(car: ActorSpec, vehicle: Any) -> None:
+def test_vehicle_stops_at_destination(car: ActorSpec, vehicle: Any) -> None:
     ego = vehicle(speed=10.0)
     drive(ego, planner(car, target_speed=10.0), Goal(waypoints=np.array([[60.0, 0.0, 0.0]])), 20.0)
     assert ego.x == pytest.approx(60.0, abs=0.6)
@@ -95,7 +95,7 @@ def test_it_stops_at_the_destination_and_stays(car: ActorSpec, vehicle: Any) -> 
 
 
 @pytest.mark.parametrize("offset", [0.5, 1.5, -1.5])
-def test_an_offset_decays_and_hardly_swings_over(car: ActorSpec, vehicle: Any, offset: float) -> None:
+def test_lateral_offset_decays_with_small_overshoot(car: ActorSpec, vehicle: Any, offset: float) -> None:
     ego = vehicle(y=offset, speed=10.0)
     goal = Goal(speed=10.0, path=np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]]))
     route, controller = planner(car), PidController(car, 0.05)
@@ -111,10 +111,10 @@ def test_an_offset_decays_and_hardly_swings_over(car: ActorSpec, vehicle: Any, o
     ("offset", "yaw", "speed"),
     [(3.0, 1.0, 8.0), (0.0, 1.0, 8.0), (-6.0, -0.4, 12.0), (3.0, 0.4, 18.0), (3.0, 0.0, 28.0)],
 )
-def test_what_is_far_off_or_stands_across_comes_back_and_stays(
+def test_large_offset_or_heading_error_converges_to_path(
     car: ActorSpec, vehicle: Any, offset: float, yaw: float, speed: float
 ) -> None:
-    """As after a turn tighter than its wheels allow, or where somebody pushed: it does not swing about its path."""
+    """The vehicle converges to its path without oscillation, as after a tight turn or a collision."""
     ego, route, controller = vehicle(y=offset, yaw=yaw, speed=speed), planner(car), PidController(car, 0.05)
     goal = Goal(speed=speed, path=np.array([[-20.0, 0.0, 0.0], [900.0, 0.0, 0.0]]))
     for _ in range(300):
@@ -125,7 +125,7 @@ def test_what_is_far_off_or_stands_across_comes_back_and_stays(
 
 
 @pytest.mark.parametrize(("radius", "speed"), [(12.0, 6.0), (40.0, 10.0), (-40.0, 12.0), (100.0, 20.0)])
-def test_a_circle_is_kept(car: ActorSpec, vehicle: Any, radius: float, speed: float) -> None:
+def test_circular_path_is_followed(car: ActorSpec, vehicle: Any, radius: float, speed: float) -> None:
     """The front axle keeps to it; the rear one, inside, cuts it by R - sqrt(R² - L²). sqrt(5 R) allows these speeds.
 
     The curve begins at once, while the front axle is still on the tangent: judged from 3 s on.
@@ -146,7 +146,7 @@ def test_a_circle_is_kept(car: ActorSpec, vehicle: Any, radius: float, speed: fl
     assert ego.speed == pytest.approx(speed, abs=0.3)
 
 
-def test_a_demanded_deceleration_is_the_pedal_exactly_and_steering_goes_on(car: ActorSpec, vehicle: Any) -> None:
+def test_braking_of_plan_sets_brake_and_keeps_steering(car: ActorSpec, vehicle: Any) -> None:
     ego = vehicle(y=1.0, speed=8.0)
     points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [9.0, 0.0]])
     free, braked = (Plan(points, np.full(5, 8.0), "", braking=braking) for braking in (None, 5.0))
@@ -158,7 +158,7 @@ def test_a_demanded_deceleration_is_the_pedal_exactly_and_steering_goes_on(car: 
     assert PidController(car, 0.05).control(ego.state(), beyond).brake == 1.0
 
 
-def test_braking_to_a_stand_takes_the_time_and_way_of_that_deceleration(car: ActorSpec, vehicle: Any) -> None:
+def test_braking_to_standstill_has_time_and_distance_of_deceleration(car: ActorSpec, vehicle: Any) -> None:
     """From 8 m/s with 5 m/s²: 1.6 s and 6.4 m, a little less with rolling resistance and drag."""
     ego, controller = vehicle(speed=8.0), PidController(car, 0.05)
     points = np.stack([np.arange(60.0), np.zeros(60)], axis=1)
@@ -171,12 +171,12 @@ def test_braking_to_a_stand_takes_the_time_and_way_of_that_deceleration(car: Act
 @pytest.mark.parametrize(
     "plan", [Plan(STRAIGHT, np.zeros(3), "stop", braking=5.0), Plan(STRAIGHT, np.full(3, 9.0), "go")]
 )
-def test_a_vehicle_without_brakes_or_drive_has_pedals_all_the_same(car: ActorSpec, vehicle: Any, plan: Plan) -> None:
+def test_vehicle_without_brakes_or_drive_has_finite_controls(car: ActorSpec, vehicle: Any, plan: Plan) -> None:
     weak = replace(car, max_acceleration=0.0, max_deceleration=0.0)
     control = PidController(weak, 0.05).control(vehicle(speed=5.0).state(), plan)
     assert max(control.throttle, control.brake) == 1.0
 
 
-def test_parked(car: ActorSpec) -> None:
+def test_hold_standstill_applies_full_brake(car: ActorSpec) -> None:
     control = PidController(car, 0.05).hold_standstill()
     assert (control.throttle, control.brake, control.steering) == (0.0, 1.0, 0.0)

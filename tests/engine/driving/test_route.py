@@ -25,13 +25,13 @@ def ego(x: float, y: float, yaw: float = 0.0, speed: float = 0.0) -> EgoState:
     return EgoState(0.0, np.array([x, y, 0.0]), yaw, 0.0, 0.0, speed, 0.0, 0.0)
 
 
-def test_speed_in_a_curve_is_the_root_of_five_radii() -> None:
+def test_speed_limit_in_curve_is_root_of_five_radii() -> None:
     angles = np.linspace(0.0, math.pi, 200)
     path = PlannedPath(np.stack([20.0 * np.sin(angles), 20.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
     np.testing.assert_allclose(path.limits[8:-8], math.sqrt(5.0 * 20.0), rtol=0.02)
 
 
-def test_before_a_curve_the_speed_falls_with_three_meters_per_second_squared() -> None:
+def test_speed_limit_before_curve_has_approach_deceleration() -> None:
     angles = np.linspace(0.0, math.pi / 2, 100)[1:]
     straight = np.stack([np.linspace(-60.0, 0.0, 61), np.zeros(61)], axis=1)
     curve = np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1)
@@ -41,14 +41,14 @@ def test_before_a_curve_the_speed_falls_with_three_meters_per_second_squared() -
     assert path.limits.min() == pytest.approx(math.sqrt(50.0), rel=0.05)
 
 
-def test_the_end_is_a_stop_and_the_horizon_is_not() -> None:
+def test_speed_limit_is_zero_at_end_but_not_at_horizon() -> None:
     line = np.array([[0.0, 0.0], [50.0, 0.0]])
     assert PlannedPath(line, ends=True).limits[-1] == 0.0
     assert PlannedPath(line, ends=True).limits[-25] == pytest.approx(math.sqrt(2 * 3.0 * 24), rel=1e-6)
     assert PlannedPath(line, ends=False).limits.min() > 100.0
 
 
-def test_points_are_a_meter_apart_and_doubled_ones_do_no_harm() -> None:
+def test_path_points_are_spaced_by_one_meter_without_duplicates() -> None:
     path = PlannedPath(np.array([[0.0, 0.0], [0.0, 0.0], [4.0, 3.0], [4.0, 3.0], [8.0, 6.0]]), ends=True)
     np.testing.assert_allclose(np.hypot(*np.diff(path.points, axis=0).T), 1.0)
     assert len(path) == 11
@@ -56,14 +56,14 @@ def test_points_are_a_meter_apart_and_doubled_ones_do_no_harm() -> None:
         PlannedPath(np.zeros((3, 2)), ends=True)
 
 
-def test_smoothing_keeps_a_curve_within_a_decimeter() -> None:
+def test_smoothing_moves_curve_by_less_than_a_decimeter() -> None:
     angles = np.linspace(0.0, math.pi, 200)
     path = PlannedPath(np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
     radius = np.hypot(path.points[:, 0], path.points[:, 1] - 10.0)
     assert np.abs(radius - 10.0).max() < 0.11
 
 
-def test_projection_goes_forward_only() -> None:
+def test_projection_is_monotonic() -> None:
     """A path that crosses itself: the vehicle stays on the branch that it is on."""
     angles = np.linspace(0.0, 2 * math.pi, 300)
     eight = np.stack([30 * np.sin(angles), 20 * np.sin(2 * angles)], axis=1)
@@ -114,7 +114,7 @@ def test_route_without_goal_follows_lane_to_end_of_road(car: ActorSpec, roads: R
 
 
 @pytest.mark.parametrize("radius", [3.5, 6.0, 20.0])
-def test_round_a_ring_that_leads_into_itself_it_goes_on_and_on(car: ActorSpec, radius: float) -> None:
+def test_route_on_ring_road_does_not_end(car: ActorSpec, radius: float) -> None:
     length = 2.0 * math.pi * radius
     ring = f"""<OpenDRIVE><header revMajor="1" revMinor="7"/><road id="1" length="{length!r}" junction="-1"><link>
       <predecessor elementType="road" elementId="1" contactPoint="end"/>
@@ -134,20 +134,20 @@ def test_round_a_ring_that_leads_into_itself_it_goes_on_and_on(car: ActorSpec, r
     assert np.diff(angles).min() > 0.0, "always forward"
 
 
-def test_oncoming_traffic_follows_the_other_lane_the_other_way(car: ActorSpec, roads: RoadNetwork) -> None:
+def test_route_on_opposite_lane_follows_its_driving_direction(car: ActorSpec, roads: RoadNetwork) -> None:
     plan = planner(car, roads, target_speed=5.0).plan(ego(50.0, 1.75, math.pi), NOTHING, None, 0.0)
     assert plan.points[0] == pytest.approx((50.0, 1.75), abs=1e-6)
     assert plan.points[-1][0] < 5.0
     np.testing.assert_allclose(plan.points[:, 1], 1.75, atol=1e-6)
 
 
-def test_a_vehicle_that_looks_the_wrong_way_goes_straight_ahead(car: ActorSpec, roads: RoadNetwork) -> None:
+def test_vehicle_against_driving_direction_plans_straight_ahead(car: ActorSpec, roads: RoadNetwork) -> None:
     plan = planner(car, roads).plan(ego(50.0, -1.75, math.pi), NOTHING, None, 0.0)
     assert plan.points[-1][0] < 0.0
     np.testing.assert_allclose(plan.points[:, 1], -1.75, atol=1e-6)
 
 
-def test_waypoints_lead_along_the_road_to_a_stop(car: ActorSpec, roads: RoadNetwork) -> None:
+def test_waypoints_on_roads_give_route_to_a_stop(car: ActorSpec, roads: RoadNetwork) -> None:
     goal = Goal(waypoints=np.array([[60.0, -1.7, 0.0], [131.8, 80.0, 0.0]]))
     route = planner(car, roads, target_speed=9.0)
     route.plan(ego(5.0, -1.75), NOTHING, goal, 0.0)
@@ -163,7 +163,7 @@ def test_waypoints_lead_along_the_road_to_a_stop(car: ActorSpec, roads: RoadNetw
     assert route._path.points[-1] == pytest.approx((90.0, -1.75), abs=0.05)
 
 
-def test_waypoints_off_the_road_are_joined_directly(car: ActorSpec, roads: RoadNetwork) -> None:
+def test_waypoints_outside_roads_are_connected_directly(car: ActorSpec, roads: RoadNetwork) -> None:
     for network in (roads, None):
         route = planner(car, network)
         route.plan(ego(0.0, -40.0), NOTHING, Goal(waypoints=np.array([[20.0, -40.0, 0.0], [40.0, -50.0, 0.0]])), 0.0)
@@ -175,7 +175,7 @@ def test_waypoints_off_the_road_are_joined_directly(car: ActorSpec, roads: RoadN
 
 
 @pytest.mark.parametrize("goal", [Goal(waypoints=np.zeros((1, 3))), Goal(path=np.zeros((2, 3)))])
-def test_a_vehicle_that_is_where_it_shall_go_stands(car: ActorSpec, roads: RoadNetwork, goal: Goal) -> None:
+def test_vehicle_at_destination_stays(car: ActorSpec, roads: RoadNetwork, goal: Goal) -> None:
     here = ego(0.0, 0.0, yaw=2.0)
     for network in (None, roads):
         plan = planner(car, network, target_speed=10.0).plan(here, NOTHING, goal, 0.0)
@@ -183,7 +183,7 @@ def test_a_vehicle_that_is_where_it_shall_go_stands(car: ActorSpec, roads: RoadN
         assert (control.throttle, control.brake > 0.0) == (0.0, True)
 
 
-def test_a_way_that_turns_back_between_two_points_of_the_path(car: ActorSpec) -> None:
+def test_path_with_reversal_between_samples_has_finite_control(car: ActorSpec) -> None:
     """4.5 m ahead and back: the fifth meter's point lies where the fourth's does."""
     route = planner(car, None, target_speed=10.0)
     goal = Goal(path=np.array([[0.0, 0.0, 0.0], [4.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))
@@ -193,7 +193,7 @@ def test_a_way_that_turns_back_between_two_points_of_the_path(car: ActorSpec) ->
         assert math.isfinite(PidController(car, 0.05).control(ego(x, 0.0, speed=2.0), plan).steering)
 
 
-def test_speeds(car: ActorSpec) -> None:
+def test_target_speed_precedence_is_goal_setting_initial_speed(car: ActorSpec) -> None:
     route = planner(car, None, target_speed=7.0)
     assert route.plan(ego(0, 0), NOTHING, None, 0.0).speeds[0] == 7.0
     assert route.plan(ego(0, 0), NOTHING, Goal(speed=3.0), 0.0).speeds[0] == 3.0
@@ -202,7 +202,7 @@ def test_speeds(car: ActorSpec) -> None:
     assert free.plan(ego(0, 0, speed=2.0), NOTHING, None, 0.0).speeds[0] == 4.5
 
 
-def test_a_straight_path_without_roads_never_ends(car: ActorSpec) -> None:
+def test_straight_path_without_roads_does_not_end(car: ActorSpec) -> None:
     route = planner(car, None, target_speed=10.0)
     for x in range(0, 2000, 5):
         plan = route.plan(ego(float(x), 0.0), NOTHING, None, 0.0)

@@ -81,7 +81,7 @@ def test_mast_with_cooperates_with_fuses_received_and_sends_own_detections(tmp_p
         mast = after.view.position[after.view.row("RSU")]
         if len(unit.fused):
             away = np.hypot(unit.fused.boxes[:, 0] - mast[0], unit.fused.boxes[:, 1] - mast[1])
-            assert away.min() > 1.0, "the mast is not an object of its own list"
+            assert away.min() > 1.0, "the list of a mast does not contain the mast"
     assert learned > 0
 
 
