@@ -11,7 +11,7 @@ import pytest
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.experiments.perception_metrics import recall_by_sight, snapshot
+from eidrive_scenario.experiments.perception_metrics import metric_sample, recall_by_sight
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
@@ -89,7 +89,8 @@ def test_fused_objects_of_mast_count_in_perception_metrics(tmp_path: Path) -> No
     _, deaf = play(with_properties(tmp_path, sensors="{truth: {range: 8}}"))
     _, hearing = play(with_properties(tmp_path, sensors="{truth: {range: 8}}", cooperates_with="Ego"))
     alone, joined = (
-        recall_by_sight([snapshot(frame, "RSU", reach=60.0) for frame in frames[2:]], 0.1) for frames in (deaf, hearing)
+        recall_by_sight([metric_sample(frame, "RSU", reach=60.0) for frame in frames[2:]], 0.1)
+        for frames in (deaf, hearing)
     )
     assert alone.others is not None
     assert joined.others is not None
