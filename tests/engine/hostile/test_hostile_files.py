@@ -27,7 +27,7 @@ needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs POSIX"
 
 
 def output_of(path: Path) -> str:
-    """What check and run say of a file that they refuse."""
+    """Return the output of `check` and `run` for a file that they reject."""
     texts = []
     for command in (["check", str(path)], ["run", str(path), "--no-record"]):
         result = CliRunner().invoke(app, command)

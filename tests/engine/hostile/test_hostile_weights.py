@@ -108,7 +108,7 @@ def with_weights(write: Write, weights: Path) -> Path:
 
 
 def watched(folder: Path, *arguments: str, **environment: str) -> dict[str, object]:
-    """What `eidrive` with these arguments did, as an audit hook saw it."""
+    """Return the operations of `eidrive` with these arguments that an audit hook records."""
     report = folder / "report.json"
     inherited = {name: value for name, value in os.environ.items() if name != "EIDRIVE_ALLOW_TORCHSCRIPT"}
     command = [sys.executable, "-B", "-c", WATCHED, str(folder), str(report), *arguments]

@@ -132,7 +132,7 @@ def test_tables_contain_every_numeric_setting() -> None:
     with_files = {("LearnedSettings", name) for name in ("input_size", "confidence", "threads")}
     with_files.add(("TraceDelay", "column"))
     missing = {(model.__name__, name) for model, name in needed - given}
-    assert missing == with_files  # weights and a delay trace, which have tests of their own
+    assert missing == with_files  # weights and a delay trace, which have separate tests
 
 
 def test_setting_with_hostile_value_is_accepted_or_refused() -> None:

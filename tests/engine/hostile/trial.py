@@ -1,4 +1,4 @@
-"""A file through check and run in a process of its own, with limits of memory and time."""
+"""Trial of a file: `check` and `run` in a separate process with limits of memory and time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WAIT = 900.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a trial.
+    """Result of a trial.
 
     kind       refused (with `errors` diagnostics), played, internal error, out of memory, hang, crash
     detail     the traceback of an internal error
@@ -62,7 +62,7 @@ def attempt(path: Path, cpu_limit: int = 60, run: Callable[[Path], None] | None 
 
 
 def check_and_run(path: Path) -> None:
-    """What the commands `check` and `run` do with a file."""
+    """Execute the operations of `check` and `run` on a file."""
     roads = definition(path) == "roads" or path.suffix == ".xodr"
     (check_road_file if roads else check_scenario)(path)
     if not roads:
