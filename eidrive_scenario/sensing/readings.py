@@ -13,7 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
 
 FIELDS = frozenset({"truth", "camera", "lidar", "gnss", "imu"})
-"""Kinds of sensors with a field of their own in `Readings`."""
+"""Kinds of sensors with a separate field in `Readings`."""
 
 
 @fast_frozen

@@ -1,9 +1,9 @@
 """Recipe of ns3_80211p_broadcast_pdr.json: PDR over distance of IEEE 802.11p broadcasts in ns-3.
 
-    pip install ns3==3.44.post0     (1.3 GB, in an environment of its own)
+    pip install ns3==3.44.post0     (1.3 GB, in a separate environment)
     python ns3_80211p_broadcast_pdr.py [packets per distance]
 
-One sender and one receiver; nothing else is on the air. ns-3's default preamble detection drops all that arrives below
+One sender and one receiver; no other station transmits. ns-3's default preamble detection drops all that arrives below
 -82 dBm, which would end reception at 150 to 200 m: both its threshold and the sensitivity are lowered.
 """
 

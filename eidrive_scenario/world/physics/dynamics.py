@@ -298,9 +298,9 @@ class SingleTrack:
         return front, rear, free - rolling
 
 
-def fiala(slip: float, stiffness: float, largest: float) -> float:
+def fiala(slip_tangent: float, stiffness: float, largest: float) -> float:
     """Return the side force of an axle [N] at a tangent of its slip angle, limited to `largest`, in slip direction."""
-    used = stiffness * slip / (3.0 * largest)
+    used = stiffness * slip_tangent / (3.0 * largest)
     size = abs(used)
     if size >= 1.0:
         return math.copysign(largest, used)

@@ -85,7 +85,7 @@ BROKEN_MODULES = {
     "faulty_raises": "import math\nVALUE = 1 / 0\n",
     "faulty_import": "import no_such_module\n",
 }
-"""Modules that cannot be imported; each is registered as a detector of its own name."""
+"""Modules that cannot be imported; each is registered as a detector under its module name."""
 
 
 def install(folder: Path) -> Path:
