@@ -308,7 +308,8 @@ def timed(task: Callable[[], object]) -> float:
 
 def sum_of_minima(runs: list[list[float]]) -> float:
     """Return the sum of the minimum times of all ticks [s]."""
-    return sum(map(min, zip(*runs, strict=True)))
+    total: float = sum(map(min, zip(*runs, strict=True)))
+    return total
 
 
 if __name__ == "__main__":

@@ -75,7 +75,11 @@ def main() -> None:
         for weather in ("sunny", "foggy_morning"):
             world.set_weather(load_weather(weather))
             settings = LidarSettings(points_per_second=32 * 180 * 20)
-            value = minimum_time(lambda settings=settings: Lidar(settings, world.spec("Ego")).read(world, view, 0))
+
+            def read_lidar(settings: LidarSettings = settings) -> object:
+                return Lidar(settings, world.spec("Ego")).read(world, view, 0)
+
+            value = minimum_time(read_lidar)
             print(f"{weather:<26}{value:.1f}")
 
 

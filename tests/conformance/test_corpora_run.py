@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,7 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", [name for name in scenarios() if name not in BROKEN])
 @pytest.mark.filterwarnings("default")
-def test_corpora_scenario_runs_to_its_end(name: str, record_property: pytest.RecordProperty) -> None:
+def test_corpora_scenario_runs_to_its_end(name: str, record_property: Callable[[str, object], None]) -> None:
     scenario, watch = load_scenario(Path(CORPORA) / name), PresenceObserver()
     settings = RunSettings(dt=0.05, time_limit=60.0)
     result = Simulation(scenario, settings=settings, observers=[watch]).run()
@@ -79,7 +80,7 @@ def _placed(private: object) -> bool:
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_corpora_invalid_scenario_has_expected_error(name: str, record_property: pytest.RecordProperty) -> None:
+def test_corpora_invalid_scenario_has_expected_error(name: str, record_property: Callable[[str, object], None]) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(Path(CORPORA) / name)
     assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
@@ -102,7 +103,7 @@ def test_corpora_scenarios_are_all_covered() -> None:
         ("LaneOffsetActionExample", "hero", ("4", -1)),
     ],
 )
-def test_carla_scenarios_start_on_lanes_in_driving_direction(name: str, entity: str, lane: tuple) -> None:
+def test_carla_scenarios_start_on_lanes_in_driving_direction(name: str, entity: str, lane: tuple[str, int]) -> None:
     """Their world positions have the left-handed axes of CARLA; with y to the left they are outside of the town."""
     scenario = load_scenario(Path(CORPORA) / "scenario_runner" / f"{name}.xosc")
     with Simulation(scenario, settings=RunSettings(dt=0.05)) as simulation:

@@ -7,6 +7,7 @@ change of a named element within 0.05 s. A table of all deviations stands at the
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -64,7 +65,9 @@ def names() -> list[str]:
 @pytest.mark.timeout(240)
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("name", names())
-def test_scenario_matches_reference_or_known_deviation(name: str, record_property: pytest.RecordProperty) -> None:
+def test_scenario_matches_reference_or_known_deviation(
+    name: str, record_property: Callable[[str, object], None]
+) -> None:
     found = compare(source_of(Path(CORPORA), name), Path(CORPORA) / "reference", name)
     record_property(LINE, line_of(name, found) + (f"  - {NOT_MET[name]}" if name in NOT_MET else ""))
     beyond = {actor: drift for actor, drift in found.actors.items() if not drift.within}

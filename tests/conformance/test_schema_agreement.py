@@ -125,7 +125,7 @@ class Validator:
         root = etree.fromstring(xml)
         schema = self._schemas[self.version_of(root) or otherwise]
         valid = schema.validate(root)
-        complaints = () if valid else tuple(str(entry.message) for entry in schema.error_log)
+        complaints = () if valid else tuple(str(one.message) for one in schema.error_log)  # type: ignore[attr-defined]
         collector = DiagnosticCollector()
         read_root(open_document(xml), collector)
         return Verdict(what, complaints, tuple(diagnostic.message for diagnostic in collector.errors))
@@ -182,7 +182,7 @@ def drop_attribute(node: etree._Element, dice: random.Random, _: Pool) -> None:
 
 def rename_attribute(node: etree._Element, dice: random.Random, pool: Pool) -> None:
     if node.attrib:
-        name = dice.choice(list(node.attrib))
+        name = str(dice.choice(list(node.attrib)))
         value = node.attrib.pop(name)
         node.set(dice.choice([dice.choice(pool.attributes), f"{name}s".split("}")[-1]]), value)
 

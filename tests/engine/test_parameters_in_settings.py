@@ -247,4 +247,6 @@ def test_command_of_a_later_event_takes_parameters(make: Make) -> None:
         ),
     )
     result = delays(path, Latency="0.5")
-    assert 0.1 < result.links[LINK].mean_delay < 0.5
+    mean = result.links[LINK].mean_delay
+    assert mean is not None
+    assert 0.1 < mean < 0.5

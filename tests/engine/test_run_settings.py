@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_seed_of_an_array_is_the_same_seed(tmp_path: Path) -> None:
     settings = RunSettings(time_limit=0.2)
     plain = run_and_save(ONE, seed=3, settings=settings, out=tmp_path)
     (seed,) = np.arange(3, 4)
-    again = run_and_save(ONE, seed=seed, settings=settings, out=tmp_path)
+    again = run_and_save(ONE, seed=cast("int", seed), settings=settings, out=tmp_path)
     assert again.trace_hash == plain.trace_hash
     assert (again.settings, again.command) == (plain.settings, plain.command)
     assert type(again.seed) is int

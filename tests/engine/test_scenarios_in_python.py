@@ -11,7 +11,7 @@ from lxml import etree
 from scenariogeneration import xodr, xosc
 
 from eidrive_scenario.checks.scenario_checks import check_scenario
-from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording import read_recording
@@ -124,7 +124,7 @@ def test_a_mistake_has_the_line_that_the_file_would_have(cut_in: Build, tmp_path
     wrong = cut_in(changing="Taget")
     path = tmp_path / "cut_in.xosc"
     wrong.write_xml(str(path))
-    diagnostics = []
+    diagnostics: list[Diagnostic] = []
     for source in (path, wrong):
         with pytest.raises(ScenarioError) as caught:
             load_scenario(source)

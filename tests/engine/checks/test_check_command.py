@@ -87,9 +87,9 @@ def test_check_road_files_reports_errors_and_map_warnings(eidrive: Eidrive, tmp_
     (tmp_path / "broken.xodr").write_text("<OpenDRIVE>\n<road></OpenDRIVE>", encoding="utf-8")
     result = eidrive("check", tmp_path)
     assert result.exit_code == 2
-    broken, doubtful, wrong, count = result.stdout.splitlines()
+    broken, warned, wrong, count = result.stdout.splitlines()
     assert broken.startswith(f"{tmp_path}/broken.xodr:2: not well-formed XML: ")
-    assert doubtful == (
+    assert warned == (
         f"{tmp_path}/doubtful.xodr:2: road '1' links to junction '4', which does not exist; "
         "remove the link or add the junction with its connections (warning: road-link)"
     )

@@ -106,29 +106,42 @@ def diagnostics_of(folder: Path, *fragments: str, text: str = SCENARIO) -> list[
     return list(run_rules(load_scenario(path)))
 
 
+def descendant(root: etree._Element, path: str) -> etree._Element:
+    """Return the first element at a path below `root`."""
+    element = root.find(path)
+    assert element is not None, path
+    return element
+
+
+def replace(old: etree._Element, new: etree._Element) -> None:
+    parent = old.getparent()
+    assert parent is not None
+    parent.replace(old, new)
+
+
 def put_on_road(folder: Path, element: etree._Element) -> None:
     """Replace a part of the road by an example, or add the example to the road file."""
     root = etree.fromstring(ROAD)
     old = root.find(f".//{element.tag}")
     if old is None:
-        (root if element.tag == "junction" else root.find("road")).append(element)
+        (root if element.tag == "junction" else descendant(root, "road")).append(element)
     else:
-        old.getparent().replace(old, element)
+        replace(old, element)
     (folder / "street.xodr").write_bytes(etree.tostring(root, pretty_print=True))
 
 
 def put(root: etree._Element, element: etree._Element) -> None:
     if element.tag == "StopTrigger":
-        old = root.find("Storyboard/StopTrigger")
+        old = descendant(root, "Storyboard/StopTrigger")
     elif element.tag in REPLACED:
-        old = root.find(f".//Event[@name='First']//{REPLACED[element.tag]}")
+        old = descendant(root, f".//Event[@name='First']//{REPLACED[element.tag]}")
     elif element.tag == "ScenarioObject":
-        root.find("Entities").insert(0, element)
+        descendant(root, "Entities").insert(0, element)
         return
     else:
-        root.find(f".//{INTO[element.tag]}").append(element)
+        descendant(root, f".//{INTO[element.tag]}").append(element)
         return
-    old.getparent().replace(old, element)
+    replace(old, element)
 
 
 def violated_rules(folder: Path, *fragments: str) -> set[str]:
@@ -140,7 +153,9 @@ def documented() -> Iterator[tuple[str, str, str]]:
     text = DOCUMENT.read_text(encoding="utf-8")
     for part in re.split(r"^### ", text, flags=re.MULTILINE)[1:]:
         heading, _, body = part.partition("\n")
-        name, level = re.fullmatch(r"`([a-z-]+)` \((\w+)\)", heading).groups()
+        matched = re.fullmatch(r"`([a-z-]+)` \((\w+)\)", heading)
+        assert matched is not None, heading
+        name, level = matched.groups()
         examples = re.findall(r"^```xml\n(.*?)^```", body, flags=re.MULTILINE | re.DOTALL)
         assert len(examples) == 1, name
         after = body.rpartition("```")[2].partition("\n## ")[0].strip()

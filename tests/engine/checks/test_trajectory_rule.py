@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import pytest
 
 from eidrive_scenario.checks.road_rules.context import RoadLintContext
@@ -32,7 +30,7 @@ def test_trajectory_off_road_checks_a_bounded_number_of_points(
     counts = []
     outside = RoadLintContext.outside
 
-    def count_points(self: RoadLintContext, x: Sequence[float], y: Sequence[float]) -> Sequence[float]:
+    def count_points(self: RoadLintContext, x: list[float], y: list[float]) -> list[float]:
         counts.append(len(x))
         return outside(self, x, y)
 

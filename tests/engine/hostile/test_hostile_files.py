@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import socket
 import zipfile
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_scenario import Write
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -20,7 +20,6 @@ from eidrive_scenario.library import definition
 from eidrive_scenario.perception.learned.weight_files import read_arrays
 from eidrive_scenario.settings import load_yaml_file
 
-Write = Callable[..., Path]
 SECRET = "root:x:0:0:hunter2"
 
 needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs POSIX")
@@ -210,7 +209,7 @@ def test_read_arrays_returns_arrays_of_numpy_files() -> None:
         "b": np.array("text"),
         "c": np.asfortranarray(np.eye(3, dtype=np.float16)),
     }
-    np.savez_compressed(stream, **values)
+    np.savez_compressed(stream, a=values["a"], b=values["b"], c=values["c"])
     found = read_arrays(stream.getvalue())
     assert set(found) == set(values)
     for name, value in values.items():

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hostile_scenario import Write
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 
 BOMB = "{a: &a [x, x, x], b: &b [*a, *a, *a, *a], c: &c [*b, *b, *b, *b], d: [*c, *c, *c, *c]}"
 LONG = "x" * 5000
-
-Write = Callable[..., Path]
 
 
 def refused(path: Path, *words: str, line: bool = True) -> None:

@@ -7,18 +7,16 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hostile_scenario import Write
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
-
-Write = Callable[..., Path]
 
 WATCHED = """
 import json, os, sys

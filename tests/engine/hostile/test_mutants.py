@@ -22,7 +22,7 @@ COUNT = os.environ.get("EIDRIVE_MUTANTS", "24")
 def test_check_and_run_of_mutants_end_without_internal_error_or_hang(tmp_path: Path) -> None:
     """In a process with one thread: each trial is a fork, and locks of other threads would stay locked in it."""
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    program = Path(__file__).with_name("campaign.py")
+    program = Path(__file__).parent / "shared" / "campaign.py"
     done = subprocess.run(
         [sys.executable, str(program), "--count", COUNT, "--out", str(tmp_path)],
         env=dict(os.environ) | single,

@@ -9,13 +9,14 @@ import os
 import random
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, get_args
 from xml.sax.saxutils import escape
 
 import pytest
 import yaml
+from hostile_scenario import Write, scenario_writer
 from pydantic import BaseModel
 from settings_values import CHANNELS, CRITERIA, STATIONS, WEATHER, as_text, variants
 from trial import attempt
@@ -31,8 +32,7 @@ from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.profile import load_profile
 from eidrive_scenario.world.weather import Weather
 
-Write = Callable[..., Path]
-
+SHARED = Path(__file__).parent / "shared"
 COUNT = os.environ.get("EIDRIVE_SETTINGS_TRIALS", "16")
 TABLES = {"station": STATIONS, "channel": CHANNELS, "weather": WEATHER, "criterion": CRITERIA}
 CAMERA = "{truth: {}, camera: {width: 64, height: 48}, lidar: {channels: 16, points_per_second: 20000, rotation: 10}}"
@@ -151,9 +151,10 @@ def test_setting_with_hostile_value_is_accepted_or_refused() -> None:
 def test_runs_with_accepted_hostile_values_end_without_internal_error(tmp_path: Path) -> None:
     """In a process with one thread: each trial is a fork, and locks of other threads would stay locked in it."""
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    path = {"PYTHONPATH": os.pathsep.join([str(SHARED), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run(
         [sys.executable, __file__, COUNT, str(tmp_path)],
-        env=dict(os.environ) | single,
+        env=dict(os.environ) | single | path,
         capture_output=True,
         text=True,
         check=False,
@@ -179,8 +180,6 @@ def scenario_with(write: Write, kind: str, name: str, data: Mapping[str, Any]) -
 
 def main(count: str, folder: Path) -> int:
     """Run so many of the values that are accepted, drawn at random; report what is neither played nor refused."""
-    from conftest import scenario_writer
-
     write = scenario_writer(folder)
     cases = [case for case in all_variants() if accepted(case[0], case[1], case[3])]
     if count != "all":

@@ -93,7 +93,8 @@ def test_integer_parameter_with_zero_fraction_satisfies_constraints(
     <ConstraintGroup><ValueConstraint rule="{rule}" value="{limit}"/></ConstraintGroup>
     </ParameterDeclaration></ParameterDeclarations>"""
     xml = scenario_xml(declarations=declared.format(value))
-    as_default, assigned = (xml, {}), (xml, {"P": value})
+    as_default: tuple[bytes, dict[str, str]] = (xml, {})
+    assigned = (xml, {"P": value})
     for text, values in (as_default, assigned):
         if fits:
             scenario = load_scenario(text, values)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
@@ -101,13 +102,14 @@ def test_lidar_directions_in_one_period_are_one_revolution(boxes: Any) -> None:
     """8000 points/s on 8 rings at 20 Hz: 50 columns a revolution, one revolution in each step of 0.05 s."""
     view = boxes.view({"Ego": (0, 0, 0)})
     lidar = Rig(boxes.spec("Ego"), {"lidar": LIDAR}).due(0.0)["lidar"]
-    first, second = lidar.directions(0.0), lidar.directions(0.05)  # type: ignore[union-attr]
+    assert isinstance(lidar, Lidar)
+    first, second = lidar.directions(0.0), lidar.directions(0.05)
     assert first.shape == second.shape == (400, 3)
     np.testing.assert_allclose(np.linalg.norm(first, axis=1), 1.0)
     np.testing.assert_allclose(first, second, atol=1e-9)
     elevations = np.unique(np.round(np.degrees(np.arcsin(first[:, 2])), 6))
     np.testing.assert_allclose(elevations, np.linspace(-30, 10, 8), atol=1e-6)
-    assert lidar.directions(0.075).shape == (200, 3)  # type: ignore[union-attr]
+    assert lidar.directions(0.075).shape == (200, 3)
     assert view.time == 0.0
 
 

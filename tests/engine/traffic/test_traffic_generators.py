@@ -321,7 +321,8 @@ def test_stopped_generators_spawn_and_remove_no_cars(make_scene: Callable[..., S
     scene.traffic.stop("source")
     came = [name for _ in range(50) for name in next(steps).additions]
     assert not [name for name in came if name.startswith("source")]
-    assert keeper.active
+    active = keeper.active
+    assert active
     scene.traffic.stop(None)
     assert not keeper.active
     there = len(scene.traffic.fleet)

@@ -1,6 +1,6 @@
 """Mutants of all scenarios and roads of the library, and of the corpora where they are present, through check and run.
 
-    python tests/engine/hostile/campaign.py --count 3000 --out /tmp/mutants
+    python tests/engine/hostile/shared/campaign.py --count 3000 --out /tmp/mutants
 
 prints a line for each mutant that ends in an internal error, blocks, or needs too much time or memory, and keeps its
 file. The mutants of a seed are the same on every machine with the same files. Set OPENBLAS_NUM_THREADS and

@@ -28,4 +28,4 @@ def eidrive(monkeypatch: pytest.MonkeyPatch) -> Eidrive:
 @pytest.fixture
 def passing_by() -> Path:
     """Return a scenario in which Ego passes a parked car with 5 m between the centers; OtherY=0 is a collision."""
-    return Path(__file__).parents[1] / "data" / "passing_by.xosc"
+    return Path(__file__).parents[2] / "data" / "passing_by.xosc"

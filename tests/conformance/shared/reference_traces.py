@@ -143,7 +143,9 @@ def play(path: Path, *, limit: float) -> Run:
 
 def _names(simulation: Simulation) -> dict[str, str]:
     """Return trailers defined inside their towing vehicle, by their name in the reference: its name and `+`."""
-    declared = {one.name for one in simulation.scenario.document.entities.scenario_object}
+    entities = simulation.scenario.document.entities
+    assert entities is not None
+    declared = {one.name for one in entities.scenario_object}
     names: dict[str, str] = {}
     for front, back in pairs(simulation.storyboard.context.actors):
         if back.name not in declared:

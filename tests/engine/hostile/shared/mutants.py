@@ -98,10 +98,17 @@ def _element(root: Tree, draw: random.Random) -> Tree | None:
     return draw.choice(found) if found else None
 
 
+def _parent(node: Tree) -> Tree:
+    """The parent of an element; only a root has none, and `_elements` omits it."""
+    parent = node.getparent()
+    assert parent is not None
+    return parent
+
+
 def _delete(root: Tree, draw: random.Random) -> None:
     node = _element(root, draw)
     if node is not None:
-        node.getparent().remove(node)
+        _parent(node).remove(node)
 
 
 def _duplicate(root: Tree, draw: random.Random) -> None:
@@ -116,8 +123,8 @@ def _swap(root: Tree, draw: random.Random) -> None:
     if one is None or other is None or one is other or one in other.iterancestors() or other in one.iterancestors():
         return
     first, second = deepcopy(one), deepcopy(other)
-    one.getparent().replace(one, second)
-    other.getparent().replace(other, first)
+    _parent(one).replace(one, second)
+    _parent(other).replace(other, first)
 
 
 def _move(root: Tree, draw: random.Random) -> None:
@@ -132,10 +139,10 @@ def _nest(root: Tree, draw: random.Random) -> None:
     node = _element(root, draw)
     if node is None or len(list(node.iter())) > 50:
         return
+    attributes = {str(name): str(value) for name, value in node.attrib.items()}
     inner = node
     for _ in range(draw.choice((1, 3, 40))):
-        copy = etree.SubElement(inner, node.tag, dict(node.attrib))
-        inner = copy
+        inner = etree.SubElement(inner, node.tag, attributes)
 
 
 def _rename(root: Tree, draw: random.Random) -> None:
@@ -147,7 +154,7 @@ def _rename(root: Tree, draw: random.Random) -> None:
 def _reverse(root: Tree, draw: random.Random) -> None:
     node = _element(root, draw)
     if node is not None:
-        node[:] = node[::-1]
+        node[:] = list(node)[::-1]
 
 
 def _set(root: Tree, draw: random.Random) -> None:
@@ -160,11 +167,11 @@ def _set(root: Tree, draw: random.Random) -> None:
 
 def _set_number(root: Tree, draw: random.Random) -> None:
     """A number in the place of a number, as a wrong unit, sign or order of magnitude makes it."""
-    numbers = [(node, name) for node in _elements(root) for name, text in node.attrib.items() if _is_number(text)]
+    numbers = [(node, name) for node in _elements(root) for name, text in node.attrib.items() if _is_number(str(text))]
     if numbers:
         node, name = draw.choice(numbers)
         factor = draw.choice((-1.0, 0.0, 1e-6, 1e-3, 0.1, 10.0, 1e3, 1e6))
-        value = float(node.get(name)) * factor
+        value = float(node.attrib[name]) * factor
         if draw.random() < 0.5:
             value = float(
                 draw.choice(("1e9", "-1e9", "1e-9", "1e6", "-1e6", "1e5", "0.001", "100000", "-0.5", "1e-300"))
@@ -177,7 +184,7 @@ def _copy_value(root: Tree, draw: random.Random) -> None:
     nodes = [node for node in _elements(root) if node.attrib]
     if len(nodes) > 1:
         one, other = draw.choice(nodes), draw.choice(nodes)
-        value = one.get(draw.choice(sorted(one.attrib)))
+        value = one.attrib[draw.choice(sorted(one.attrib))]
         other.set(draw.choice(sorted(other.attrib)), value)
 
 
