@@ -9,9 +9,9 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.exposure import develop, meter_exposure
+from eidrive_scenario.sensing.imaging.exposure import develop, meter_exposure
+from eidrive_scenario.sensing.imaging.optics import Optics, lens_of
 from eidrive_scenario.sensing.mounting import mounting
-from eidrive_scenario.sensing.optics import Optics, lens_of
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.scene import Scene

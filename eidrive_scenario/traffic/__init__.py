@@ -6,7 +6,8 @@ from eidrive_scenario.traffic.idm import IntelligentDriver
 from eidrive_scenario.traffic.mobil import LaneChanger
 from eidrive_scenario.traffic.spawning.areas import Cursor, Stretch, polygon, road_range, stretches_cover
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
-from eidrive_scenario.traffic.spawning.generators import Area, Sink, Source, Swarm, TrafficGenerator
+from eidrive_scenario.traffic.spawning.generators import Area, Source, Swarm, TrafficGenerator
+from eidrive_scenario.traffic.spawning.sinks import Sink
 from eidrive_scenario.traffic.spawning.sites import SpawnSites, sites_within_radius
 
 __all__ = [

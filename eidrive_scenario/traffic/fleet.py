@@ -63,8 +63,7 @@ class Fleet:
         self._lines = None if must_stop is None else StopLines(self.lanes, must_stop)
         self._cars = Cars()
         self._index: dict[str, int] = {}
-        self._made = 0
-        self._ticks = self._decisions = 0
+        self._made = self._ticks = self._decisions = 0
         self._until = 0.0
         self._poses: Array | None = None
         self._foreign, self._moving = no_occupants(), set[int]()
@@ -308,8 +307,7 @@ class Fleet:
         to_junction = np.where(junction, begins, np.inf).min(axis=1)
         for index, target in self._changes.decide(cars, indices, leaders, desired, occupants, to_junction):
             self._changes.begin(cars, index, target)
-            cars.plan[index] = -1
-            cars.plan[index, 0] = target
+            cars.plan[index] = (target, *(-1,) * (cars.plan.shape[1] - 1))
             cars.granted[index] = False
             self._plans.extend(cars, index)
 

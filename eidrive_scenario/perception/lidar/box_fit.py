@@ -13,9 +13,8 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
 from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
 from eidrive_scenario.perception.lidar.l_shape import Rectangle, bounds, rectangles
+from eidrive_scenario.perception.lidar.span import RANGE_NOISE, Span, blend_size, complete_span, size_cost
 
-RANGE_NOISE = 0.03
-"""Standard deviation of the points on a surface [m]."""
 THIN = 3.0 * RANGE_NOISE
 """Maximum extent of points that may be those of a surface across the axis [m]."""
 SHAPELESS = 0.4
@@ -50,20 +49,6 @@ class Fit:
     hidden: tuple[bool, bool]
 
 
-class _Span(NamedTuple):
-    """Extent of a box along one axis, as far as the points determine it."""
-
-    low: float
-    high: float
-    gap: float
-    """Maximum extent of the object beyond its points; inf if the side along this axis is not visible [m]."""
-    open_low: bool
-    """Whether the object may extend beyond its points at either end."""
-    open_high: bool
-    hidden: bool
-    """Whether something nearer hides one of the ends."""
-
-
 class _Hypothesis(NamedTuple):
     """Hypothesis about the points: costs by size and by heading, class, length axis, rectangle and extents."""
 
@@ -72,7 +57,7 @@ class _Hypothesis(NamedTuple):
     name: str
     lengthwise: int
     shape: Rectangle
-    spans: tuple[_Span, _Span]
+    spans: tuple[Span, Span]
 
     @property
     def total(self) -> float:
@@ -142,7 +127,7 @@ def fit_box(
     if math.cos(yaw) * x + math.sin(yaw) * y < 0.0:
         yaw -= math.pi
     prior = prior_of(best.name)
-    height = _blend(top, highest - top, prior.mean[2], prior.deviation[2])
+    height = blend_size(top, highest - top, prior.mean[2], prior.deviation[2])
     return Fit(
         (x, y, ground + height / 2.0, sizes[0], sizes[1], height, yaw),
         best.name,
@@ -158,7 +143,7 @@ def _complete_box(hypothesis: _Hypothesis, shapeless: bool) -> tuple[list[float]
     order = (0, 1) if hypothesis.lengthwise == 0 else (1, 0)
     sizes, middles, variances = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
     for place, axis in enumerate(order):
-        sizes[place], middles[axis], variances[axis] = _complete_span(
+        sizes[place], middles[axis], variances[axis] = complete_span(
             hypothesis.spans[axis], prior.mean[place], prior.deviation[place]
         )
     if shapeless:
@@ -205,7 +190,7 @@ def _spans(
     pattern: Pattern,
     hidden: tuple[bool, bool],
     cut: tuple[bool, bool],
-) -> tuple[_Span, _Span]:
+) -> tuple[Span, Span]:
     """Return the extents along both axes; `above` is the height of the sensor above the ground."""
     axes = ((math.cos(shape.yaw), math.sin(shape.yaw)), (-math.sin(shape.yaw), math.cos(shape.yaw)))
     x, y = points[:, :2].mean(axis=0).tolist()
@@ -234,7 +219,7 @@ def _spans(
         if any(ends):
             open_low, open_high = ends
         gap = spacing * (2.0 if open_low and open_high else 1.0)
-        spans.append(_Span(low, high, gap, open_low, open_high, any(ends)))
+        spans.append(Span(low, high, gap, open_low, open_high, any(ends)))
     return spans[0], spans[1]
 
 
@@ -282,44 +267,10 @@ def _highest(points: Array, sensor_height: float, top: float, ground: float, pat
     return max(sensor_height - ground + reach * math.tan(elevation + pattern.elevation), top)
 
 
-def _cost(prior: SizePrior, spans: tuple[_Span, _Span], lengthwise: int, top: float, highest: float) -> float:
+def _cost(prior: SizePrior, spans: tuple[Span, Span], lengthwise: int, top: float, highest: float) -> float:
     """Return squared deviations from a class, in standard deviations, minus twice the log of its share in traffic."""
     cost = -2.0 * math.log(prior.share)
     for place, axis in enumerate((lengthwise, 1 - lengthwise)):
-        cost += _deviation(spans[axis], prior.mean[place], prior.deviation[place])
+        cost += size_cost(spans[axis], prior.mean[place], prior.deviation[place])
     mean, deviation = prior.mean[2], prior.deviation[2]
     return cost + ((mean - min(max(mean, top), highest)) / deviation) ** 2
-
-
-def _deviation(span: _Span, mean: float, deviation: float) -> float:
-    measured = span.high - span.low
-    if measured > mean:
-        return ((measured - mean) / deviation) ** 2
-    least = mean - measured - span.gap
-    if span.hidden or least <= 0.0:
-        return 0.0
-    return (least / deviation) ** 2
-
-
-def _blend(measured: float, gap: float, mean: float, deviation: float) -> float:
-    """Return the fusion of a measured size, which may be up to `gap` too small, with the usual one [m]."""
-    if not math.isfinite(gap):
-        return max(measured, mean)
-    expected, variance = measured + gap / 2.0, gap**2 / 12.0 + RANGE_NOISE**2
-    return max(measured, (expected * deviation**2 + mean * variance) / (variance + deviation**2))
-
-
-def _complete_span(span: _Span, mean: float, deviation: float) -> tuple[float, float, float]:
-    """Return size, middle and variance of the middle along one axis."""
-    measured = span.high - span.low
-    if span.hidden or span.gap > 2.0 * mean:
-        size, spread = max(measured, mean), deviation**2
-    else:
-        size = _blend(measured, span.gap, mean, deviation)
-        variance = span.gap**2 / 12.0
-        spread = variance * deviation**2 / (variance + deviation**2)
-    if span.open_low == span.open_high:
-        unseen = size - measured
-        return size, (span.low + span.high) / 2.0, unseen**2 / 12.0 + RANGE_NOISE**2
-    middle = span.low + size / 2.0 if span.open_high else span.high - size / 2.0
-    return size, middle, spread / 4.0 + RANGE_NOISE**2

@@ -21,6 +21,7 @@ from eidrive_scenario.perception.lidar.box_fit import Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.perception.lifting.ground import AT_BORDER, ByGround, lift_by_ground
+from eidrive_scenario.perception.lifting.target import Target
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
 LEAST_POINTS = 2
@@ -34,8 +35,6 @@ LEAST_DEVIATION, LARGEST_DEVIATION = 0.1, 0.4
 """Minimum and maximum standard deviation of the logarithm of the distance expected from a box."""
 LEAST_OVERLAP = 0.3
 """Minimum overlap of the projected box from points with the image box (intersection over union)."""
-GATE = 3.0
-"""Maximum deviation of the distance of a cluster from the expected one, in standard deviations."""
 DOUBTFUL = 9.0
 """Sum of squared size deviations up to which points fit the class."""
 BODY_DEVIATION = 0.15
@@ -43,8 +42,6 @@ BODY_DEVIATION = 0.15
 arches [m]."""
 UNLIKELY = 60.0
 """Sum of squared size deviations above which points are not the object."""
-UNLIKELY_HEADING = 9.0
-"""Cost of a heading that image and map exclude, as squared standard deviations."""
 MAY_BE: Mapping[str, tuple[str, ...]] = {
     "car": ("car", "van"),
     "truck": ("truck", "van", "bus"),
@@ -117,7 +114,7 @@ def _fit_points(
         place = guess[:2] - camera.pose[:2, 3]
         expected = max(float(np.linalg.norm(place)), 0.5)
         deviation = math.sqrt(float(place @ spread @ place)) / expected**2
-        target = _Target(
+        target = Target(
             box.tolist(),
             MAY_BE.get(name, (name,)),
             expected,
@@ -135,7 +132,7 @@ def _fit_points(
     return found
 
 
-def _total_covariance(fit: Fit, scan: Scan, target: _Target, camera: CameraReading) -> Array:
+def _total_covariance(fit: Fit, scan: Scan, target: Target, camera: CameraReading) -> Array:
     """Return the covariance (2, 2) of a fit including unmodeled errors [m²]: bodies are not boxes, and camera and
     points differ.
 
@@ -165,61 +162,6 @@ def _total_covariance(fit: Fit, scan: Scan, target: _Target, camera: CameraReadi
     return np.asarray(spread + aside**2 * np.outer(across, across))
 
 
-class _Target(NamedTuple):
-    """Object of an image box that is searched in the points.
-
-    box      in the image [px];  classes  possible classes
-    distance expected from the camera [m], and the standard deviation of its logarithm
-    depth    from the visible points of the object to its center, approximately [m]
-    heading  in the level frame, used if there are too few points to determine one [rad]
-    first    first of the tested headings, evenly over half a turn [rad];  costs  of each, the minimum is 0
-    center   expected center (2,) [m];  covariance  of it (2, 2) [m²]; both in the level frame
-    cut      whether the border of the image cuts its left or right side
-    """
-
-    box: list[float]
-    classes: tuple[str, ...]
-    distance: float
-    deviation: float
-    depth: float
-    heading: float
-    first: float
-    costs: list[float]
-    center: Array
-    covariance: Array
-    cut: bool
-
-    def agreement(self, fit: Fit) -> float:
-        """Return the agreement of a box with the expected center, at most 1.
-
-        It is Cauchy's density of the squared distance in units of both covariances, as either may belong to another
-        object.
-        """
-        off = np.array(fit.box[:2]) - self.center
-        return 1.0 / (1.0 + 0.5 * float(off @ np.linalg.solve(self.covariance + fit.covariance, off)))
-
-    def heading_cost(self, heading: float) -> float:
-        """Return the cost of a heading by image and map, interpolated between tested headings.
-
-        The maximum is UNLIKELY_HEADING, because shapes differ and vehicles turn.
-        """
-        count = len(self.costs)
-        place = (heading - self.first) % math.pi / math.pi * count
-        row, part = int(place), place - int(place)
-        cost = (1.0 - part) * self.costs[row % count] + part * self.costs[(row + 1) % count]
-        return min(cost, UNLIKELY_HEADING)
-
-    def likelihood(self, distance: float) -> float:
-        """Return the agreement of a distance [m] with the expected one, at most 1.
-
-        It is 0 outside the gate, except for objects that the border cuts, whose distance is not certain.
-        """
-        off = math.log(max(distance + self.depth, 0.5) / self.distance) / self.deviation
-        if abs(off) <= GATE:
-            return math.exp(-0.5 * off * off)
-        return math.exp(-0.5 * GATE * GATE) if self.cut else 0.0
-
-
 class _Candidate(NamedTuple):
     """Points that may be the object, as rows of the scan; their number in the box, and that times the distance
     likelihood."""
@@ -229,7 +171,7 @@ class _Candidate(NamedTuple):
     weight: float
 
 
-def _foreground(scan: Scan, camera: CameraReading, target: _Target, places: Array, away: Array) -> Fit | None:
+def _foreground(scan: Scan, camera: CameraReading, target: Target, places: Array, away: Array) -> Fit | None:
     """Return the box of the object among the points in and around an image box, or None.
 
     places   (N, 2) image positions of all points of the scan [px]; infinitely far aside for points behind the camera
@@ -260,9 +202,7 @@ def _foreground(scan: Scan, camera: CameraReading, target: _Target, places: Arra
     return None if best is None else best[1]
 
 
-def _candidates(
-    groups: Sequence[Integers], inside: NDArray[np.bool_], away: Array, target: _Target
-) -> list[_Candidate]:
+def _candidates(groups: Sequence[Integers], inside: NDArray[np.bool_], away: Array, target: Target) -> list[_Candidate]:
     """Return the groups of points that may be the object, the likeliest first."""
     found = []
     for group in groups:
@@ -274,7 +214,7 @@ def _candidates(
     return sorted(found, key=lambda candidate: -candidate.weight)
 
 
-def _merge_parts(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_Candidate], target: _Target) -> Fit:
+def _merge_parts(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_Candidate], target: Target) -> Fit:
     """Return the fit merged with other clusters in its box if one box fits all of them.
 
     If the points alone fit no class, other clusters are merged that make a plausible object.

@@ -10,7 +10,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads.geometry.poses import BEYOND, LEAST_STRETCH, lane_height, off_road
-from eidrive_scenario.roads.model.curves import CurveTable
+from eidrive_scenario.roads.model.curve_table import CurveTable
 from eidrive_scenario.roads.model.location import LaneKey, Poses, PositionError
 from eidrive_scenario.roads.model.polynomials import PolynomialTable
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road

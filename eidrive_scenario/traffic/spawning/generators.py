@@ -247,43 +247,6 @@ class Source(TrafficGenerator):
 
 
 @dataclass
-class Sink(TrafficGenerator):
-    """Sink that removes background cars within a radius [m] around a position at a maximum rate [1/s].
-
-    categories  categories of the removed cars, None for all
-    """
-
-    place: tuple[float, float]
-    radius: float
-    rate: float
-    categories: frozenset[str] | None
-    _next: float = field(default=-math.inf, init=False)
-
-    def is_due(self, traffic: GeneratorContext) -> bool:
-        """Return False, as a sink never spawns cars."""
-        return False
-
-    def step(self, traffic: GeneratorContext) -> None:
-        """Remove the nearest cars within the radius as far as the rate permits."""
-        if self.rate <= 0.0:
-            return
-        names = [name for name in traffic.names if self._takes(traffic, name)]
-        if not names:
-            return
-        x, y = traffic.positions(names)
-        distance = np.hypot(x - self.place[0], y - self.place[1])
-        for n in np.argsort(distance, kind="stable").tolist():
-            if distance[n] > self.radius or self._next > traffic.time + TIME_TOLERANCE:
-                return
-            traffic.despawn(names[n])
-            # Unused capacity is not accumulated.
-            self._next = max(self._next, traffic.time - traffic.dt) + 1.0 / self.rate
-
-    def _takes(self, traffic: GeneratorContext, name: str) -> bool:
-        return self.categories is None or traffic.spec(name).category in self.categories
-
-
-@dataclass
 class Area(TrafficGenerator):
     """Number of participants in an area: spawned once, or maintained.
 

@@ -8,7 +8,8 @@ from scipy.integrate import quad
 from scipy.special import fresnel
 
 from eidrive_scenario.roads.model import curves
-from eidrive_scenario.roads.model.curves import Arc, Cubic, CurveTable, ReferenceLine, Spiral
+from eidrive_scenario.roads.model.curve_table import CurveTable
+from eidrive_scenario.roads.model.curves import Arc, Cubic, ReferenceLine, Spiral
 
 
 def test_quarter_arc_ends_one_radius_ahead_and_aside() -> None:

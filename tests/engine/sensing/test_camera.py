@@ -13,8 +13,16 @@ from pydantic import ValidationError
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.camera import Camera, ImageSensor
-from eidrive_scenario.sensing.exposure import BASE_SPEED, LENS, SATURATION, Exposure, develop, meter_exposure, noise_of
-from eidrive_scenario.sensing.optics import Optics, lens_of
+from eidrive_scenario.sensing.imaging.exposure import (
+    BASE_SPEED,
+    LENS,
+    SATURATION,
+    Exposure,
+    develop,
+    meter_exposure,
+    noise_of,
+)
+from eidrive_scenario.sensing.imaging.optics import Optics, lens_of
 from eidrive_scenario.sensing.precipitation import drops_before
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings
 from eidrive_scenario.world import World

@@ -1,0 +1,86 @@
+"""Joint evaluation of the reference lines of many roads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import fresnel
+
+from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.roads.model.curves import Cubic, Curve, ReferenceLine, Spiral
+from eidrive_scenario.roads.model.polynomials import spread
+
+
+class CurveTable:
+    """Reference lines of many roads for joint evaluation: line i covers [base[i], base[i] + length + 1)."""
+
+    def __init__(self, lines: Sequence[ReferenceLine]) -> None:
+        self.base: Array = spread([line.length for line in lines])
+        # A curve that starts beyond the end of its road is unreachable, and would shadow a curve of the next road.
+        reached = [[curve for curve in line.curves if curve.s <= line.length] or line.curves[:1] for line in lines]
+        curves = [curve for group in reached for curve in group]
+        owner = np.repeat(np.arange(len(lines)), [len(group) for group in reached])
+        self._starts = np.array([curve.s for curve in curves])
+        first = np.diff(owner, prepend=-1) > 0
+        self._keys = self.base[owner] + np.where(first, 0.0, np.maximum(self._starts, 0.0))
+        self._x, self._y, self._h = (np.array([getattr(curve, name) for curve in curves]) for name in ("x", "y", "h"))
+        self._kind = np.array([_kind(curve) for curve in curves], dtype=np.int8)
+        self._curvature = np.array([getattr(curve, "curvature", 0.0) for curve in curves])
+        self._rate = np.array([getattr(curve, "rate", 0.0) for curve in curves])
+        self._cubic = np.array(
+            [(*curve.u, *curve.v, curve.pace) if isinstance(curve, Cubic) else (0.0,) * 9 for curve in curves]
+        ).reshape(-1, 9)
+
+    def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Return x, y, heading, curvature and path length per meter of s at s (N,) of lines (N,)."""
+        curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
+        ds = s - self._starts[curve]
+        kind = self._kind[curve]
+        curvature = self._curvature[curve]
+        half = 0.5 * curvature * ds
+        chord = ds * np.sinc(half / np.pi)
+        u, v = chord * np.cos(half), chord * np.sin(half)
+        turn, speed = 2.0 * half, np.ones_like(ds)
+        for number, evaluate in ((1, self._spirals), (2, self._cubics)):
+            mask = kind == number
+            if mask.any():
+                u[mask], v[mask], turn[mask], curvature[mask], speed[mask] = evaluate(curve[mask], ds[mask])
+        h = self._h[curve]
+        cos, sin = np.cos(h), np.sin(h)
+        return self._x[curve] + cos * u - sin * v, self._y[curve] + sin * u + cos * v, h + turn, curvature, speed
+
+    def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
+        """Return the curvature and path length per meter of s at s (N,) of lines (N,), as `at` does."""
+        curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
+        ds = s - self._starts[curve]
+        curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)
+        mask = self._kind[curve] == 2
+        if mask.any():
+            _, _, _, curvature[mask], speed[mask] = self._cubics(curve[mask], ds[mask])
+        return curvature, speed
+
+    def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
+        k, rate = self._curvature[curve], self._rate[curve]
+        scale = np.sqrt(np.abs(rate) / np.pi)
+        shift = k / rate
+        sine, cosine = fresnel(np.stack([shift, ds + shift]) * scale)
+        along, across = (cosine[1] - cosine[0]) / scale, np.sign(rate) * (sine[1] - sine[0]) / scale
+        phase = -0.5 * k * shift
+        cos, sin = np.cos(phase), np.sin(phase)
+        turn = ds * (k + 0.5 * rate * ds)
+        return cos * along - sin * across, sin * along + cos * across, turn, k + rate * ds, np.ones_like(ds)
+
+    def _cubics(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
+        u0, u1, u2, u3, v0, v1, v2, v3, pace = self._cubic[curve].T
+        p = ds * pace
+        du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
+        ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
+        norm = np.hypot(du, dv)
+        bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > 0.0)
+        u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
+        return u, v, np.arctan2(dv, du), bend, norm * pace
+
+
+def _kind(curve: Curve) -> int:
+    return 2 if isinstance(curve, Cubic) else 1 if isinstance(curve, Spiral) else 0

@@ -1,0 +1,1 @@
+"""Imaging of a camera: lens, exposure, noise."""
