@@ -5,9 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
-
-Eidrive = Callable[..., Result]
+from command_fixtures import Eidrive
 
 
 @pytest.fixture

@@ -6,9 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
-
-Eidrive = Callable[..., Result]
+from command_fixtures import Eidrive
 
 DISTRIBUTION = """<OpenSCENARIO>
 <FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="a test" author="test"/>

@@ -4,15 +4,13 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
+from command_fixtures import Eidrive
 
 from eidrive_scenario.recording.text.csv_writer import COLUMNS
 
-Eidrive = Callable[..., Result]
 PAGE = Path(__file__).parents[3] / "docs" / "explanations.md"
 
 

@@ -1,14 +1,10 @@
 """Internal errors: exit code 3, and a traceback on request only."""
 
-from collections.abc import Callable
-
 import pytest
-from typer.testing import Result
+from command_fixtures import Eidrive
 
 from eidrive_scenario import library
 from eidrive_scenario.errors import SimulationError
-
-Eidrive = Callable[..., Result]
 
 
 def break_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:

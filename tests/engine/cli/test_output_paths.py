@@ -1,15 +1,12 @@
 """Output paths: never an input file, and never one file for two outputs."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
+from command_fixtures import Eidrive
 
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.errors import SettingError
-
-Eidrive = Callable[..., Result]
 
 
 @pytest.fixture

@@ -5,17 +5,14 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
+from command_fixtures import Eidrive
 
 from eidrive_scenario.cli.verdicts import show
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunResult
-
-Eidrive = Callable[..., Result]
 
 
 def test_run_of_passing_scenario_prints_verdicts(eidrive: Eidrive, passing_by: Path) -> None:

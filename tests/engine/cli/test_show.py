@@ -3,13 +3,10 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
-
-Eidrive = Callable[..., Result]
+from command_fixtures import Eidrive
 
 
 def test_help_lists_commands_without_importing_engine() -> None:

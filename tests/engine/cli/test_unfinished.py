@@ -3,18 +3,15 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.testing import Result
+from command_fixtures import Eidrive
 
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import Simulation
-
-Eidrive = Callable[..., Result]
 
 
 def break_at(monkeypatch: pytest.MonkeyPatch, instant: float, error: BaseException) -> None:

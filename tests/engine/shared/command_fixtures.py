@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 import pytest
 from typer.testing import CliRunner, Result
 
 from eidrive_scenario.cli import app
 
-Eidrive = Callable[..., Result]
+
+class Eidrive(Protocol):
+    """A function that executes a command line and returns its result."""
+
+    def __call__(self, *arguments: str | Path | float) -> Result: ...
 
 
 @pytest.fixture
@@ -19,7 +23,7 @@ def eidrive(monkeypatch: pytest.MonkeyPatch) -> Eidrive:
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.delenv("EIDRIVE_TRACEBACK", raising=False)
 
-    def invoke(*arguments: str | Path) -> Result:
+    def invoke(*arguments: str | Path | float) -> Result:
         return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
     return invoke

@@ -1,8 +1,24 @@
-"""The car of the tests, of a Lincoln MKZ's size."""
+"""The car of the tests, of a Lincoln MKZ's size, and types of the fixture `car` of the world tests."""
 
 from __future__ import annotations
 
+from typing import Protocol, TypedDict
+
 from eidrive_scenario.world.actor import ActorSpec
+
+
+class CarFactory(Protocol):
+    """A function that makes a car with a name, a shape and properties."""
+
+    def __call__(self, name: str = "Ego", *, shape: str = "car", **properties: object) -> ActorSpec: ...
+
+
+class Resistances(TypedDict):
+    """Properties of a car that determine its driving resistances."""
+
+    drag_area: float
+    rolling_resistance: float
+
 
 CAR = ActorSpec(
     "Ego",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec
-
-CarFactory = Callable[..., ActorSpec]
 
 
 @pytest.fixture

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.render.illumination.daylight import LUMA, daylight
 from eidrive_scenario.world.render.illumination.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
 from eidrive_scenario.world.render.illumination.sky import SIZE, dome, horizon
 from eidrive_scenario.world.render.rasterization import rasterize
 from eidrive_scenario.world.weather import Weather, load_weather
-
-CarFactory = Callable[..., ActorSpec]
 
 PINHOLE = Pinhole.of_fov(160, 120, math.radians(80))
 

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.library import names
 from eidrive_scenario.reporting.drawing.street_view import look_at
 from eidrive_scenario.reporting.weather_sheet import street
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.render.renderer import Renderer
 from eidrive_scenario.world.weather import load_weather
-
-CarFactory = Callable[..., ActorSpec]
 
 PINHOLE = Pinhole.of_fov(240, 160, math.radians(90))
 MAST = look_at((42.5, -7.5, 6.0), (21.0, 2.0, 0.0))

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from sample_car import CarFactory, Resistances
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.physics.dynamics import GRAVITY, VehicleParameters
 
-CarFactory = Callable[..., ActorSpec]
-
-LOSSLESS = {"drag_area": 0, "rolling_resistance": 0}
+LOSSLESS: Resistances = {"drag_area": 0, "rolling_resistance": 0}
 
 
 def drive(

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
-
-CarFactory = Callable[..., ActorSpec]
 
 WIDTH, HEIGHT, FOV = 320, 240, math.radians(80)
 FOCAL = WIDTH / 2 / math.tan(FOV / 2)

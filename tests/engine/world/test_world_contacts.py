@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.actor import Control, Placement
 from eidrive_scenario.world.view import Contact
-
-CarFactory = Callable[..., ActorSpec]
 
 
 def approach(world: World, ticks: int, speed: float, start: float) -> list[tuple[int, Contact]]:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.actor import Control, Placement
 from eidrive_scenario.world.physics.engine import substeps_per_tick
-
-CarFactory = Callable[..., ActorSpec]
 
 
 def test_scripted_actors_have_exactly_their_placements(world: World, car: CarFactory) -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Placement
-
-CarFactory = Callable[..., ActorSpec]
+from eidrive_scenario.world.actor import Placement
 
 
 def test_ray_hits_the_first_box(world: World, car: CarFactory) -> None:

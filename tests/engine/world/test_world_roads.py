@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from sample_car import CarFactory, Resistances
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.actor import Control, Placement
 from eidrive_scenario.world.physics.dynamics import GRAVITY
-
-CarFactory = Callable[..., ActorSpec]
 
 ROAD = """<OpenDRIVE>
   <header revMajor="1" revMinor="6" name="" version="1.0"/>
@@ -59,7 +57,7 @@ def test_driven_car_follows_the_slope(car: CarFactory, heading: float) -> None:
 
 
 def test_gravity_accelerates_on_slope_and_brake_holds(car: CarFactory) -> None:
-    free = {"drag_area": 0, "rolling_resistance": 0}
+    free: Resistances = {"drag_area": 0, "rolling_resistance": 0}
     with World(road(slope(0.08))) as world:
         world.add(car("Rolls", **free), Placement(200.0, -2.0), driven=True)
         world.add(car("Held", **free), Placement(200.0, -6.0), driven=True)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.roads import RoadNetwork, Signal, SignalPlace
 from eidrive_scenario.world import World
@@ -29,7 +29,6 @@ from eidrive_scenario.world.meshes.sign_faces import (
 from eidrive_scenario.world.meshes.signs import sign
 from eidrive_scenario.world.weather import Weather
 
-CarFactory = Callable[..., ActorSpec]
 STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
   <road name="" length="200" id="1" junction="-1"><link/>
     <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>

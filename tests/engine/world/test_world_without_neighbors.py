@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from sample_car import CarFactory
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
@@ -14,8 +15,6 @@ from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
 from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics
-
-CarFactory = Callable[..., ActorSpec]
 
 HILL = """<OpenDRIVE>
   <header revMajor="1" revMinor="6" name="" version="1.0"/>
