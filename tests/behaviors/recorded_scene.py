@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.states import StateChange
@@ -31,4 +31,22 @@ class RecordedScene:
         return next(c.why for c in self.changes if c.element == element and c.transition is not None)
 
 
-RunScene = Callable[..., RecordedScene]
+class RunScene(Protocol):
+    """A function that runs actions; see the fixture `scene`."""
+
+    def __call__(
+        self,
+        seconds: float,
+        *steps: tuple[str, ...],
+        ego: tuple[int, float, float] = (-1, 100.0, 20.0),
+        other: tuple[int, float, float] = (-1, 150.0, 10.0),
+        dt: float = 0.1,
+        driven: bool = False,
+        cruise: str | None = None,
+        controller_model: str = "adaptive_cruise",
+        everywhere: str = "",
+        edge: str = "none",
+        performance: str = "",
+        brakes: float = 10.0,
+        executions: int = 1,
+    ) -> RecordedScene: ...

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 import pytest
 from street_scene import CAR, GROUP, NOTHING, OURS, STREET, TRIGGER, at
@@ -56,7 +57,28 @@ class RecordedRun:
         ]
 
 
-Run = Callable[..., RecordedRun]
+class Run(Protocol):
+    """A function that runs actions in the complete simulation; see the fixture `run`."""
+
+    def __call__(
+        self,
+        end: float,
+        *steps: tuple[str, ...],
+        ego: tuple[int, float, float] = (-1, 100.0, 20.0),
+        driven: bool = True,
+        others: dict[str, tuple[int, float, float]] | None = None,
+        more: str = "",
+        globally: str = "",
+        signals: str = "",
+        street: str = STREET,
+        during: Callable[[Simulation, Frame], None] | None = None,
+        settings: RunSettings | None = None,
+        seed: int = 0,
+        start: str = "",
+        init: str = "",
+        edge: str = "none",
+        delay: float = 0.0,
+    ) -> RecordedRun: ...
 
 
 @pytest.fixture
