@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from eidrive_scenario.driving.step import AgentStep
-from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.image_detections import ImageDetections
@@ -195,3 +195,13 @@ class EmptyStack(DrivingStack):
 
 StackFactory = Callable[[StackContext], DrivingStack]
 """Builds the stack of a run. Raises InputError if the scenario or a setting is invalid."""
+
+
+def build_stack(factory: StackFactory, context: StackContext) -> DrivingStack:
+    """Return the stack of a factory. Raise SettingError if the factory is not one or returns something else."""
+    if not callable(factory):
+        raise SettingError(Diagnostic(f"stack: a factory is expected (got {quoted(factory)})"))
+    stack: object = factory(context)
+    if not isinstance(stack, DrivingStack):
+        raise SettingError(Diagnostic(f"stack: the factory returned no DrivingStack (got {quoted(stack)})"))
+    return stack

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory
+from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory, build_stack
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.evaluation.criteria_parser import stop_trigger_criteria, unsupported_criteria
@@ -66,7 +66,7 @@ def set_up_run(
     with collector:
         storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=seed, controllers=settings.controllers)
     with collector:
-        driving = stack(_stack_context(scenario, roads, seed, settings, load_weights))
+        driving = build_stack(stack, _stack_context(scenario, roads, seed, settings, load_weights))
     with collector:
         criteria = tuple(stop_trigger_criteria(scenario))
     with collector:

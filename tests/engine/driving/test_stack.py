@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.stack import DrivingStack, EmptyStack, StackContext, StackInputs, StackSettings
 from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.requests import Overrides
@@ -147,3 +151,12 @@ def test_scenario_without_stations_runs_without_a_stack(tmp_path: Path) -> None:
 def test_channel_command_without_a_channel_is_a_warning(tmp_path: Path) -> None:
     result = run_file(ONE, settings=RunSettings(time_limit=0.3), stack=EmptyStack)
     assert any("the driving stack has no channel" in warning for warning in result.warnings)
+
+
+@pytest.mark.parametrize(
+    ("stack", "expected"),
+    [(None, "a factory is expected (got None)"), (lambda context: 5, "returned no DrivingStack (got 5)")],
+)
+def test_invalid_stack_is_a_setting_error(stack: Any, expected: str) -> None:
+    with pytest.raises(InputError, match=re.escape(expected)):
+        run_file(ONE, stack=stack)
