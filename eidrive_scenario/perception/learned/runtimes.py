@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import io
 import logging
+import os
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -31,6 +32,10 @@ Compute = Callable[[Floats], list[Floats]]
 
 ONNX_SUFFIX = ".onnx"
 _ONNXRUNTIME = "onnxruntime"
+_NO_TELEMETRY = ("ORT_DISABLE_TELEMETRY", "1")
+"""Environment variable of ONNX Runtime. Without it, `import onnxruntime` writes an identifier of the device and a
+database below the home directory, and sends events to its manufacturer (its Privacy.md, version 1.29 and later).
+"""
 _LAYER = re.compile(r"Node \[([\w.]{1,60})@")
 _LOG = logging.getLogger(__name__)
 _FATAL_ONLY = 4
@@ -58,7 +63,8 @@ def load_network(path: Path, threads: int) -> Compute:
 
 
 def onnxruntime_network(path: Path, threads: int) -> Compute:
-    """Return the function of an ONNX model, executed by ONNX Runtime with its deterministic kernels."""
+    """Return the function of an ONNX model, executed by ONNX Runtime with deterministic kernels, without telemetry."""
+    os.environ.setdefault(*_NO_TELEMETRY)
     import onnxruntime
 
     options = onnxruntime.SessionOptions()

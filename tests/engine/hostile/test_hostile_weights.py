@@ -18,6 +18,7 @@ from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 
+RED_BOXES = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
 WATCHED = """
 import json, os, sys
 allowed, report = sys.argv[1], sys.argv[2]
@@ -183,6 +184,22 @@ def test_run_without_weights_writes_only_to_its_output_folder(write: Write, tmp_
     assert found["code"] == 3  # out of time
     assert outside(found, out) == []
     assert [event for event in found["events"] if event[0] == "writes"]  # type: ignore[attr-defined]
+
+
+def test_run_with_onnx_weights_writes_nothing_into_the_home_directory(write: Write, tmp_path: Path) -> None:
+    """ONNX Runtime writes from native code, which an audit hook cannot see, and stops doing so under CI services."""
+    pytest.importorskip("onnxruntime", reason="needs the extra 'onnx'")
+    home, out = tmp_path / "home", tmp_path / "out"
+    home.mkdir()
+    command = ["run", str(with_weights(write, RED_BOXES)), "--out", str(out), "--time-limit", "0.2"]
+    environment = {"PATH": os.defpath, "HOME": str(home)}
+    program = "from eidrive_scenario.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", program, *command], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 3, done.stderr  # out of time
+    assert list(out.rglob("result.json"))
+    assert list(home.rglob("*")) == []
 
 
 def test_check_of_shipped_and_onnx_weights_loads_none(write: Write, tmp_path: Path) -> None:
