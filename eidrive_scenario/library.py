@@ -58,6 +58,8 @@ def resolve_scenario(name: str | Path) -> Path:
         return inside
     if str(name) and is_folder(path):
         raise SettingError(Diagnostic(f"{quoted(str(name))} is a folder", "give one .xosc file"))
+    if str(name) and os.path.exists(path):
+        return path  # a pipe or a device: the reader refuses it and states what it is
     hint = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
     raise SettingError(Diagnostic(f"no scenario {quoted(str(name))}: neither a file nor in the library", hint))
 

@@ -11,16 +11,17 @@ from eidrive_scenario.cli.error_output import INVALID_INPUT
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution
 
-RunOne = Callable[[ConcreteRun], int]
-"""Function that executes a run and returns its exit code."""
+RunSeeds = Callable[[ConcreteRun], Sequence[int]]
+"""Function that executes a run with each seed and returns the exit codes."""
 
 
 def run_distribution(
-    path: Path, run_one: RunOne, *, seed: int, max_runs: int | None, parameters: Mapping[str, object]
+    path: Path, run_seeds: RunSeeds, *, seed: int, repeat: int, max_runs: int | None, parameters: Mapping[str, object]
 ) -> int:
     """Execute the runs of a distribution, report skipped runs on stderr, and return the highest exit code.
 
     seed        seed of a stochastic distribution without randomSeed
+    repeat      number of seeds per run; each counts as a run in the summary
     max_runs    number of runs, spread over all values; None: all runs
     parameters  values for all runs; parameters that the distribution varies are excluded
 
@@ -38,24 +39,26 @@ def run_distribution(
     last: ConstraintError | None = None
     for run in _runs(expansion, numbers):
         try:
-            result = run_one(run)
+            codes = run_seeds(run)
         except ConstraintError as error:
             last = error
-            counts["excluded by constraints"] += 1
+            counts["excluded by constraints"] += repeat
             typer.secho(f"run {run.number} ({run}) is skipped: {error}", fg="yellow", err=True)
             continue
         except InputError as error:
             if not counts["passed"] + counts["not passed"]:
                 raise
             typer.echo(f"run {run.number} ({run}): {error}", err=True)
-            result = INVALID_INPUT
-        counts["not passed" if result else "passed"] += 1
-        code = max(code, result)
-    if last is not None and counts["excluded by constraints"] == len(numbers):
+            codes = [INVALID_INPUT] * repeat
+        passed = codes.count(0)
+        counts["passed"] += passed
+        counts["not passed"] += len(codes) - passed
+        code = max(code, *codes)
+    if last is not None and counts["excluded by constraints"] == repeat * len(numbers):
         raise ScenarioError(last.diagnostics)
-    counts["not selected"] = len(expansion) - len(numbers)
+    counts["not selected"] = repeat * (len(expansion) - len(numbers))
     summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
-    typer.echo(f"{len(expansion)} runs in {path}: {summary}", err=True)
+    typer.echo(f"{repeat * len(expansion)} runs in {path}: {summary}", err=True)
     return code
 
 

@@ -61,12 +61,12 @@ def run(
         int | None,
         typer.Option(min=1, help="Maximum runs of a distribution, spread over its values.", show_default="all"),
     ] = None,
-    dt: Annotated[float, typer.Option(help="Time step [s].")] = 0.05,
+    dt: Annotated[float, typer.Option(help="Time step in seconds.")] = 0.05,
     wall_limit: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Maximum wall time of each run with loading.", show_default="none"),
     ] = None,
-    time_limit: Annotated[float, typer.Option(help="Maximum simulated time [s].")] = 120.0,
+    time_limit: Annotated[float, typer.Option(help="Maximum simulated time in seconds.")] = 120.0,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder for one subfolder per run: recording, camera images, result.json."),
@@ -120,8 +120,8 @@ def run(
         allow_torchscript=allow_torchscript,
     )
 
-    def run_seeds(source: Path | ConcreteRun) -> int:
-        code = 0
+    def run_seeds(source: Path | ConcreteRun) -> list[int]:
+        codes: list[int] = []
         parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
         for each in range(seed, seed + repeat):
             suffixes = [*parts, f"seed-{each}"] if repeat > 1 else parts
@@ -143,7 +143,7 @@ def run(
                 raise
             except EidriveError as error:
                 failures.report(error)
-                code = max(code, ABORTED)
+                codes.append(ABORTED)
                 continue
             if json:
                 typer.echo(as_json_text(result, ascii_only=not has_all_characters()))
@@ -156,18 +156,20 @@ def run(
                 typer.echo(f"files: {result.folder}", err=json)
             for explanation in explanations:
                 typer.echo("\n".join(explanation.lines()), err=json)
-            code = max(code, result.exit_code)
-        return code
+            codes.append(result.exit_code)
+        return codes
 
     path = resolve_scenario(scenario)
     check_output_paths({"--csv": csv, "--log": None if log == PRINTED else log}, (path, channel, weather))
     if definition(path) == "distribution":
-        raise typer.Exit(run_distribution(path, run_seeds, seed=seed, max_runs=max_runs, parameters=parameters))
+        raise typer.Exit(
+            run_distribution(path, run_seeds, seed=seed, repeat=repeat, max_runs=max_runs, parameters=parameters)
+        )
     if max_runs is not None:
         raise SettingError(
             Diagnostic(f"--max-runs has no effect for a scenario (got {max_runs})", "remove the option", str(path))
         )
-    raise typer.Exit(run_seeds(path))
+    raise typer.Exit(max(run_seeds(path)))
 
 
 def _with_suffixes(path: Path, suffixes: list[str]) -> Path:

@@ -63,7 +63,7 @@ def parse_geo_reference(text: str) -> GeoReference:
     A text of latitude and longitude without a projection is CARLA's: a Mercator projection of a sphere, true to scale
     at that latitude.
     """
-    number = re.search(r"(?i)epsg:*([0-9]{4,5})\s*$", text.strip())
+    number = re.search(r"(?i)epsg:*([0-9]{1,9})\s*$", text.strip())
     if number:
         return GeoReference(_epsg_transformer(int(number[1])))
     given = _parameters(text)

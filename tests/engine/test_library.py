@@ -1,11 +1,13 @@
 """Names of the library and files."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from eidrive_scenario import library
-from eidrive_scenario.errors import SettingError
+from eidrive_scenario.errors import ScenarioError, SettingError
+from eidrive_scenario.openscenario import load_scenario
 
 OPENING = '<OpenSCENARIO><FileHeader revMajor="1" revMinor="3"/>'
 
@@ -48,6 +50,14 @@ def test_the_nearest_name_is_offered(own_library: Path) -> None:
         library.resolve("channels", "latency_300")
     with pytest.raises(SettingError, match="is a folder"):
         library.resolve_scenario(own_library)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
+def test_pipe_as_scenario_is_refused_as_pipe(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.xosc"
+    os.mkfifo(pipe)
+    with pytest.raises(ScenarioError, match=r"pipe\.xosc: cannot read: the path leads to a pipe"):
+        load_scenario(library.resolve_scenario(pipe))
 
 
 def test_profiles(own_library: Path) -> None:

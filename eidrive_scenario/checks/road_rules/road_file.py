@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from eidrive_scenario.checks.rule import Level, Rule
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import PositionError, RoadNetwork
 from eidrive_scenario.roads.model.map_warnings import MAP_RULES
 
 
@@ -37,7 +37,18 @@ def map_warning_rule(name: str) -> Callable[[HasRoads], Iterator[Diagnostic]]:
     return check
 
 
-ROAD_FILE_RULES: tuple[Rule[HasRoads], ...] = tuple(
-    Rule(rule.name, Level.WARNING, rule.summary, map_warning_rule(rule.name)) for rule in MAP_RULES
+def _invalid_geo_reference(context: HasRoads) -> Iterator[Diagnostic]:
+    if context.roads is None or not context.roads.header.geo_reference:
+        return
+    try:
+        _ = context.roads.geo_reference
+    except PositionError as error:
+        for diagnostic in error.diagnostics:
+            yield replace(diagnostic, message=f"{diagnostic.message}; no GeoPosition can be resolved")
+
+
+ROAD_FILE_RULES: tuple[Rule[HasRoads], ...] = (
+    *(Rule(rule.name, Level.WARNING, rule.summary, map_warning_rule(rule.name)) for rule in MAP_RULES),
+    Rule("geo-reference", Level.WARNING, "a geoReference that cannot be used", _invalid_geo_reference),
 )
 """Rules that need only the road file."""

@@ -80,7 +80,7 @@ REPLACED = {
     "StartTrigger": "StartTrigger",
 }
 """Part of the first event that the element of an example replaces."""
-ROAD_ELEMENTS = {"link", "planView", "lateralProfile", "lanes", "signals", "junction"}
+ROAD_ELEMENTS = {"header", "link", "planView", "lateralProfile", "lanes", "signals", "junction"}
 """Elements of the road file."""
 
 

@@ -76,6 +76,8 @@ def test_run_of_distribution_reports_varied_parameters_and_counts(eidrive: Eidri
     assert result.exit_code == 0
     assert "passing_by  run 0 (OtherY=5,End=2)  seed 1" in result.stdout
     assert f"6 runs in {six}: 1 passed, 5 not selected" in result.stderr
+    result = eidrive("run", six, "--max-runs", "1", "--repeat", "2")
+    assert f"12 runs in {six}: 2 passed, 10 not selected" in result.stderr
 
 
 def test_max_runs_selects_runs_over_all_values(eidrive: Eidrive, vary: Callable[..., Path]) -> None:

@@ -103,6 +103,7 @@ def test_null_grid_of_a_web_map_equals_webmerc() -> None:
         ("+lat_0=90 +lon_0=8", "lat_0 is out of range"),
         ('PROJCS["WGS 84"]', "not a PROJ string"),
         ("EPSG:9999", "EPSG:9999 is not in the EPSG register"),
+        ("EPSG:999999", "EPSG:999999 is not in the EPSG register"),
         ("EPSG:4326", "is not a plane with axes to the east and north"),  # degrees
         ("EPSG:5513", "is not a plane with axes to the east and north"),  # south and west
         ("EPSG:2225", "is not a plane with axes to the east and north"),  # US survey feet
