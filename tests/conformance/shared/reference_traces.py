@@ -1,6 +1,6 @@
 """Runs of third-party scenarios, and their deviations from recorded reference traces.
 
-As a program it prints a table: `python tests/conformance/reference_traces.py [NAME…]`, with EIDRIVE_CORPORA set.
+As a program it prints a table: `python tests/conformance/shared/reference_traces.py [NAME…]`, with EIDRIVE_CORPORA set.
 """
 
 from __future__ import annotations
@@ -35,8 +35,7 @@ ROUNDING = 1e-6
 ENDINGS = {"endTransition", "stopTransition"}
 """Transitions to completeState. The reference deviates from the standard in three cases: it ends overridden elements
 and parents of a stopped action, where the standard stops them; it stops immediately completed actions, where the
-standard
-ends them. State and time are still compared."""
+standard ends them. State and time are still compared."""
 
 LINE = "line of the reference table"
 """Name of the property with the table line of a test."""
