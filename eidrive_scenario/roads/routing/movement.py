@@ -14,6 +14,8 @@ from eidrive_scenario.roads.routing.links import LaneLinks
 
 STRIDE = 2.0
 """Maximum step of the integration along a curved lane [m]."""
+EQUAL_TURN = 1e-6
+"""Maximum difference of the sizes of two turns that count as equal [rad]."""
 LOOK_AHEAD = 30.0
 """Distance ahead at which the direction of a branch is evaluated outside of connecting roads [m]."""
 
@@ -72,8 +74,8 @@ class Movement:
         """Return the location `distance` [m] further in the driving direction (backwards if negative), or None.
 
         The distance is measured on the path at the offset of the location. Where the lane forks, the branch is selected
-        by the route, else by `choose`, else it is the straightest one. If the lane ends, the result is None, or the end
-        of the lane with `to_end`.
+        by the route, else by `choose`, else it is that of the default route. If the lane ends, the result is None, or
+        the end of the lane with `to_end`.
         """
         road = self._roads[location.road]
         section, lane = lane_at(road, location.lane, location.s)
@@ -136,7 +138,7 @@ class Movement:
         if chosen is None and choose is not None:
             chosen = choose(found)
         if chosen is None:
-            chosen = min(found, key=lambda branch: abs(branch.turn))
+            chosen = _default_branch(found, road)
         return chosen.lane, chosen.direction, 0.0
 
     def branches(self, key: LaneKey, direction: int, with_traffic: bool = True) -> list[Branch]:
@@ -178,6 +180,19 @@ class Movement:
             return None
         number = min(choices)[1]
         return LaneKey(road.id, index, number), center - lane_t(road, other, other.lanes[number], s)[0]
+
+
+def _default_branch(branches: Sequence[Branch], road: Road) -> Branch:
+    """Return the branch of the default route at the end of a road (ASAM OpenSCENARIO XML 1.3.1, 6.8.1).
+
+    It has the smallest turn. Of a left and a right turn of equal size, it is the right one with right-hand traffic, and
+    the left one with left-hand traffic.
+    """
+    chosen = min(branches, key=lambda branch: abs(branch.turn))
+    is_far_side = chosen.turn > EQUAL_TURN if road.rule == "RHT" else chosen.turn < -EQUAL_TURN
+    if not is_far_side:
+        return chosen
+    return next((branch for branch in branches if abs(branch.turn + chosen.turn) < EQUAL_TURN), chosen)
 
 
 def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, direction: int) -> tuple[LaneSection, Lane]:

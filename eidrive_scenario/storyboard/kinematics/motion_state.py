@@ -62,7 +62,7 @@ class MotionState:
 
     @property
     def branch_selector(self) -> BranchSelector | None:
-        """Selects the branch at junctions that the route leaves open; None selects the straightest branch."""
+        """Selects the branch at junctions that the route leaves open; None selects the default route."""
         return self._branch_selector
 
     @property

@@ -1,7 +1,7 @@
 """Tests of motion along lanes, through links and junctions."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import pytest
 
@@ -150,20 +150,30 @@ def test_advance_to_end_of_a_lane_inside_its_road_stays_on_it(road: Text, map_of
     assert short.s == pytest.approx(38.0)
 
 
-def fork(road: Text, map_of: Text) -> RoadNetwork:
-    """Return a road to a junction with a left turn and a branch that bends slightly to the right."""
+BENDS = {"left": 0.05, "ahead": -0.01}
+"""Curvatures of a left turn and of a branch that bends slightly to the right [1/m]."""
+
+
+def fork(road: Text, map_of: Text, bends: Mapping[str, float] = BENDS, rule: str = "RHT") -> RoadNetwork:
+    """Return road `a` to a junction with a branch of 20 m for each curvature [1/m]."""
+    number = -1 if rule == "RHT" else 1
+
+    def lanes(link: str = "") -> str:
+        only = lane(number, link)
+        return section(0, only) if number < 0 else section(0, "", only)
+
     ways = []
     rest = ['<junction id="9" name="">']
-    for i, (number, bend) in enumerate((("left", 0.05), ("ahead", -0.01))):
+    for i, (name, bend) in enumerate(bends.items()):
         arc = f'<geometry s="0" x="100" y="0" hdg="0" length="20"><arc curvature="{bend}"/></geometry>'
         link = '<predecessor elementType="road" elementId="a" contactPoint="end"/>'
-        lanes = section(0, lane(-1, '<predecessor id="-1"/>'))
-        ways.append(road(number, length=20.0, geometry=arc, lanes=lanes, link=link, junction="9"))
+        own = lanes(f'<predecessor id="{number}"/>')
+        ways.append(road(name, length=20.0, geometry=arc, lanes=own, link=link, junction="9", rule=rule))
         rest.append(
-            f'<connection id="{i}" incomingRoad="a" connectingRoad="{number}" contactPoint="start">'
-            '<laneLink from="-1" to="-1"/></connection>'
+            f'<connection id="{i}" incomingRoad="a" connectingRoad="{name}" contactPoint="start">'
+            f'<laneLink from="{number}" to="{number}"/></connection>'
         )
-    a = road("a", lanes=section(0, lane(-1)), link='<successor elementType="junction" elementId="9"/>')
+    a = road("a", lanes=lanes(), link='<successor elementType="junction" elementId="9"/>', rule=rule)
     return RoadNetwork.parse(map_of(a, *ways, rest="".join(rest) + "</junction>"))
 
 
@@ -187,6 +197,19 @@ def test_advance_at_junction_selects_straightest_or_chosen_branch(road: Text, ma
     followed = network.advance(start, 10.0, route=route)
     assert followed is not None
     assert followed.road == "left"
+
+
+@pytest.mark.parametrize(("rule", "expected"), [("RHT", "right"), ("LHT", "left")])
+@pytest.mark.parametrize("order", [("left", "right"), ("right", "left")])
+def test_advance_at_symmetric_fork_turns_to_the_side_of_the_traffic(
+    road: Text, map_of: Text, rule: str, expected: str, order: tuple[str, str]
+) -> None:
+    """ASAM OpenSCENARIO XML 1.3.1, 6.8.1: right with right-hand traffic, left with left-hand traffic."""
+    bends = {"left": 0.05, "right": -0.05}
+    network = fork(road, map_of, {name: bends[name] for name in order}, rule)
+    moved = network.advance(network.location("a", -1 if rule == "RHT" else 1, 95.0), 10.0)
+    assert moved is not None
+    assert moved.road == expected
 
 
 def test_advance_backwards_leaves_a_junction(road: Text, map_of: Text) -> None:
