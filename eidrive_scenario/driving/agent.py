@@ -16,10 +16,9 @@ from eidrive_scenario.driving.communication.partial_reports import PartialReport
 from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.planner import Planner
-from eidrive_scenario.driving.result_checks import check_followed, check_plan
+from eidrive_scenario.driving.result_checks import check_control, check_followed, check_plan, is_valid_control
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, Plan
-from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
@@ -231,15 +230,17 @@ class Agent:
         if self.controller is None:
             return None
         if plan is None or self.planner is None:
-            return self.controller.hold_standstill()
+            control = self.controller.hold_standstill()
+            check_control(self.controller, "hold_standstill", control)
+            return control
         try:
             control = self.controller.control(ego, plan)
         except (ArithmeticError, ValueError, LookupError):
             check_followed(self.planner, plan)
             raise
-        if not math.isfinite(control.throttle + control.brake + control.steering):
+        if not is_valid_control(control):
             check_followed(self.planner, plan)
-            raise SimulationError(f"station {self.name!r}: the controller returned {control} (expected finite numbers)")
+            check_control(self.controller, "control", control)
         return control
 
     def _state(self, ego: EgoState) -> StationState:

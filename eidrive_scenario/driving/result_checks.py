@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.result_checks import LARGEST, are_within, describe, raise_not_finite, raise_outside
+from eidrive_scenario.world.actor import Control
 
 FASTEST = 1e4
 """Maximum magnitude of a planned speed [m/s], as of `target_speed`, and of an acceleration [m/s²]."""
@@ -57,6 +60,24 @@ def check_followed(planner: Planner, plan: Plan) -> None:
         row = int(equal[0])
         text = f"returned points {row} and {row + 1} at the same place {plan.points[row].tolist()} (expected a line)"
         raise InvalidResult(planner, "plan", text)
+
+
+def is_valid_control(control: object) -> bool:
+    """Return whether `control` is a Control of finite numbers."""
+    try:
+        return isinstance(control, Control) and math.isfinite(control.throttle + control.brake + control.steering)
+    except TypeError:
+        return False
+
+
+def check_control(controller: VehicleController, method: str, control: object) -> None:
+    """Raise InvalidResult unless `control`, which this method of the controller returned, is valid."""
+    if is_valid_control(control):
+        return
+    if not isinstance(control, Control):
+        raise InvalidResult(controller, method, f"returned {describe(control)} (expected Control)")
+    pedals: dict[str, object] = {"throttle": control.throttle, "brake": control.brake, "steering": control.steering}
+    raise_not_finite(controller, method, pedals)
 
 
 def _is_in_range(plan: Plan) -> bool:

@@ -12,6 +12,7 @@ from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import PLANE, Localizer
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
@@ -36,6 +37,7 @@ class Perception:
         self.detector = detector
         self._checked = is_checked(detector)
         self._tracker = tracker
+        self._tracker_checked = tracker is not None and not is_built_in(type(tracker))
         self._localizer = localizer
         self._latency = latency
         self._computing: deque[tuple[float, Detections, Readings]] = deque()
@@ -79,6 +81,8 @@ class Perception:
             newest = self._track(found, past)
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
+            if self._tracker_checked and newest is not None:
+                check_detections(self._tracker, "predict", newest)
         return newest
 
     def _track(self, found: Detections, readings: Readings) -> Detections:
@@ -90,7 +94,10 @@ class Perception:
             check_in_view(self.detector, shares, len(boxes))
             return shares
 
-        return self._tracker.update(found, in_view)
+        tracked = self._tracker.update(found, in_view)
+        if self._tracker_checked:
+            check_detections(self._tracker, "update", tracked)
+        return tracked
 
 
 def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:

@@ -1,4 +1,4 @@
-"""Checks of the results of detectors and fusion methods: finite numbers and possible sizes."""
+"""Checks of the results of detectors, trackers and fusion methods: finite numbers and possible sizes."""
 
 from __future__ import annotations
 

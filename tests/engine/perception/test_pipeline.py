@@ -16,7 +16,8 @@ from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer
 from eidrive_scenario.perception.oracle import OracleDetector
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.perception.tracking.settings import TrackerKind, TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.sensing.readings import EgoState, Readings, SignalReading, TruthReading
 from eidrive_scenario.world.actor import ActorSpec
@@ -203,3 +204,33 @@ def test_in_view_zero_keeps_undetected_tracks() -> None:
             new = perception.perceive(readings(tick * DT, 200.0))
         left.append(0 if new is None else int((new.boxes[:, 0] < 100.0).sum()))
     assert left == [1, 0]
+
+
+class FixedTracker(TrackingMethod):
+    """Tracker of a third party that returns the given results."""
+
+    def __init__(self, update_result: Any, prediction: Any) -> None:
+        super().__init__(TrackerKind(kind="fixed"))
+        self.update_result, self.prediction = update_result, prediction
+
+    def update(self, detections: Detections, in_view: object = None) -> Any:
+        return self.update_result
+
+    def predict(self, time: float) -> Any:
+        return self.prediction
+
+
+def test_update_of_tracker_with_invalid_result_raises() -> None:
+    perception = Perception(OracleDetector(), tracker=FixedTracker((), None))
+    with pytest.raises(InvalidResult, match=r"update returned an object of type tuple \(expected Detections\)"):
+        perception.perceive(readings(0.0, 5.0))
+
+
+def test_prediction_of_tracker_with_invalid_result_raises() -> None:
+    undefined = Detections(
+        0.0, np.full((1, 7), np.nan), np.ones(1), ("car",), np.zeros((1, 2)), np.zeros((1, 2, 2)), tracks=(1,)
+    )
+    perception = Perception(OracleDetector(), tracker=FixedTracker(Detections(0.0), undefined))
+    perception.perceive(readings(0.0, 5.0))
+    with pytest.raises(InvalidResult, match="predict returned boxes with the value nan"):
+        perception.perceive(readings(DT, None))

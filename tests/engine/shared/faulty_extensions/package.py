@@ -21,9 +21,9 @@ from py_trees.common import Status
 from eidrive_scenario.api.actions import ActionBehaviour, Condition
 from eidrive_scenario.api.common import Diagnostic, SettingError
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Verdict
-from eidrive_scenario.api.driving import Plan, RoutePlanner
+from eidrive_scenario.api.driving import Control, Plan, RoutePlanner, VehicleController
 from eidrive_scenario.api.fusion import FusionMethod
-from eidrive_scenario.api.perception import Detections, Detector
+from eidrive_scenario.api.perception import Detections, Detector, TrackingMethod
 from eidrive_scenario.api.v2x import LinkChannel, ChannelProfile
 
 AFTER = 0.5  # [s]: the faults begin later than the run
@@ -59,6 +59,7 @@ POINTS = {
         "a_function": "a_function",
         "no_signals": "NoSignals",
     },
+    "trackers": {"tracker_none": "TrackerNone"},
     "fusion": {
         "fusion_nan": "FusionNaN",
         "fusion_none": "FusionNone",
@@ -72,6 +73,11 @@ POINTS = {
         "planner_stands": "PlannerStands",
         "planner_static_raises": "PlannerStaticRaises",
         "planner_arguments": "PlannerArguments",
+    },
+    "vehicle_controllers": {
+        "controller_none": "ControllerNone",
+        "controller_nan": "ControllerNaN",
+        "controller_text": "ControllerText",
     },
     "channels": {"faulty": "FaultyChannel"},
     "criteria": {"faulty": "FaultyCriterion"},

@@ -16,6 +16,8 @@ SCENARIO = """<?xml version="1.0"?>
         <Property name="detector" value="{detector}"/>
         <Property name="fusion" value="{fusion}"/>
         <Property name="planner" value="{planner}"/>
+        <Property name="tracker" value="{tracker}"/>
+        <Property name="vehicle_controller" value="{controller}"/>
         <Property name="obey_signals" value="{signals}"/>
       </Properties></Controller></ObjectController>
     </ScenarioObject>
@@ -76,6 +78,8 @@ def write_scenario(
     detector: str = "oracle",
     fusion: str = "average",
     planner: str = "route",
+    tracker: str = "",
+    controller: str = "pid",
     criterion: str = "collision: {of: Ego}",
     action: str = "sound",
     condition: str = "sound",
@@ -90,6 +94,8 @@ def write_scenario(
         "detector": detector,
         "fusion": fusion,
         "planner": planner,
+        "tracker": tracker,
+        "controller": controller,
         "criterion": criterion,
         "action": action,
         "condition": condition,

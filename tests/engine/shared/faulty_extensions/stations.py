@@ -1,6 +1,14 @@
-"""Source text of faulty extensions of stations other than detectors: fusion methods, planners, a channel."""
+"""Source text of faulty extensions of stations other than detectors: trackers, fusion methods, planners, a channel."""
 
 STATIONS = """
+class TrackerNone(TrackingMethod):
+    def update(self, detections, in_view=None):
+        return None
+
+    def predict(self, time):
+        return None
+
+
 class FusionNaN(FusionMethod):
     def fuse(self, reports, now):
         return Detections(now, np.full((1, 7), math.inf), np.ones(1), ("car",), np.zeros((1, 2)), np.zeros((1, 2, 2)))
@@ -57,6 +65,21 @@ class PlannerStaticRaises(RoutePlanner):
 class PlannerArguments(RoutePlanner):
     def __init__(self, settings):
         pass
+
+
+class ControllerNone(VehicleController):
+    def control(self, ego, plan):
+        return None
+
+
+class ControllerNaN(VehicleController):
+    def control(self, ego, plan):
+        return Control(0.0, math.nan, 0.0)
+
+
+class ControllerText(VehicleController):
+    def control(self, ego, plan):
+        return Control("full", 0.0, 0.0)
 
 
 class FaultyProfile(ChannelProfile):
