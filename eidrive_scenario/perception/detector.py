@@ -43,7 +43,7 @@ class Detector(ABC):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset()
-    """Kinds of required sensors: truth, camera, lidar."""
+    """Kinds of required sensors, by their names in the entry points `eidrive_scenario.sensors`."""
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {}
     """Sensors by name of a station that configures none; if empty, one of each kind in `needs`."""
     provides_velocity: ClassVar[bool] = False

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from eidrive_scenario.registry import GROUPS
+
 GUIDE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCKS = BLOCK.findall(GUIDE.read_text(encoding="utf-8"))
@@ -92,15 +94,11 @@ def run_in(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 def test_guide_has_an_example_of_every_kind_of_extension() -> None:
     project = tomllib.loads(files()["pyproject.toml"])
-    kinds = {group.removeprefix("eidrive_scenario.") for group in project["project"]["entry-points"]}
-    assert kinds == {
-        *("sensors", "detectors", "trackers", "channels", "fusion", "planners"),
-        *("actions", "conditions", "criteria"),
-    }
-    modules = {
-        value.partition(":")[0] for entries in project["project"]["entry-points"].values() for value in entries.values()
-    }
-    assert modules == set(project["tool"]["setuptools"]["py-modules"])
+    points = project["project"]["entry-points"]
+    assert {group.removeprefix("eidrive_scenario.") for group in points} == set(GROUPS)
+    modules = [value.partition(":")[0] for entries in points.values() for value in entries.values()]
+    assert len(modules) == len(set(modules)), "an extension is one module and one entry point"
+    assert set(modules) == set(project["tool"]["setuptools"]["py-modules"])
     written = {name for name in files() if name.endswith(".py")} - {script.split()[1] for script in scripts()}
     assert {f"{module}.py" for module in modules} == written
 

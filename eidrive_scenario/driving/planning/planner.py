@@ -18,9 +18,10 @@ from eidrive_scenario.world.actor import ActorSpec
 
 
 class Planner(ABC):
-    """Turns the information of one station into a trajectory, in every tick. Built once for each station and run.
+    """Planner of one station: a trajectory in every tick. Built once for each station and run.
 
-    A class is registered in the entry points `eidrive_scenario.planners`. Its inputs are those of its station only.
+    A class is registered in the entry points `eidrive_scenario.planners`. It is built as
+    `cls(settings, spec, roads, dt=…, seed=…)`. Its inputs are those of its station only.
     """
 
     settings_type: ClassVar[type[PlannerSettings]] = PlannerSettings
