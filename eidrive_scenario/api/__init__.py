@@ -5,7 +5,7 @@ criteria    criteria over frames
 perception  sensors, detectors, trackers
 fusion      fusion methods
 v2x         channels
-driving     planners
+driving     planners, vehicle controllers, driving stacks
 run         runs from Python
 common      names that several groups need: errors, settings, geometry, roads
 

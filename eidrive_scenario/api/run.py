@@ -9,6 +9,7 @@ from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, read_recording
+from eidrive_scenario.recording.text.csv_writer import text_of_csv
 from eidrive_scenario.simulation import (
     ABORTED,
     FAILED,
@@ -21,6 +22,7 @@ from eidrive_scenario.simulation import (
     load_for_seed,
     run_file,
 )
+from eidrive_scenario.wall_limit import limit_wall_time
 
 __all__ = [
     "ABORTED",
@@ -35,10 +37,12 @@ __all__ = [
     "RunSettings",
     "Simulation",
     "check_scenario",
+    "limit_wall_time",
     "load_distribution",
     "load_for_seed",
     "load_scenario",
     "read_recording",
     "run_and_save",
     "run_file",
+    "text_of_csv",
 ]
