@@ -21,7 +21,7 @@ _WORDS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("ambulance", ("ambulance",)),
     ("bus", ("bus", "fusorosa", "coach")),
     ("van", ("van", "sprinter", "transporter")),
-    ("truck", ("truck", "truck", "semi", "trailer", "carlacola")),
+    ("truck", ("truck", "semi", "trailer", "carlacola")),
     ("motorbike", ("motorbike", "motorcycle", "mc", "harley", "yamaha", "vespa", "kawasaki")),
     ("bicycle", ("bicycle", "bike", "cyclist", "crossbike", "gazelle", "omafiets")),
     ("pedestrian", ("pedestrian", "walker", "person", "adult", "child")),

@@ -1,7 +1,7 @@
 """Comparison of third-party scenarios with runs of esmini 3.6.0 at the same step of 0.01 s.
 
 Every actor within 0.10 m root mean square and 0.5 m at worst, headings within 0.02 rad root mean square, every state
-change of a named element within 0.05 s. A table of all deviations stands at the end of pytest's report.
+change of a named element within 0.05 s. A table of all deviations is printed at the end of the pytest report.
 """
 
 from __future__ import annotations
@@ -17,45 +17,42 @@ from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 
 CORPORA = os.environ.get("EIDRIVE_CORPORA", "")
-pytestmark = pytest.mark.skipif(not CORPORA, reason="EIDRIVE_CORPORA does not say where the third-party scenarios are")
+pytestmark = pytest.mark.skipif(not CORPORA, reason="EIDRIVE_CORPORA is not set")
 
 NOT_MET = {
     "esmini__auto_light": (
-        "we are right: the storyboard's stop trigger stops a ManeuverGroup that has executions left ; esmini lets it "
-        "end and stand by first, at the same instant. All motion is the same"
+        "the stop trigger of the storyboard stops a ManeuverGroup with remaining executions; in esmini it ends and "
+        "returns to standbyState first, at the same instant. All motion agrees"
     ),
-    "esmini__cut-in_cr": (
-        "we are right: a LaneOffsetAction that is continuous does not end by itself (standard: `continuous`); "
-        "esmini ends it at its target"
-    ),
+    "esmini__cut-in_cr": "a continuous LaneOffsetAction does not end by itself; esmini ends it at its target",
     "esmini__cut-in_visibility": (
-        "we are right: free space along a bend is that between the corners of the boxes in road coordinates; a search "
-        "along the reference line at steps of 4 mm finds the same 11.98 m. What esmini measures is 0.1 m more, which "
-        "triggers 0.02 s earlier"
+        "free space in a curve is that between the corners of the boxes in road coordinates; a search along the "
+        "reference line in steps of 4 mm finds the same 11.98 m. esmini measures 0.1 m more, so that its trigger fires "
+        "0.02 s earlier"
     ),
     "esmini__follow_trajectory_by_front_axle": (
-        "we are right: the standard knows no property refpoint_x_offset, by which esmini draws the vehicle behind a "
-        "point that is not its reference point; the positions agree"
+        "the property refpoint_x_offset, by which esmini draws the vehicle behind another reference point, is not part "
+        "of the standard; the positions agree"
     ),
     "esmini__lane-change_clothoid_spline_based_trajectory": (
-        "we are right: the way is the actor's speed times the time; in the last 0.2 s of each curve esmini's car, at "
-        "8.33 m/s, covers 1.26 m in 0.1 s, and then waits for the end (root mean square 0.06 m)"
+        "the covered distance is speed times time; in the last 0.2 s of each curve the car of esmini, at 8.33 m/s, "
+        "covers 1.26 m in 0.1 s, and then waits for the end (root mean square 0.06 m)"
     ),
     "esmini__parking_demo": (
-        "we are right as far as we see: time 0 is one instant, which esmini plays twice, and lights are switched on "
-        "twice; at the end of a clothoid spline it runs 0.3 m ahead of the speed. The angles of a NURBS whose control "
-        "points have headings are blended as its coordinates are, esmini's differ by 0.07 rad"
+        "time 0 is one instant, which esmini executes twice, so that it turns the lights on twice; at the end of a "
+        "clothoid spline it is 0.3 m ahead of the speed. The angles of a NURBS with headings are blended like its "
+        "coordinates; those of esmini differ by 0.07 rad"
     ),
     "esmini__routing-test": (
-        "we are right: an actor covers its speed times the time; where lanes slant esmini moves along the reference "
-        "line so fast, and 5.11 m in 0.1 s at 50 m/s along the lane"
+        "the covered distance is speed times time; where lanes are oblique esmini covers it along the reference line, "
+        "and 5.11 m in 0.1 s at 50 m/s along the lane"
     ),
     "esmini__trailers": (
-        "we are right: as routing-test; and where the lane of one train tapers to nothing esmini jumps 1.9 m sideways "
-        "into the next lane"
+        "as routing-test; in addition esmini moves one train 1.9 m sideways into the next lane in one step, where the "
+        "width of its lane falls to 0"
     ),
 }
-"""Known deviations, with the engine that is correct by the standard and the reason."""
+"""Known deviations with their reasons; the engine follows the standard in each of them."""
 
 
 def names() -> list[str]:
@@ -72,7 +69,7 @@ def test_scenario_matches_reference_or_known_deviation(
     record_property(LINE, line_of(name, found) + (f"  - {NOT_MET[name]}" if name in NOT_MET else ""))
     beyond = {actor: drift for actor, drift in found.actors.items() if not drift.within}
     if name in NOT_MET:
-        assert not found.agrees, f"{name} agrees now: take it off the list"
+        assert not found.agrees, f"{name} agrees: remove it from NOT_MET"
     else:
         assert beyond == {}
         assert found.unmatched == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from lxml import etree
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.world.physics.dynamics import PROPERTIES, VehicleParameters
-from eidrive_scenario.world.specs import actor_spec
+from eidrive_scenario.world.specs import COLOR_PROPERTY, SHAPE_PROPERTY, SHAPES, actor_spec
 
 CATALOGS = Path(__file__).parents[3] / "xosc" / "catalogs"
 
@@ -142,4 +143,13 @@ def test_catalog_vehicles_are_consistent() -> None:
         assert float(center.attrib["x"]) - float(size.attrib["length"]) / 2 <= 0.02 - radius, entry.get("name")
         assert float(center.attrib["z"]) == pytest.approx(float(size.attrib["height"]) / 2, abs=1e-3)
         known = {prop.get("name") for prop in entry.findall(".//Property")}
-        assert known - {"eidrive.shape", "eidrive.color"} <= set(PROPERTIES)
+        assert known - {SHAPE_PROPERTY, COLOR_PROPERTY} <= set(PROPERTIES)
+
+
+def test_documented_properties_of_a_vehicle_are_complete() -> None:
+    page = (CATALOGS.parents[1] / "docs" / "scenario_files.md").read_text(encoding="utf-8")
+    section = page.split("\n## Dynamics and appearance: properties of a vehicle\n")[1].split("\n## ")[0]
+    documented = set(re.findall(r"`([a-z_.]+)`", section))
+    assert documented == {*PROPERTIES, SHAPE_PROPERTY, COLOR_PROPERTY, *SHAPES}
+    rows = [line.split("|")[1].strip().strip("`") for line in section.splitlines() if line.startswith("| `")]
+    assert sorted(rows) == sorted(PROPERTIES)
