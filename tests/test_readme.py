@@ -1,0 +1,35 @@
+"""README.md: agreement of its lists with the command line, the pytest plugin and the files of the project."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import eidrive_scenario.pytest_plugin
+from eidrive_scenario.cli.show import Names
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_readme_lists_every_kind_of_names() -> None:
+    row = next(line for line in README.splitlines() if line.startswith("| `eidrive list"))
+    listed = re.findall(r"`(?:eidrive list )?([a-z_]+)`", row)
+    assert sorted(listed) == sorted([*Names, "check"])
+
+
+def test_readme_lists_every_option_of_the_pytest_plugin() -> None:
+    folder = Path(eidrive_scenario.pytest_plugin.__file__).parent
+    source = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
+    declared = set(re.findall(r'addoption\(\s*"(--eidrive-[a-z-]+)"', source))
+    declared |= set(re.findall(r'addini\(\s*"(eidrive_[a-z_]+)"', source))
+    table = README[README.index("| option | effect |") :].split("\n## ")[0]
+    assert set(re.findall(r"`(--eidrive-[a-z-]+|eidrive_[a-z_]+)", table)) == declared
+
+
+def test_files_that_the_readme_names_exist() -> None:
+    named = set(re.findall(r"`((?:docs|examples|xosc)/[\w/.]*|CONTRIBUTING\.md)`|\]\(([\w/.]+)\)", README))
+    missing = [name for pair in named for name in pair if name and not (ROOT / name).exists()]
+    assert missing == []
+    pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")}
+    assert {page for page in pages if page not in README} == set()
