@@ -220,8 +220,8 @@ class RoadNetwork(RoadAttributes):
         """Return the location `distance` [m] further along the lane in its driving direction (backwards if negative).
 
         The path passes links and junctions. At a fork the branch is selected by the route, else by `choose(branches)`,
-        else it is that of the default route. If the lane ends, the result is None, or the end of the lane with `to_end`.
-        `visit` is the visit of the route (`Route.visit`), which may pass a road several times.
+        else it is that of the default route. If the lane ends, the result is None, or its end with `to_end`. `visit`
+        is the visit of the route (`Route.visit`), which may pass a road several times.
         """
         return self.movement.advance(location, distance, route, choose, visit, to_end)
 
