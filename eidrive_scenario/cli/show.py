@@ -136,17 +136,26 @@ def report(
         typer.Option("--out", "-o", help="Folder of report.html, or a file.", show_default="the first folder of runs"),
     ] = None,
 ) -> None:
-    """Write an HTML report of many runs."""
-    from eidrive_scenario.recording.run_files import read_result, result_paths, unfinished_runs
-    from eidrive_scenario.reporting.run_report.report import write_report
+    """Write an HTML report of many runs.
 
-    files = list(result_paths(runs))
-    results = [read_result(path) for path in files]
-    for path in unfinished_runs(runs):
-        typer.secho(f"warning: {path}: the run did not end, the report omits it", fg="yellow", err=True)
-    if not results:
+    Below folders, damaged results and runs that did not end are omitted with a warning; the page lists them.
+    """
+    from eidrive_scenario.recording.run_files import RESULT, result_paths, unfinished_runs
+    from eidrive_scenario.reporting.run_report.report import write_report
+    from eidrive_scenario.reporting.run_report.reported_run import read_runs
+
+    results, errors = read_runs(result_paths(runs))
+    omitted = [f"{path}: the run did not end" for path in unfinished_runs(runs)]
+    given = {str(path) for path in runs}
+    invalid = not results or any(error.source in given for error in errors)
+    if not invalid:
+        omitted += [f"{error.source}: {error.message}" for error in errors]
+    for line in omitted:
+        typer.secho(f"warning: {line}, the report omits it", fg="yellow", err=True)
+    if invalid:
         folders = ", ".join(map(str, runs))
-        raise SettingError(Diagnostic(f"no result.json in {folders}", "give folders written by eidrive run --out"))
+        missing = Diagnostic(f"no {RESULT} in {folders}", "give folders written by eidrive run --out")
+        raise SettingError(errors or missing)
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
-    typer.echo(str(write_report(results, out, sources=files)))
+    typer.echo(str(write_report(results, out, omitted=omitted)))

@@ -7,7 +7,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
-from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -26,19 +25,18 @@ _UNITS = {"count": "", "impact_speed": "m/s"}
 
 
 def write_report(
-    results: Iterable[Mapping[str, Any]], out: Path, *, sources: Sequence[Path] = (), footer: str = ""
+    results: Iterable[Mapping[str, Any] | ReportedRun], out: Path, *, omitted: Sequence[str] = ()
 ) -> Path:
     """Write a page about results in the format of `--json`, and return its path.
 
     out      file of the page if it ends in `.html`, else the folder of `report.html`
-    sources  files of the results in their order, for error messages
+    omitted  files of runs that `results` do not contain, each with the reason; the page lists them
 
     Runs are grouped by the settings in which those of a scenario differ. A run in several folders is listed each time
     and counts once. Raise InputError without results, or for an invalid result.
     """
     page = out if out.suffix == ".html" else out / "report.html"
-    files: Iterable[str | Path] = chain(sources, repeat(""))
-    runs = [parse_run(result, file) for result, file in zip(results, files, strict=False)]
+    runs = [parse_run(result) for result in results]
     if not runs:
         raise InputError(Diagnostic("no result to report", "give at least one run", str(out)))
     groups = group_runs(runs)
@@ -71,7 +69,8 @@ def write_report(
         number=_number,
         has_settings=any(run.settings_sha256 for run in runs),
         all_settings=lambda run: json.dumps(run.settings, indent=1, ensure_ascii=False),
-        footer=footer or f"eidrive-scenario {version('eidrive-scenario')}",
+        omitted=omitted,
+        footer=f"eidrive-scenario {version('eidrive-scenario')}",
     )
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.recording.run_files import read_result
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 
@@ -51,10 +52,22 @@ class ReportedRun(BaseModel):
         return self.end_reason != TIME_LIMIT
 
 
-def parse_run(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:
+def read_runs(paths: Iterable[Path]) -> tuple[list[ReportedRun], list[Diagnostic]]:
+    """Return the runs of these result files, and the errors of files that are damaged or not results."""
+    runs: list[ReportedRun] = []
+    errors: list[Diagnostic] = []
+    for path in paths:
+        try:
+            runs.append(parse_run(read_result(path), path))
+        except InputError as error:
+            errors += error.diagnostics
+    return runs, errors
+
+
+def parse_run(result: Mapping[str, Any] | ReportedRun, source: str | Path = "") -> ReportedRun:
     """Return a validated run from an object in the format of `--json`, read from the optional file `source`.
 
-    Raise InputError if the object is invalid.
+    A validated run is returned unchanged. Raise InputError if the object is invalid.
     """
     try:
         return ReportedRun.model_validate(result)

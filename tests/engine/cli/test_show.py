@@ -108,19 +108,57 @@ def test_report_of_runs_writes_page(eidrive: Eidrive, passing_by: Path, tmp_path
     assert beside.read_bytes() == page.read_bytes()
 
 
-@pytest.mark.parametrize("command", ["report", "view"])
-def test_malformed_result_is_reported_with_its_file(
-    eidrive: Eidrive, passing_by: Path, tmp_path: Path, command: str
-) -> None:
-    """One of several results has no seed."""
-    eidrive("run", passing_by, "--out", tmp_path, "--repeat", "2")
-    _, file = sorted(tmp_path.glob("*/result.json"))
+def without_seed(file: Path) -> Path:
     content = json.loads(file.read_text())
     del content["seed"]
     file.write_text(json.dumps(content))
-    result = eidrive(command, tmp_path if command == "report" else file.parent)
+    return file
+
+
+def test_view_of_malformed_result_names_its_file(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    (file,) = tmp_path.glob("*/result.json")
+    result = eidrive("view", without_seed(file).parent)
     assert result.exit_code == 2
     assert result.stderr == f"{file}: result: 'seed': field required; give an object that eidrive run --json prints\n"
+
+
+def test_report_omits_damaged_results_with_warning(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    """Of four results one is cut off, one has no seed and one is empty; the page lists the three."""
+    eidrive("run", passing_by, "--out", tmp_path, "--no-record", "--repeat", "4")
+    cut, seedless, empty, _ = sorted(tmp_path.glob("*/result.json"))
+    cut.write_bytes(cut.read_bytes()[:100])
+    without_seed(seedless)
+    empty.write_bytes(b"")
+    result = eidrive("report", tmp_path)
+    assert result.exit_code == 0, result.output
+    warnings = result.stderr.splitlines()
+    assert [line.split(": ")[:2] for line in warnings] == [["warning", str(one)] for one in (cut, seedless, empty)]
+    assert warnings[1] == f"warning: {seedless}: result: 'seed': field required, the report omits it"
+    page = Path(result.stdout.strip()).read_text(encoding="utf-8")
+    assert "1 run:" in page
+    assert "3 runs are omitted" in page
+    assert all(str(one) in page for one in (cut, seedless, empty))
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_report_of_given_damaged_file_is_invalid_input(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, others: int
+) -> None:
+    """A file that the command line names is never omitted, with and without other results."""
+    eidrive("run", passing_by, "--out", tmp_path / "runs", "--no-record")
+    (tmp_path / "result.json").write_text("{")
+    result = eidrive("report", tmp_path / "result.json", *[tmp_path / "runs"] * others, "-o", tmp_path / "report")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"{tmp_path / 'result.json'}: not JSON: ")
+    assert not (tmp_path / "report").exists()
+
+
+def test_report_of_damaged_results_only_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text("{")
+    result = eidrive("report", tmp_path, "-o", tmp_path / "report")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"{tmp_path / 'result.json'}: not JSON: ")
 
 
 def test_report_without_runs_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
