@@ -2,7 +2,7 @@
 
 - `CustomCommandAction type="eidrive.criterion"` with a YAML flow mapping, one criterion or several:
   `min_distance: {of: Ego, to: Incoming, at_least: 1.5}`
-- ScenarioRunner: ParameterConditions named `criteria_…` in the StopTrigger of the Storyboard, about the ego vehicle
+- ScenarioRunner: criteria in the StopTrigger of the Storyboard, about the ego vehicle (see `scenario_runner`)
 - scenario_simulator_v2: CustomCommandActions of the types `exitSuccess` and `exitFailure`
 
 A command is parsed once, before the run. `build_criteria` then creates new criteria at each execution of the command.
@@ -12,22 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
+from eidrive_scenario.openscenario.scenario_runner import CRITERION_PREFIX, criteria_of
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.values.references import resolve_references
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import key_lines, load_yaml, parse_settings
+from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 EXITS = {"exitSuccess": True, "exitFailure": False}
 """Verdict of each exit command of scenario_simulator_v2: True for passed."""
-
-PREFIX = "criteria_"
-"""Prefix of the names of conditions that ScenarioRunner evaluates as criteria."""
 
 _EXAMPLE = "min_distance: {of: Ego, to: Incoming, at_least: 1.5}"
 
@@ -168,24 +167,14 @@ def _free_name(name: str, taken: Collection[str]) -> str:
     return free
 
 
-class Command(Protocol):
-    """CustomCommandAction that the storyboard has executed."""
-
-    @property
-    def type(self) -> str: ...
-    @property
-    def content(self) -> str: ...
-
-
-def exit_verdict(command: Command, time: float | None = None) -> Verdict:
+def exit_verdict(command: CustomCommand, time: float) -> Verdict:
     """Return the verdict of an `exitSuccess` or `exitFailure` command at `time` [s].
 
     Raise KeyError for a command of another type.
     """
     passed = EXITS[command.type]
-    when = "" if time is None else f" at {time:.2f} s"
     text = command.content.strip()
-    reason = f"the scenario executed {command.type}{when}" + (f": {text}" if text else "")
+    reason = f"the scenario executed {command.type} at {time:.2f} s" + (f": {text}" if text else "")
     return Verdict(command.type, passed, None, None, "", None if passed else time, reason, fatal=True)
 
 
@@ -196,8 +185,8 @@ def stop_trigger_criteria(scenario: Scenario, taken: Collection[str] = ()) -> li
     condition is invalid or no entity is the ego vehicle.
     """
     criteria: list[Criterion] = []
-    for condition in _criterion_conditions(scenario):
-        translated = _TRANSLATIONS.get(condition.name.removeprefix(PREFIX))
+    for condition in criteria_of(scenario.storyboard):
+        translated = _TRANSLATIONS.get(condition.name.removeprefix(CRITERION_PREFIX))
         if translated is None:
             continue
         kind, settings_of = translated
@@ -212,23 +201,14 @@ def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
     """Return warnings about criteria of ScenarioRunner that this engine does not support."""
     return [
         Diagnostic(
-            f"criterion {condition.name.removeprefix(PREFIX)!r} is not evaluated",
+            f"criterion {condition.name.removeprefix(CRITERION_PREFIX)!r} is not evaluated",
             f"supported criteria: {', '.join(sorted(_TRANSLATIONS))}",
             condition.source,
             condition.line,
         )
-        for condition in _criterion_conditions(scenario)
-        if condition.name.removeprefix(PREFIX) not in _TRANSLATIONS
+        for condition in criteria_of(scenario.storyboard)
+        if condition.name.removeprefix(CRITERION_PREFIX) not in _TRANSLATIONS
     ]
-
-
-def _criterion_conditions(scenario: Scenario) -> Iterator[Condition]:
-    trigger = scenario.storyboard.stop_trigger
-    for group in trigger.condition_group if trigger is not None else ():
-        for condition in group.condition:
-            by_value = condition.by_value_condition
-            if condition.name.startswith(PREFIX) and by_value is not None and by_value.parameter_condition is not None:
-                yield condition
 
 
 def _value(condition: Condition) -> str:

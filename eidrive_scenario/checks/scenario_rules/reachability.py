@@ -31,7 +31,7 @@ from eidrive_scenario.checks.scenario_rules.truth_intervals import (
     truth_intervals,
 )
 from eidrive_scenario.openscenario.model import Act, Condition, ConditionEdge, ConditionGroup, Storyboard, Trigger
-from eidrive_scenario.openscenario.validation.names import CRITERIA
+from eidrive_scenario.openscenario.scenario_runner import without_criteria
 
 
 @dataclass(frozen=True)
@@ -202,9 +202,7 @@ def stop_trigger(node: Node) -> Trigger | None:
     """Return the stop trigger of an element without the criteria of ScenarioRunner; None if no condition remains."""
     if not isinstance(node.element, Act | Storyboard) or node.element.stop_trigger is None:
         return None
-    kept = []
-    for group in node.element.stop_trigger.condition_group:
-        conditions = tuple(one for one in group.condition if node.parent or not one.name.startswith(CRITERIA))
-        if conditions:
-            kept.append(ConditionGroup(condition=conditions, line=group.line, source=group.source))
-    return Trigger(condition_group=tuple(kept)) if kept else None
+    trigger = node.element.stop_trigger
+    if isinstance(node.element, Storyboard):
+        trigger = without_criteria(trigger)
+    return trigger if trigger.condition_group else None

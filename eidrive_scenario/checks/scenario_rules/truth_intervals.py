@@ -10,7 +10,7 @@ from eidrive_scenario.checks.scenario_rules.intervals import ALWAYS, NEVER, Inte
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model import Element, Rule
-from eidrive_scenario.openscenario.validation.names import CRITERIA
+from eidrive_scenario.openscenario.scenario_runner import is_criterion
 
 IMPOSSIBLE_CONDITION = "impossible-condition"
 IMPOSSIBLE_STATE = "impossible-state"
@@ -55,7 +55,7 @@ def truth_intervals(condition: model.Condition, outline: Outline) -> TruthInterv
         return _of_entities(by_entity, outline)
     leaf = next(iter(by_value.children()), None) if by_value is not None else None
     evaluate = _BY_VALUE.get(type(leaf))
-    if evaluate is None or condition.name.startswith(CRITERIA):
+    if evaluate is None or is_criterion(condition):
         return OPEN
     return evaluate(leaf, outline)
 

@@ -15,7 +15,6 @@ from eidrive_scenario.openscenario.model import (
     ObjectController,
     OpenScenario,
     ParameterAssignment,
-    ParameterCondition,
     ParameterDeclaration,
     StoryboardElementStateCondition,
     TrafficSignalController,
@@ -23,12 +22,10 @@ from eidrive_scenario.openscenario.model import (
     VariableDeclaration,
 )
 from eidrive_scenario.openscenario.reading.schema import rules
+from eidrive_scenario.openscenario.scenario_runner import is_criterion
 from eidrive_scenario.openscenario.validation.scenario_objects import scenario_objects
 from eidrive_scenario.openscenario.validation.storyboard_names import StoryboardNames
 from eidrive_scenario.openscenario.values.scalars import Version
-
-CRITERIA = "criteria_"
-"""Prefix of the names of ScenarioRunner criteria, which are ParameterConditions without a declared parameter."""
 
 _DECLARED_BY: Mapping[type[Element], str] = {
     ParameterDeclaration: "parameter",
@@ -65,7 +62,7 @@ def check_names(
             )
         known[kind].setdefault(name, element)
     complete = {kind: names for kind, names in known.items() if kind not in unnamed}
-    exempt = {id(one) for element in elements if isinstance(element, Condition) for one in _criterion(element)}
+    exempt = {id(parameter) for element in elements for parameter in _undeclared_parameter(element)}
     exempt |= {
         id(element.trailer_ref) for element in elements if isinstance(element, Trailer) and _has_no_trailer(element)
     }
@@ -92,11 +89,10 @@ def _definitions(
             yield kind, getattr(element, "name", None), element
 
 
-def _criterion(condition: Condition) -> Iterator[ParameterCondition]:
-    if isinstance(condition.name, str) and condition.name.startswith(CRITERIA) and condition.by_value_condition:
-        parameter = condition.by_value_condition.parameter_condition
-        if parameter is not None:
-            yield parameter
+def _undeclared_parameter(element: Element) -> Iterator[Element]:
+    """Yield the ParameterCondition of a criterion of ScenarioRunner, whose parameter need not be declared."""
+    if isinstance(element, Condition) and element.by_value_condition is not None and is_criterion(element):
+        yield from element.by_value_condition.children()
 
 
 def _has_no_trailer(trailer: Trailer) -> bool:

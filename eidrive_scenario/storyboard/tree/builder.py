@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, RegistryError, ScenarioError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.openscenario.scenario_runner import without_criteria
 from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition, EntityCondition
@@ -44,9 +45,6 @@ WRAPPERS = (
 )
 """Types that only wrap actions."""
 
-CRITERION = "criteria_"
-"""Name prefix of conditions of the storyboard's stop trigger that are criteria, as in ScenarioRunner."""
-
 ElementPath = tuple[str, ...]
 
 
@@ -75,7 +73,8 @@ class Builder:
         storyboard = self._scenario.storyboard
         init = InitBlock(self._context, self._init(storyboard.init.actions))
         stories = [self._story(story) for story in storyboard.story]
-        stop = self._wait("stop", _without_criteria(storyboard.stop_trigger))
+        trigger = storyboard.stop_trigger
+        stop = self._wait("stop", without_criteria(trigger) if trigger is not None else None)
         root = StoryboardElement(self._context, ("storyboard",), stories, stop=stop)
         for condition in self._built:
             try:
@@ -252,17 +251,6 @@ def _leaves(element: model.Element, parent: model.Element) -> Iterator[tuple[mod
         return
     for child in element.children():
         yield from _leaves(child, element)
-
-
-def _without_criteria(trigger: model.Trigger | None) -> model.Trigger | None:
-    if trigger is None:
-        return None
-    groups = []
-    for group in trigger.condition_group:
-        conditions = tuple(entry for entry in group.condition if not entry.name.startswith(CRITERION))
-        if conditions:
-            groups.append(model.ConditionGroup(condition=conditions, line=group.line, source=group.source))
-    return model.Trigger(condition_group=tuple(groups), line=trigger.line, source=trigger.source)
 
 
 def _registered_name(leaf: model.Element, registry: Registry) -> str:

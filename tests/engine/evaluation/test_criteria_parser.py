@@ -240,3 +240,12 @@ def test_stop_trigger_criteria_without_ego_raises_setting_error() -> None:
     scenario = written_for_scenario_runner(("criteria_CollisionTest", "", ""), ego=False)
     with pytest.raises(SettingError, match="the scenario has no ego vehicle; give a Vehicle the property"):
         stop_trigger_criteria(scenario)
+
+
+def test_stop_condition_with_prefix_but_without_parameter_ends_run() -> None:
+    """Criteria of ScenarioRunner are ParameterConditions; a condition of another type only has a similar name."""
+    text = PASSING_BY.read_text(encoding="utf-8")
+    assert text.count('<Condition name="end"') == 1
+    with Simulation(text.replace('<Condition name="end"', '<Condition name="criteria_end"').encode()) as simulation:
+        result = simulation.run()
+    assert (result.end_reason, result.simulated_s) == ("stop trigger", pytest.approx(3.0))
