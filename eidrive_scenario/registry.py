@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Any, NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, suggestion
 
@@ -32,8 +32,18 @@ _SINGULAR = {
     "vehicle_controllers": "vehicle controller",
 }
 _BUILT_IN = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
-_loaded: dict[type, tuple[str, str, str]] = {}
-"""Kind, name and value of the entry point of each loaded extension."""
+
+
+class Registration(NamedTuple):
+    """Entry point of an extension: kind (singular of the group), name, and value `package.module:Object`."""
+
+    kind: str
+    name: str
+    value: str
+
+
+_loaded: dict[type, Registration] = {}
+"""Registration of each loaded extension."""
 
 
 class Registry:
@@ -49,7 +59,8 @@ class Registry:
             other = self._points.get(point.name)
             if other is not None and other.value != point.value:
                 raise RegistryError(
-                    f"two {kind} are named {point.name!r}: {other.value} and {point.value}; rename or uninstall one"
+                    f"{singular(kind)} {point.name!r} is registered twice: {other.value} and {point.value}; "
+                    "rename or uninstall one"
                 )
             self._points[point.name] = point
 
@@ -79,12 +90,11 @@ class Registry:
         """
         point = self._points.get(name)
         if point is None:
-            what = self.kind.removesuffix("s")
-            raise SettingError(Diagnostic(f"unknown {what} {name!r}", suggestion(name, self._points)))
+            raise SettingError(Diagnostic(f"unknown {singular(self.kind)} {name!r}", suggestion(name, self._points)))
         extension = self._import(point)
         if extension in _checked.get((self.kind, name, base), ()):
             return extension
-        described = f"{self.kind} {name!r} ({point.value})"
+        described = self._described(point)
         if base is not None and not (isinstance(extension, type) and issubclass(extension, base)):
             got = extension.__name__ if isinstance(extension, type) else f"an object of type {type(extension).__name__}"
             raise RegistryError(f"{described} is not a class derived from {base.__name__} (got {got})")
@@ -94,7 +104,7 @@ class Registry:
         if isinstance(extension, type):
             for mismatch in _signature_mismatches(extension):
                 raise RegistryError(f"{described}: {mismatch}")
-            _loaded.setdefault(extension, (singular(self.kind), name, point.value))
+            _loaded.setdefault(extension, Registration(singular(self.kind), name, point.value))
             _checked[self.kind, name, base] = (extension,)
         return extension
 
@@ -104,8 +114,11 @@ class Registry:
         except (Exception, SystemExit) as error:
             location = _raised_at(error)
             text = str(error) if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {error}"
-            described = f"{self.kind} {point.name!r} ({point.value})"
-            raise RegistryError(f"{described} does not load: {text}{f' ({location})' if location else ''}") from error
+            location = f" ({location})" if location else ""
+            raise RegistryError(f"{self._described(point)} does not load: {text}{location}") from error
+
+    def _described(self, point: EntryPoint) -> str:
+        return f"{singular(self.kind)} {point.name!r} ({point.value})"
 
 
 _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
@@ -139,9 +152,9 @@ def construct(extension_class: Any, *arguments: Any, **keywords: Any) -> Any:
         raise
 
 
-def third_party_files() -> dict[str, dict[str, tuple[str, str, str]]]:
-    """Return kind, name and value of loaded third-party extensions, by file and qualified name of their classes."""
-    found: dict[str, dict[str, tuple[str, str, str]]] = {}
+def third_party_files() -> dict[str, dict[str, Registration]]:
+    """Return the registrations of loaded third-party extensions, by file and qualified name of their classes."""
+    found: dict[str, dict[str, Registration]] = {}
     for extension_class, known in _loaded.items():
         file = getattr(sys.modules.get(extension_class.__module__), "__file__", None)
         if file is not None and not is_built_in(extension_class):
@@ -149,8 +162,8 @@ def third_party_files() -> dict[str, dict[str, tuple[str, str, str]]]:
     return found
 
 
-def registration(extension_class: type) -> tuple[str, str, str] | None:
-    """Return kind, name and value of the entry point through which a class was loaded, or None."""
+def registration(extension_class: type) -> Registration | None:
+    """Return the registration of a class or of its nearest loaded base class, or None."""
     for one in extension_class.__mro__:
         if one in _loaded:
             return _loaded[one]

@@ -200,7 +200,7 @@ def test_extension_that_cannot_be_loaded_is_named(
     package: Path, tmp_path: Path, detector: str, diagnostic: str
 ) -> None:
     text = re.escape(diagnostic.replace("FOLDER", str(package)))
-    with pytest.raises(RegistryError, match=rf"detectors '{detector}' \(faulty\w*:\w+\).*{text}"):
+    with pytest.raises(RegistryError, match=rf"detector '{detector}' \(faulty\w*:\w+\).*{text}"):
         run(tmp_path, detector=detector)
 
 

@@ -32,20 +32,29 @@ def test_extension_is_imported_on_load() -> None:
     ],
 )
 def test_invalid_extension_is_reported_by_name(value: str, message: str) -> None:
-    with pytest.raises(RegistryError, match=f"criteria 'mine' .*{message}"):
+    with pytest.raises(RegistryError, match=f"^criterion 'mine' .*{message}"):
         registry_of(mine=value).load("mine")
 
 
 def test_duplicate_name_raises_with_both_modules() -> None:
     points = [EntryPoint("mine", value, GROUP) for value in ("one:Thing", "two:Thing")]
-    with pytest.raises(RegistryError, match="two criteria are named 'mine': one:Thing and two:Thing"):
+    with pytest.raises(RegistryError, match="^criterion 'mine' is registered twice: one:Thing and two:Thing"):
         Registry("criteria", points)
     assert list(Registry("criteria", points[:1] * 2)) == ["mine"], "one package found twice is no clash"
 
 
 def test_unknown_name_suggests_the_nearest() -> None:
-    with pytest.raises(SettingError, match="did you mean 'collision'"):
+    with pytest.raises(SettingError, match="^unknown criterion 'colision'; did you mean 'collision'"):
         registry_of(collision="eidrive_criteria.collision:Collision").load("colision")
+
+
+@pytest.mark.parametrize(("kind", "noun"), [("fusion", "fusion method"), ("vehicle_controllers", "vehicle controller")])
+def test_errors_use_the_noun_of_the_kind(kind: str, noun: str) -> None:
+    point = EntryPoint("mine", "no.such.module:Thing", f"eidrive_scenario.{kind}")
+    with pytest.raises(SettingError, match=f"^unknown {noun} 'other'"):
+        Registry(kind, [point]).load("other")
+    with pytest.raises(RegistryError, match=f"^{noun} 'mine' .* does not load"):
+        Registry(kind, [point]).load("mine")
 
 
 def test_distribution_names_the_package_of_third_parties_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -104,7 +104,7 @@ def test_run_beyond_time_limit_ends_with_exit_code_3(eidrive: Eidrive, passing_b
         (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
         (["{file}", "--user-value", "mood"], "--user-value: no value is assigned (got 'mood'; expected NAME=VALUE)"),
         (["{file}", "--controller", "ALKSController"], "--controller: no value is assigned (got 'ALKSController'"),
-        (["{file}", "--controller", "ALKSController=alk"], "unknown controller 'alk'; did you mean 'alks'?"),
+        (["{file}", "--controller", "ALKSController=alk"], "unknown controller model 'alk'; did you mean 'alks'?"),
         (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
         (["{file}", "--dt", "0"], "--dt: not a positive number of seconds (got 0.0)"),
     ],

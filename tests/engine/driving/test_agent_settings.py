@@ -122,7 +122,7 @@ WRONG = [
     ([("detectr", "oracle")], "s.xosc:12: unknown setting 'detectr'; did you mean 'detector'?"),
     ([("detector", "oracl")], "s.xosc:12: unknown detector 'oracl'; did you mean 'oracle'?"),
     ([("planner", "conflictarea")], "s.xosc:12: unknown planner 'conflictarea'; did you mean 'conflict_area'?"),
-    ([("fusion", "mean")], "s.xosc:12: unknown fusion 'mean'"),
+    ([("fusion", "mean")], "s.xosc:12: unknown fusion method 'mean'"),
     ([("range", "50"), ("range", "60")], "s.xosc:13: property 'range' is given twice, first in line 12"),
     ([("range", "far")], "s.xosc:12: setting 'range' is 'far'"),
     ([("target_speed", "-3")], "s.xosc:12: setting 'target_speed' is -3"),

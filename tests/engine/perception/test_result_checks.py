@@ -112,5 +112,5 @@ def test_detector_class_with_invalid_declaration_is_error(
     name: str, value: object, diagnostic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(OracleDetector, name, value)
-    with pytest.raises(RegistryError, match=rf"detectors 'oracle' \(.*:OracleDetector\): {diagnostic}"):
+    with pytest.raises(RegistryError, match=rf"detector 'oracle' \(.*:OracleDetector\): {diagnostic}"):
         build_detector(AgentSettings(detector="oracle"))
