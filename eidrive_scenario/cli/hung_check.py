@@ -36,6 +36,6 @@ class HungCheck:
 
         The report omits the file, which only the child process has.
         """
-        from eidrive_scenario.hung_runs import describe_dump
+        from eidrive_scenario.simulation.hung_runs import describe_dump
 
         print_error(describe_dump(limit, dump))

@@ -52,7 +52,7 @@ class RunFailures:
 
     def end_hung_run(self, limit: Limit, frame: FrameType | None) -> None:
         """Report an uninterruptible run that executes this frame, and end the process."""
-        from eidrive_scenario.hung_runs import describe_hung_run
+        from eidrive_scenario.simulation.hung_runs import describe_hung_run
 
         error = describe_hung_run(limit, frame)
         for note in limit.notes:
@@ -74,7 +74,7 @@ class RunFailures:
 
     def report_dump(self, limit: float, dump: str) -> None:
         """Report a run whose process ended with this dump of its stack."""
-        from eidrive_scenario.hung_runs import describe_dump
+        from eidrive_scenario.simulation.hung_runs import describe_dump
 
         error = describe_dump(limit, dump)
         (length,) = _LENGTH.unpack_from(self._shared)

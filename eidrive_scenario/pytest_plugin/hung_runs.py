@@ -91,7 +91,7 @@ def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
     file = Path(node.workerinput[_WORKER_KEY]) / node.gateway.id
     text = file.read_text(errors="replace").strip() if file.is_file() else ""
     if text.startswith("Timeout"):
-        from eidrive_scenario.hung_runs import describe_dump
+        from eidrive_scenario.simulation.hung_runs import describe_dump
 
         limit = node.config.stash[_limit] or 0.0
         notes = _Notes(file).read()
@@ -129,7 +129,7 @@ class _Reporter:
         self._file = file
 
     def __call__(self, limit: Limit, frame: FrameType | None) -> None:
-        from eidrive_scenario.hung_runs import describe_hung_run
+        from eidrive_scenario.simulation.hung_runs import describe_hung_run
 
         try:
             report = "\n".join([str(describe_hung_run(limit, frame)), *limit.notes])

@@ -10,10 +10,12 @@ from pathlib import Path
 import pytest
 from faulty_extensions import line_of, write_scenario
 
+import eidrive_scenario
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
+from eidrive_scenario.simulation.hung_runs import describe_dump
 from eidrive_scenario.wall_limit import current_limit, limit_wall_time
 
 pytestmark = pytest.mark.timeout(600)
@@ -104,3 +106,22 @@ def test_limit_that_is_not_positive_is_refused(package: Path, tmp_path: Path, se
 def test_line_of_finds_the_package_line(package: Path) -> None:
     text = (package / "faulty.py").read_text().splitlines()
     assert "sys.exit(0)" in text[line_of("sys.exit(0)") - 1]
+
+
+@pytest.mark.parametrize(
+    "module", ["simulation/simulation.py", "checks/scenario_checks.py", "checks/catalog_checks.py"]
+)
+def test_dump_of_hung_run_or_check_names_line_of_its_thread(module: str) -> None:
+    """The thread of the watchdog comes first, as faulthandler lists the newest thread first."""
+    engine = Path(eidrive_scenario.__file__).parent
+    reading = engine / "files" / "bounded.py"
+    dump = f"""Timeout (0:00:12)!
+Thread 0x00007f0000000002 (most recent call first):
+  File "/usr/lib/python3.11/threading.py", line 331 in wait
+  File "{engine / "wall_limit.py"}", line 161 in _watch
+
+Thread 0x00007f0000000001 (most recent call first):
+  File "{reading}", line 66 in read_regular_file
+  File "{engine / module}", line 30 in collect
+"""
+    assert describe_dump(6.0, dump).where == f"{reading}:66 in read_regular_file"

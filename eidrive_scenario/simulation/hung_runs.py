@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import os
 import re
 import traceback
 from collections.abc import Iterator
@@ -15,13 +16,14 @@ from pathlib import Path
 from types import FrameType
 
 from eidrive_scenario.errors import ExtensionPlace, WallLimitError
-from eidrive_scenario.registry import GROUPS, registry, singular
-from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.registry import GROUPS, Registration, registry, singular
 from eidrive_scenario.simulation.attribution import wall_limit_error
+from eidrive_scenario.simulation.simulation import Simulation
 from eidrive_scenario.wall_limit import Limit
 
-_MODULES = ("simulation.py", "scenario_checks.py", "distribution_checks.py")
-"""Modules in the stack of the thread of a run or a check, but of no other thread."""
+_ENGINE = Path(__file__).parents[1]
+_FOLDERS = tuple(f'File "{_ENGINE / package}{os.sep}' for package in ("simulation", "checks"))
+"""Packages in the stack of the thread of a run or a check, but of no other thread, as faulthandler writes their files."""
 _DUMPED = re.compile(r'^  File "(.+)", line (\d+) in (.+)$', re.MULTILINE)
 
 
@@ -37,7 +39,7 @@ def describe_hung_run(limit: Limit, frame: FrameType | None) -> WallLimitError:
 def describe_dump(limit: float, dump: str) -> WallLimitError:
     """Return the error of a run or check that ended with a dump of its stack by faulthandler."""
     threads = re.split(r"^(?:Current thread|Thread) .*$", dump, flags=re.MULTILINE)
-    of_run = next((text for text in threads if any(module in text for module in _MODULES)), dump)
+    of_run = next((text for text in threads if any(folder in text for folder in _FOLDERS)), dump)
     calls = [(file, int(line), function) for file, line, function in _DUMPED.findall(of_run)]
     for file, line, function in calls:
         for kind, name, value in _extensions_at(file, line):
@@ -47,7 +49,7 @@ def describe_dump(limit: float, dump: str) -> WallLimitError:
     return WallLimitError(limit, where=where)
 
 
-def _extensions_at(file: str, line: int) -> Iterator[tuple[str, str, str]]:
+def _extensions_at(file: str, line: int) -> Iterator[Registration]:
     """Yield third-party extensions whose class contains a line; if there is none, those of the module."""
     of_module = []
     for group in GROUPS:
@@ -57,7 +59,7 @@ def _extensions_at(file: str, line: int) -> Iterator[tuple[str, str, str]]:
             module, _, attribute = value.partition(":")
             if _file_of(module) != file:
                 continue
-            of_module.append((singular(group), name, value))
+            of_module.append(Registration(singular(group), name, value))
             if line in _lines_of(file).get(attribute.strip(), range(0)):
                 yield of_module[-1]
     yield from of_module
