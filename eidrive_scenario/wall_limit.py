@@ -84,12 +84,6 @@ def set_last_resort(resort: LastResort | None) -> LastResort | None:
     return before
 
 
-def check_wall_limit(seconds: float | None, origin: str = "wall_limit") -> None:
-    """Raise SettingError unless the limit is None or a positive number of seconds."""
-    if seconds is not None and not 0.0 < seconds < math.inf:
-        raise SettingError(Diagnostic(f"{origin} is {seconds}", "give a positive number of seconds"))
-
-
 @contextmanager
 def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
     """Limit the wall time of the block [s]. None sets no limit, and an outer limit of the thread stays in force.
@@ -97,7 +91,8 @@ def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
     Raise WallLimitError when the limit is reached, and SettingError for a limit that is not positive. Outside of the
     main thread, a waiting system call is not interrupted before it returns.
     """
-    check_wall_limit(seconds)
+    if seconds is not None and not 0.0 < seconds < math.inf:
+        raise SettingError(Diagnostic(f"wall_limit is {seconds}", "give a positive number of seconds"))
     if seconds is None or current_limit() is not None:
         yield current_limit()
         return

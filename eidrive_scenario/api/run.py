@@ -5,23 +5,13 @@ Stable: all names.
 
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
+from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, PASSED
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, read_recording
 from eidrive_scenario.recording.text.csv_writer import text_of_csv
-from eidrive_scenario.simulation import (
-    ABORTED,
-    FAILED,
-    INVALID_INPUT,
-    PASSED,
-    Observer,
-    RunResult,
-    RunSettings,
-    Simulation,
-    load_for_seed,
-    run_file,
-)
+from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed, run_file
 from eidrive_scenario.wall_limit import limit_wall_time
 
 __all__ = [

@@ -10,11 +10,12 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.check import check
-from eidrive_scenario.cli.error_output import ABORTED, Guarded, print_error
+from eidrive_scenario.cli.error_output import Guarded, print_error
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
 from eidrive_scenario.cli.streams import make_writable
 from eidrive_scenario.cli.supervision import allow
+from eidrive_scenario.exit_codes import ABORTED
 
 app = typer.Typer(
     name="eidrive",

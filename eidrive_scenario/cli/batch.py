@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import typer
 
-from eidrive_scenario.cli.error_output import INVALID_INPUT
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
+from eidrive_scenario.exit_codes import INVALID_INPUT
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution
 
 RunSeeds = Callable[[ConcreteRun], Sequence[int]]
@@ -37,7 +37,7 @@ def run_distribution(
     counts = {"passed": 0, "not passed": 0, "excluded by constraints": 0}
     code = 0
     last: ConstraintError | None = None
-    for run in _runs(expansion, numbers):
+    for run in (expansion[number] for number in numbers):
         try:
             codes = run_seeds(run)
         except ConstraintError as error:
@@ -60,10 +60,6 @@ def run_distribution(
     summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
     typer.echo(f"{repeat * len(expansion)} runs in {path}: {summary}", err=True)
     return code
-
-
-def _runs(expansion: DistributionExpansion, numbers: Sequence[int]) -> Iterator[ConcreteRun]:
-    return (expansion[number] for number in numbers)
 
 
 def _check_not_varied(expansion: DistributionExpansion, parameters: Mapping[str, object]) -> None:

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.error_output import ABORTED, INVALID_INPUT, print_error
+from eidrive_scenario.cli.error_output import print_error
 from eidrive_scenario.cli.hung_check import HungCheck
+from eidrive_scenario.cli.option_values import check_seconds
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 from eidrive_scenario.library import definition, resolve_scenario
-from eidrive_scenario.wall_limit import LimitReached, check_wall_limit, limit_wall_time
+from eidrive_scenario.wall_limit import LimitReached, limit_wall_time
 
 if TYPE_CHECKING:
     from eidrive_scenario.checks.report import CheckReport
@@ -44,7 +46,7 @@ def check(
 
     hung = HungCheck()
     if wall_limit is not None:
-        check_wall_limit(wall_limit, "--wall-limit")
+        check_seconds("--wall-limit", wall_limit)
         supervise(hung.end, partial(hung.report_dump, wall_limit), "check")
     missing: list[Diagnostic] = []
     aborted: list[BaseException] = []

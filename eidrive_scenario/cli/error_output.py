@@ -11,8 +11,8 @@ import typer
 from typer.core import TyperGroup
 
 from eidrive_scenario.errors import EidriveError, ExtensionError, InputError
+from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 
-INVALID_INPUT, ABORTED = 2, 3
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
 """Exit codes of shells: 128 + SIGINT, 128 + SIGPIPE."""
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.cli.error_output import ABORTED, print_error
+from eidrive_scenario.cli.error_output import print_error
+from eidrive_scenario.exit_codes import ABORTED
 
 if TYPE_CHECKING:
     from eidrive_scenario.wall_limit import Limit

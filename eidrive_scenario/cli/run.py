@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.error_output import ABORTED
+from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
 from eidrive_scenario.cli.streams import has_all_characters
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError
-
-PRINTED = "-"
-"""Value of a file option that selects standard output."""
+from eidrive_scenario.exit_codes import ABORTED
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
@@ -97,26 +95,30 @@ def run(
     from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.recording import Explanation
+    from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
     from eidrive_scenario.simulation import RunSettings
 
-    if json and log == PRINTED:
+    if json and log == STANDARD_OUTPUT:
         raise SettingError(Diagnostic("--log - and --json both write to standard output", "give a file to --log"))
 
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
+    for option, seconds in (("--dt", dt), ("--time-limit", time_limit), ("--wall-limit", wall_limit)):
+        if seconds is not None:
+            check_seconds(option, seconds)
     if wall_limit is not None:
-        report = partial(failures.report_dump, _positive("--wall-limit", wall_limit))
+        report = partial(failures.report_dump, wall_limit)
         supervise(failures.end_hung_run, report, publish=failures.share)
-    parameters = _parse_assignments("--param", param or [])
+    parameters = parse_assignments("--param", param or [])
     settings = RunSettings(
         channel=channel,
         detector=detector,
-        cooperate=_senders(cooperate),
+        cooperate=parse_senders(cooperate),
         weather=weather,
         parameters=parameters,
-        user_values=_parse_assignments("--user-value", user_value or []),
-        controllers=_parse_assignments("--controller", controller or []),
-        dt=_positive("--dt", dt),
-        time_limit=_positive("--time-limit", time_limit),
+        user_values=parse_assignments("--user-value", user_value or []),
+        controllers=parse_assignments("--controller", controller or []),
+        dt=dt,
+        time_limit=time_limit,
         allow_torchscript=allow_torchscript,
     )
 
@@ -135,7 +137,7 @@ def run(
                     below=out,
                     record=not no_record,
                     csv=_with_suffixes(csv, suffixes) if csv is not None else None,
-                    log=_with_suffixes(Path(log), suffixes) if log is not None and log != PRINTED else log,
+                    log=_with_suffixes(Path(log), suffixes) if log is not None and log != STANDARD_OUTPUT else log,
                     explanations=explanations,
                     wall_limit=wall_limit,
                 )
@@ -160,7 +162,7 @@ def run(
         return codes
 
     path = resolve_scenario(scenario)
-    check_output_paths({"--csv": csv, "--log": None if log == PRINTED else log}, (path, channel, weather))
+    check_output_paths({"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}, (path, channel, weather))
     if definition(path) == "distribution":
         raise typer.Exit(
             run_distribution(path, run_seeds, seed=seed, repeat=repeat, max_runs=max_runs, parameters=parameters)
@@ -177,28 +179,3 @@ def _with_suffixes(path: Path, suffixes: list[str]) -> Path:
     if not suffixes or (path.exists() and not path.is_file()):
         return path
     return path.with_stem("-".join([path.stem, *suffixes]))
-
-
-def _senders(text: str | None) -> tuple[str, ...] | None:
-    if text is None:
-        return None
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    if not names:
-        raise SettingError(Diagnostic(f"--cooperate: no station is listed (got {text!r}; expected A,B or none)"))
-    return () if names == ("none",) else names
-
-
-def _parse_assignments(option: str, assignments: list[str]) -> dict[str, str]:
-    values: dict[str, str] = {}
-    for assignment in assignments:
-        name, equals, value = assignment.partition("=")
-        if not equals or not name:
-            raise SettingError(Diagnostic(f"{option}: no value is assigned (got {assignment!r}; expected NAME=VALUE)"))
-        values[name] = value
-    return values
-
-
-def _positive(option: str, value: float) -> float:
-    if not 0 < value < float("inf"):
-        raise SettingError(Diagnostic(f"{option}: not a positive number of seconds (got {value})"))
-    return value

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from eidrive_scenario.cli.error_output import ABORTED, print_error, show_traceback
+from eidrive_scenario.cli.error_output import print_error, show_traceback
 from eidrive_scenario.cli.streams import has_all_characters
 from eidrive_scenario.errors import EidriveError, SimulationError
+from eidrive_scenario.exit_codes import ABORTED
 
 if TYPE_CHECKING:
     from eidrive_scenario.wall_limit import Limit

@@ -5,12 +5,11 @@ from __future__ import annotations
 from rich.text import Text
 from rich.tree import Tree
 
+from eidrive_scenario.recording.text.run_log import describe_kind
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.elements import ManeuverGroupElement, StoryElement
 from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement
-
-_KINDS = {"maneuverGroup": "maneuver group"}
 
 
 def storyboard_tree(storyboard: Storyboard) -> Tree:
@@ -25,7 +24,7 @@ def storyboard_tree(storyboard: Storyboard) -> Tree:
 
 def _add(branch: Tree, element: StoryElement) -> None:
     name = "" if element.kind == "storyboard" else element.name
-    node = branch.add(_heading(_KINDS.get(element.kind, element.kind), name, _remarks(element)))
+    node = branch.add(_heading(describe_kind(element.kind), name, _remarks(element)))
     for verb, leaf in (("starts", element.start_leaf), ("stops", element.stop_leaf)):
         if leaf is not None:
             node.add(Text.assemble((f"{verb} when ", "cyan"), leaf.trigger.describe() or "criteria end the run"))

@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 import typer
 
-from eidrive_scenario.cli.error_output import ABORTED
+from eidrive_scenario.exit_codes import ABORTED
 from eidrive_scenario.files.bounded import file_in_memory
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 

@@ -10,8 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from eidrive_scenario.evaluation import Verdict
+from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
 from eidrive_scenario.experiments.reproduction import reproduction_lines
-from eidrive_scenario.simulation import ABORTED, FAILED, PASSED, RunResult
+from eidrive_scenario.simulation import RunResult
 
 _OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("time limit", "bold red")}
 

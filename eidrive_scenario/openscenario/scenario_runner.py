@@ -1,4 +1,4 @@
-"""Criteria of files for ScenarioRunner: ParameterConditions named `criteria_…` in the stop trigger of the storyboard."""
+"""Criteria of ScenarioRunner: ParameterConditions named `criteria_…` in the stop trigger of the storyboard."""
 
 from __future__ import annotations
 

@@ -19,11 +19,11 @@ from typing import IO, Any
 
 import pytest
 
+from eidrive_scenario.exit_codes import ABORTED
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 USUAL_LIMIT = 1800.0
 """Default of the ini option `eidrive_wall_limit` [s]."""
-_ABORTED = 3
 _NO_LIMIT = "none"
 _WORKER_KEY = "eidrive_hung_runs"
 _reports = pytest.StashKey[Path]()
@@ -136,7 +136,7 @@ class _Reporter:
             self._file.write(f"{report}\n".encode(errors="replace"))
             sys.stdout.flush()
         finally:
-            os._exit(_ABORTED)
+            os._exit(ABORTED)
 
 
 def _given_limit(config: pytest.Config) -> float | None:

@@ -23,7 +23,7 @@ from eidrive_scenario.wall_limit import Limit
 
 _ENGINE = Path(__file__).parents[1]
 _FOLDERS = tuple(f'File "{_ENGINE / package}{os.sep}' for package in ("simulation", "checks"))
-"""Packages in the stack of the thread of a run or a check, but of no other thread, as faulthandler writes their files."""
+"""Beginnings of lines of faulthandler that only the thread of a run or a check has: files of these packages."""
 _DUMPED = re.compile(r'^  File "(.+)", line (\d+) in (.+)$', re.MULTILINE)
 
 

@@ -20,9 +20,6 @@ from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.simulation.result_views import result_html, result_row
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
-PASSED, FAILED, INVALID_INPUT, ABORTED = range(4)
-"""Exit codes of a run."""
-
 DEFAULT_SEED = 1
 """Seed of a run for which none is given, in Python, in pytest and on the command line."""
 

@@ -38,13 +38,13 @@ def test_invalid_extension_is_reported_by_name(value: str, message: str) -> None
 
 def test_duplicate_name_raises_with_both_modules() -> None:
     points = [EntryPoint("mine", value, GROUP) for value in ("one:Thing", "two:Thing")]
-    with pytest.raises(RegistryError, match="^criterion 'mine' is registered twice: one:Thing and two:Thing"):
+    with pytest.raises(RegistryError, match=r"^criterion 'mine' is registered twice: one:Thing and two:Thing"):
         Registry("criteria", points)
     assert list(Registry("criteria", points[:1] * 2)) == ["mine"], "one package found twice is no clash"
 
 
 def test_unknown_name_suggests_the_nearest() -> None:
-    with pytest.raises(SettingError, match="^unknown criterion 'colision'; did you mean 'collision'"):
+    with pytest.raises(SettingError, match=r"^unknown criterion 'colision'; did you mean 'collision'\?"):
         registry_of(collision="eidrive_criteria.collision:Collision").load("colision")
 
 

@@ -8,9 +8,10 @@ from html.parser import HTMLParser
 import pytest
 
 from eidrive_scenario.evaluation import Verdict
+from eidrive_scenario.exit_codes import FAILED
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.simulation.result_views import typed
-from eidrive_scenario.simulation.run import FAILED, RunResult
+from eidrive_scenario.simulation.run import RunResult
 
 PROFILE = {"model": "composed", "delay": {"kind": "trace", "seconds": [0.1, 0.2]}, "own_perception": False}
 RESULT = RunResult(

@@ -14,7 +14,6 @@ from eidrive_scenario.storyboard.state.states import ElementState, ElementTransi
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
 
 STANDARD_OUTPUT = "-"
-_KINDS = {"maneuverGroup": "maneuver group"}
 _VERBS = {
     ElementTransition.START: "starts",
     ElementTransition.END: "ends",
@@ -60,7 +59,7 @@ class RunLog:
             self._stream.flush()
 
     def _title(self, change: StateChange) -> str:
-        kind = _KINDS.get(change.kind, change.kind)
+        kind = describe_kind(change.kind)
         if change.path == change.kind:
             return kind
         key = (change.kind, change.element)
@@ -70,6 +69,11 @@ class RunLog:
         suffix = f" (in {parent})" if parent and (key not in self._mentioned or key in self._ambiguous) else ""
         self._mentioned.add(key)
         return f"{kind} {change.element}{suffix}"
+
+
+def describe_kind(kind: str) -> str:
+    """Return the words for the kind of a storyboard element, such as `maneuver group` for `maneuverGroup`."""
+    return "maneuver group" if kind == "maneuverGroup" else kind
 
 
 def describe_change(change: StateChange) -> str:

@@ -24,9 +24,7 @@ _UNITS = {"count": "", "impact_speed": "m/s"}
 """Units that differ from the unit of the criterion, by the last part of the name of the metric."""
 
 
-def write_report(
-    results: Iterable[Mapping[str, Any] | ReportedRun], out: Path, *, omitted: Sequence[str] = ()
-) -> Path:
+def write_report(results: Iterable[Mapping[str, Any] | ReportedRun], out: Path, *, omitted: Sequence[str] = ()) -> Path:
     """Write a page about results in the format of `--json`, and return its path.
 
     out      file of the page if it ends in `.html`, else the folder of `report.html`

@@ -107,6 +107,8 @@ def test_run_beyond_time_limit_ends_with_exit_code_3(eidrive: Eidrive, passing_b
         (["{file}", "--controller", "ALKSController=alk"], "unknown controller model 'alk'; did you mean 'alks'?"),
         (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
         (["{file}", "--dt", "0"], "--dt: not a positive number of seconds (got 0.0)"),
+        (["{file}", "--time-limit", "-1"], "--time-limit: not a positive number of seconds (got -1.0)"),
+        (["{file}", "--wall-limit", "nan"], "--wall-limit: not a positive number of seconds (got nan)"),
     ],
 )
 def test_run_with_invalid_argument_ends_with_exit_code_2(
