@@ -6,7 +6,7 @@ Stable: `ActionBehaviour`, `Condition` and its subclasses, `ControllerModel`, th
 
 from eidrive_scenario import traffic
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.trajectory_times import has_times
+from eidrive_scenario.openscenario.trajectory_times import TIME_ATTRIBUTES, has_times
 from eidrive_scenario.requests import Goal, Override
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import (
@@ -53,6 +53,7 @@ from eidrive_scenario.world.physics.multi_axle import turning_wheelbase
 
 __all__ = [
     "STEEPEST",
+    "TIME_ATTRIBUTES",
     "ActionBehaviour",
     "ActionContext",
     "Actor",

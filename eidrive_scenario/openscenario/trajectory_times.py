@@ -1,10 +1,18 @@
-"""Check whether a trajectory has times."""
+"""Times of trajectories."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.openscenario.model import Clothoid, ClothoidSpline, Element, Nurbs, Polyline
+
+TIME_ATTRIBUTES: Mapping[type[Element], str] = {
+    Polyline: "the time of each vertex",
+    Clothoid: "startTime and stopTime",
+    ClothoidSpline: "timeEnd",
+    Nurbs: "the time of each control point",
+}
+"""Attributes of a shape that specify its times."""
 
 
 def has_times(shape: Element) -> bool:

@@ -260,7 +260,7 @@ def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Run
             assert x == pytest.approx(110.0 + 20.0 * (frame.view.time - start), abs=1e-6)
     (warning,) = [text for text in warnings if "no times for Timing to scale" in text]
     assert "scene.xosc:" in warning
-    assert warning.endswith("specify a time for each vertex, or <None/> as the TimeReference")
+    assert warning.endswith("specify the time of each vertex, or <None/> as the TimeReference")
 
 
 def test_trajectory_without_timing_holds_the_lateral_domain_only(scene: RunScene) -> None:

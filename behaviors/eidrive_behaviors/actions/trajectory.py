@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
 from eidrive_scenario.api.actions import (
+    TIME_ATTRIBUTES,
     ActionBehaviour,
     ActionContext,
     Domain,
@@ -28,13 +29,6 @@ from eidrive_scenario.api.common import EPSILON, Pose, wrap_angle
 
 TELEPORT_DISTANCE = 1.0
 """Minimum distance to the start on the trajectory at which an actor is teleported there [m]."""
-TIME_ATTRIBUTES = {
-    "polyline": "a time for each vertex",
-    "clothoid": "startTime and stopTime",
-    "clothoid_spline": "timeEnd",
-    "nurbs": "a time for each control point",
-}
-"""Required time attributes, per shape."""
 
 
 class FollowTrajectoryAction(ActionBehaviour):
@@ -71,11 +65,11 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._followed: TrajectoryProgress | None = None
         self._trajectory = self._resolve_trajectory()
         self._timing = action.time_reference.timing
-        if self._timing is not None and not has_times(self._trajectory.shape.chosen()):
+        shape = self._trajectory.shape.chosen()
+        if self._timing is not None and not has_times(shape):
             self._timing = None
-            shape = next(name for name in TIME_ATTRIBUTES if getattr(self._trajectory.shape, name) is not None)
             what = "the actor keeps its own speed: the trajectory has no times for Timing to scale"
-            hint = f"specify {TIME_ATTRIBUTES[shape]}, or <None/> as the TimeReference"
+            hint = f"specify {TIME_ATTRIBUTES[type(shape)]}, or <None/> as the TimeReference"
             context.warn(*self.error(what, hint).diagnostics)
 
     @property

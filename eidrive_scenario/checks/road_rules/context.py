@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.checks.scenario_rules import LintContext
+from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Position

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from eidrive_scenario.checks.road_rules.context import RoadLintContext
-from eidrive_scenario.checks.scenario_rules import at
+from eidrive_scenario.checks.rule import at
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.openscenario.model import (
     AssignRouteAction,
@@ -15,7 +15,6 @@ from eidrive_scenario.openscenario.model import (
     Route,
     RouteRef,
     Trajectory,
-    TrajectoryRef,
     Vehicle,
 )
 from eidrive_scenario.roads import Pose
@@ -41,7 +40,7 @@ def trajectories_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     for action, actors in context.performances:
         for element in action.walk():
             if isinstance(element, FollowTrajectoryAction) and _vehicles(context, actors):
-                trajectory = _trajectory(context, element.trajectory_ref or element)
+                trajectory = context.trajectory(element)
                 curve = _curve(context, trajectory) if trajectory is not None else None
                 if trajectory is not None and curve is not None:
                     yield from _departure(context, element, trajectory, curve)
@@ -82,13 +81,6 @@ def _curve(context: RoadLintContext, trajectory: Trajectory) -> TrajectoryCurve 
         return sample_trajectory(trajectory, pose)
     except (_RelativePosition, InputError, ValueError, ZeroDivisionError):
         return None
-
-
-def _trajectory(context: RoadLintContext, holder: TrajectoryRef | FollowTrajectoryAction) -> Trajectory | None:
-    if holder.trajectory is not None or holder.catalog_reference is None:
-        return holder.trajectory
-    entry = context.scenario.entries.get(holder.catalog_reference)
-    return entry if isinstance(entry, Trajectory) else None
 
 
 def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eidrive_scenario.checks.road_rules.context import RoadLintContext
-from eidrive_scenario.checks.scenario_rules import at
+from eidrive_scenario.checks.rule import at
 from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario.model import (
     LaneChangeAction,

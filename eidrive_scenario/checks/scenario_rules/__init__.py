@@ -5,7 +5,7 @@ docs/checks.md describes each rule with an example that violates it and the corr
 
 from __future__ import annotations
 
-from eidrive_scenario.checks.rule import Level, Rule, at
+from eidrive_scenario.checks.rule import Level, Rule
 from eidrive_scenario.checks.scenario_rules import actions, counterparts, declarations, entities, triggers
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.truth_intervals import (
@@ -64,5 +64,3 @@ RULES: tuple[Rule[LintContext], ...] = (
     Rule("unused-catalog", Level.NOTE, "a catalog location without references", declarations.unused_catalogs),
 )
 """Rules that need only the file and its catalogs."""
-
-__all__ = ["RULES", "Level", "LintContext", "Rule", "at"]

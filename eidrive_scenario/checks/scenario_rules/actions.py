@@ -13,8 +13,6 @@ from eidrive_scenario.openscenario.model import (
     AbsoluteSpeed,
     AbsoluteTargetSpeed,
     Action,
-    Clothoid,
-    ClothoidSpline,
     Element,
     Event,
     FollowTrajectoryAction,
@@ -22,17 +20,16 @@ from eidrive_scenario.openscenario.model import (
     LaneOffsetAction,
     LateralDistanceAction,
     LongitudinalDistanceAction,
-    Nurbs,
     Polyline,
     SpeedAction,
     SpeedProfileAction,
     SpeedProfileEntry,
     SynchronizeAction,
-    Trajectory,
     TransitionDynamics,
     Vehicle,
 )
-from eidrive_scenario.openscenario.trajectory_times import has_times
+from eidrive_scenario.openscenario.trajectory_times import TIME_ATTRIBUTES, has_times
+from eidrive_scenario.tolerances import EPSILON
 
 _DOMAINS: Mapping[type[Element], str] = {
     SpeedAction: "longitudinal",
@@ -45,13 +42,6 @@ _DOMAINS: Mapping[type[Element], str] = {
     FollowTrajectoryAction: "lateral",
 }
 """Control domain of each action with a duration (ASAM OpenSCENARIO XML, control strategies)."""
-
-TIME_ATTRIBUTES: Mapping[type[Element], str] = {
-    Clothoid: "startTime and stopTime",
-    ClothoidSpline: "timeEnd",
-    Nurbs: "the time of each control point",
-}
-"""Attributes of a shape that specify its times."""
 
 
 def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
@@ -101,7 +91,7 @@ def speeds_above_max(context: LintContext) -> Iterator[Diagnostic]:
             for name in actors:
                 entity = context.scenario.entities.get(name)
                 limit = entity.performance.max_speed if isinstance(entity, Vehicle) else None
-                if limit is not None and abs(speed) > limit + 1e-9:
+                if limit is not None and abs(speed) > limit + EPSILON:
                     yield at(
                         element,
                         f"speed {speed:g} m/s of {name!r} exceeds its maxSpeed of {limit:g} m/s",
@@ -127,7 +117,7 @@ def untimed_trajectories(context: LintContext) -> Iterator[Diagnostic]:
     for element in context.elements:
         if not isinstance(element, FollowTrajectoryAction) or element.time_reference.timing is None:
             continue
-        trajectory = _trajectory(element, context)
+        trajectory = context.trajectory(element)
         shape = trajectory.shape.chosen() if trajectory is not None else None
         if isinstance(shape, Polyline):
             yield from _times(shape)
@@ -142,15 +132,7 @@ def _times(shape: Polyline) -> Iterator[Diagnostic]:
     for vertex in shape.vertex:
         if vertex.time is None:
             message = "Timing has no effect: this vertex has no time, so the actor keeps its speed"
-            yield at(vertex, message, "specify the time of each vertex")
+            yield at(vertex, message, f"specify {TIME_ATTRIBUTES[Polyline]}")
     known = [vertex.time for vertex in shape.vertex if vertex.time is not None]
     if len(known) == len(shape.vertex) and all(time == known[0] for time in known):
         yield at(shape, f"all vertices have the time {known[0]:g} s", "specify when each vertex is passed")
-
-
-def _trajectory(action: FollowTrajectoryAction, context: LintContext) -> Trajectory | None:
-    holder = action.trajectory_ref or action
-    if holder.trajectory is not None or holder.catalog_reference is None:
-        return holder.trajectory
-    entry = context.scenario.entries.get(holder.catalog_reference)
-    return entry if isinstance(entry, Trajectory) else None

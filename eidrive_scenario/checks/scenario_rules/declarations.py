@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import cast
@@ -12,11 +11,11 @@ from lxml import etree
 
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
+from eidrive_scenario.checks.scenario_rules.outline import WORD
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.files.bounded import absolute
 from eidrive_scenario.openscenario.catalogs import catalog_place
 from eidrive_scenario.openscenario.model import (
-    CustomCommandAction,
     EntitySelection,
     MonitorDeclaration,
     ParameterAction,
@@ -24,8 +23,6 @@ from eidrive_scenario.openscenario.model import (
     VariableDeclaration,
 )
 from eidrive_scenario.openscenario.values.parameters import REFERENCE
-
-_WORD = re.compile(r"\w+")
 
 
 def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:
@@ -60,7 +57,7 @@ def _used(root: etree._Element) -> set[str]:
             if "$" in value:
                 used.update(REFERENCE.findall(value))
         if node.text and not node.text.isspace():
-            used.update(_WORD.findall(node.text))
+            used.update(WORD.findall(node.text))
     return used
 
 
@@ -78,7 +75,7 @@ def ineffective_parameter_actions(context: LintContext) -> Iterator[Diagnostic]:
 
 def unused_variables(context: LintContext) -> Iterator[Diagnostic]:
     """Yield variables without a reference."""
-    referenced = context.referenced.get("variable", set()) | _words_of_commands(context)
+    referenced = context.referenced.get("variable", set()) | context.command_words
     for element in context.elements:
         if isinstance(element, VariableDeclaration) and element.name not in referenced:
             yield at(element, f"variable {element.name!r} is never used", "remove it")
@@ -94,7 +91,7 @@ def unused_monitors(context: LintContext) -> Iterator[Diagnostic]:
 
 def unused_selections(context: LintContext) -> Iterator[Diagnostic]:
     """Yield entity selections without a reference."""
-    referenced = context.referenced.get("entity", set()) | _words_of_commands(context)
+    referenced = context.referenced.get("entity", set()) | context.command_words
     for element in context.elements:
         if isinstance(element, EntitySelection) and element.name not in referenced:
             yield at(element, f"selection {element.name!r} is never used", "remove it")
@@ -116,9 +113,3 @@ def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:
         if not any(file == place or file.parent == place for file in used):
             missing = "" if os.path.exists(place) else ", which does not exist"
             yield at(location, f"no entry of the {kind} {directory.path!r} is used{missing}", "remove it")
-
-
-def _words_of_commands(context: LintContext) -> set[str]:
-    """Return all words in custom commands, as their executors may use names in them."""
-    texts = [one.content for one in context.elements if isinstance(one, CustomCommandAction)]
-    return {word for text in texts for word in _WORD.findall(text)}

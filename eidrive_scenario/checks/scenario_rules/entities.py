@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 from eidrive_scenario.checks.rule import at
@@ -11,7 +10,6 @@ from eidrive_scenario.checks.scenario_rules.outline import Node
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.model import (
     Action,
-    CustomCommandAction,
     Event,
     LateralDistanceAction,
     LongitudinalDistanceAction,
@@ -21,8 +19,6 @@ from eidrive_scenario.openscenario.model import (
     Vehicle,
 )
 from eidrive_scenario.openscenario.validation.scenario_objects import scenario_objects
-
-_WORD = re.compile(r"\w+")
 
 
 def _objects(context: LintContext) -> Iterator[ScenarioObject]:
@@ -35,8 +31,7 @@ def _objects(context: LintContext) -> Iterator[ScenarioObject]:
 
 def _referenced_entities(context: LintContext) -> set[str]:
     names = {one for name in context.referenced.get("entity", set()) for one in context.members(name)}
-    commands = [one.content for one in context.elements if isinstance(one, CustomCommandAction)]
-    return names | {word for text in commands for word in _WORD.findall(text)}
+    return names | context.command_words
 
 
 def unused_entities(context: LintContext) -> Iterator[Diagnostic]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 from lxml import etree
@@ -14,6 +15,7 @@ from eidrive_scenario.openscenario.model import (
     Action,
     AddEntityAction,
     CatalogReference,
+    CustomCommandAction,
     Element,
     EntityAction,
     Event,
@@ -26,6 +28,7 @@ from eidrive_scenario.openscenario.model import (
     StoryboardElementType,
     TeleportAction,
     Trailer,
+    Trajectory,
     Trigger,
     Vehicle,
 )
@@ -35,6 +38,8 @@ from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.openscenario.validation.storyboard_names import LEVELS, ReferenceMatch
 
+WORD = re.compile(r"\w+")
+"""Pattern of words that may be names of parameters, variables or entities in the text of a command."""
 _OBJECT_TYPES = {"vehicle": Vehicle, "pedestrian": Pedestrian, "miscellaneous": MiscObject}
 
 
@@ -136,6 +141,14 @@ class Outline:
         names = [name for ref in (group.actors.entity_ref if group else ()) for name in self.members(ref.entity_ref)]
         return tuple(dict.fromkeys(names))
 
+    def trajectory(self, action: FollowTrajectoryAction) -> Trajectory | None:
+        """Return the trajectory of an action, also from a catalog; None if the entry is of another kind."""
+        holder = action.trajectory_ref or action
+        if holder.trajectory is not None or holder.catalog_reference is None:
+            return holder.trajectory
+        entry = self.scenario.entries.get(holder.catalog_reference)
+        return entry if isinstance(entry, Trajectory) else None
+
     @cached_property
     def elements(self) -> tuple[Element, ...]:
         """Return all elements of the file and of the catalog entries that it uses."""
@@ -212,6 +225,12 @@ class Outline:
         return found
 
     @cached_property
+    def command_words(self) -> frozenset[str]:
+        """Return all words in custom commands, as their executors may use names in them."""
+        texts = [element.content for element in self.elements if isinstance(element, CustomCommandAction)]
+        return frozenset(word for text in texts for word in WORD.findall(text))
+
+    @cached_property
     def files(self) -> tuple[etree._Element, ...]:
         """Return the XML of the scenario with unresolved parameters, then of its catalogs; () without a text."""
         scenario = self.scenario.path or self.scenario.text
@@ -226,18 +245,13 @@ def _places(action: PrivateAction) -> bool:
     return any(isinstance(below, TeleportAction | FollowTrajectoryAction) for below in action.walk())
 
 
-def _reference_fields(cls: type[Element]) -> Sequence[tuple[str, str]]:
+@cache
+def _reference_fields(cls: type[Element]) -> tuple[tuple[str, str], ...]:
     """Return the kinds to which attributes of a class refer in any version, and the names of their fields."""
-    known = _REFERENCE_FIELDS.get(cls)
-    if known is None:
-        pairs = [
-            (rule.points_to, rule.field)
-            for version in VERSIONS
-            for rule in rules(cls, version).attributes.values()
-            if rule.points_to
-        ]
-        known = _REFERENCE_FIELDS[cls] = tuple(dict.fromkeys(pairs))
-    return known
-
-
-_REFERENCE_FIELDS: dict[type[Element], tuple[tuple[str, str], ...]] = {}
+    pairs = [
+        (rule.points_to, rule.field)
+        for version in VERSIONS
+        for rule in rules(cls, version).attributes.values()
+        if rule.points_to
+    ]
+    return tuple(dict.fromkeys(pairs))

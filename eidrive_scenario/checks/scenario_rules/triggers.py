@@ -16,6 +16,7 @@ from eidrive_scenario.checks.scenario_rules.truth_intervals import (
 )
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.model import Condition, ConditionEdge, Rule, SimulationTimeCondition
+from eidrive_scenario.storyboard.context.condition import describe_rule
 
 _HINTS = {
     UNOBSERVED_EDGE: 'an edge requires a change between two evaluations; write conditionEdge="none"',
@@ -114,7 +115,7 @@ def _consequence(trigger: TriggerAnalysis) -> str:
 def _describe_condition(condition: Condition) -> str:
     time = _time(condition)
     if time is not None:
-        return f"simulation time {_SIGNS[time.rule]} {time.value:g} s"
+        return f"simulation time {describe_rule(time.rule)} {time.value:g} s"
     return f"condition {condition.name!r}"
 
 
@@ -131,12 +132,3 @@ def _time(condition: Condition) -> SimulationTimeCondition | None:
     by_value = condition.by_value_condition
     return by_value.simulation_time_condition if by_value is not None else None
 
-
-_SIGNS = {
-    Rule.GREATER_THAN: ">",
-    Rule.GREATER_OR_EQUAL: "≥",
-    Rule.LESS_THAN: "<",
-    Rule.LESS_OR_EQUAL: "≤",
-    Rule.EQUAL_TO: "=",
-    Rule.NOT_EQUAL_TO: "≠",
-}

@@ -8,7 +8,7 @@ import pytest
 from lxml import etree
 
 from eidrive_scenario.checks.registry import ALL_RULES, run_rules
-from eidrive_scenario.checks.scenario_rules import Level
+from eidrive_scenario.checks.rule import Level
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.openscenario import load_scenario
 

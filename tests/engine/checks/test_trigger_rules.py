@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from eidrive_scenario.checks.scenario_rules import RULES, LintContext
+from eidrive_scenario.checks.scenario_rules import RULES
+from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.openscenario import load_scenario
 
 PLACE = """<Private entityRef="Ego"><PrivateAction><TeleportAction><Position><WorldPosition x="0" y="0"/></Position>
