@@ -20,6 +20,8 @@ _MAX_ELEMENTS = 100_000
 
 LIBRARY_FOLDER = "eidrive_library"
 """First part of the paths with which scenario files in any folder refer to the library."""
+CATALOGS = "catalogs"
+"""Folder of the catalogs in the library."""
 
 
 def library_path() -> Path:

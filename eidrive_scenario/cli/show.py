@@ -60,8 +60,8 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
 
 def _catalog_lines() -> list[str]:
     """Return one line per entry, and two lines about references from scenarios."""
-    from eidrive_scenario.library import LIBRARY_FOLDER, library_path
-    from eidrive_scenario.openscenario.library_catalogs import CATALOGS, library_catalog_entries
+    from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path
+    from eidrive_scenario.openscenario.library_catalogs import library_catalog_entries
 
     rows = [("CATALOG", "ENTRY", "KIND", "LENGTH x WIDTH x HEIGHT", "MASS")]
     for entry in library_catalog_entries():

@@ -11,7 +11,7 @@ from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.library import LIBRARY_FOLDER, library_path, place_of
+from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path, place_of
 from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
@@ -267,8 +267,8 @@ def _missing_catalog(name: str, places: Iterable[Path], known: set[str]) -> tupl
     message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(place), 300) for place in places)
     if missing:
         hint = "correct the Directory"
-        if is_regular_file(library_path() / "catalogs" / f"{name}.xosc"):
-            hint += f"; that of the library is {LIBRARY_FOLDER}/catalogs"
+        if is_regular_file(library_path() / CATALOGS / f"{name}.xosc"):
+            hint += f"; that of the library is {LIBRARY_FOLDER}/{CATALOGS}"
         return f"{message}; {', '.join(missing)} {'does' if len(missing) == 1 else 'do'} not exist", hint
     return message, suggestion(name, known)
 

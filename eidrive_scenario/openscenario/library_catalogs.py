@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from eidrive_scenario.library import library_path
+from eidrive_scenario.library import CATALOGS, library_path
 from eidrive_scenario.openscenario.model import Element, MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.reading.document import read_document
-
-CATALOGS = "catalogs"
-"""Folder of the catalogs in the library."""
 
 
 @dataclass(frozen=True)

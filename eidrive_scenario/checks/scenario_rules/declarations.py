@@ -22,7 +22,7 @@ from eidrive_scenario.openscenario.model import (
     ParameterCondition,
     VariableDeclaration,
 )
-from eidrive_scenario.openscenario.values.parameters import REFERENCE
+from eidrive_scenario.openscenario.values.expressions import REFERENCE
 
 
 def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:

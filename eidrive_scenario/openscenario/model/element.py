@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any, ClassVar
 
 from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choice, Content, Sequence
@@ -140,13 +141,10 @@ class Element:
         return first[0] if isinstance(first, tuple) else first
 
 
+@cache
 def field_names(cls: type[Element]) -> tuple[str, ...]:
     """Return the fields of a class with XML content: all except `ABOUT`."""
-    known = _FIELD_NAMES.get(cls)
-    if known is None:
-        known = tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
-        _FIELD_NAMES[cls] = known
-    return known
+    return tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
 
 
 def alternatives(cls: type[Element]) -> tuple[str, ...]:
@@ -159,5 +157,3 @@ def alternatives(cls: type[Element]) -> tuple[str, ...]:
     named = tuple(part for part in model.parts if isinstance(part, str)) if isinstance(model, Choice) else ()
     return named or field_names(cls)
 
-
-_FIELD_NAMES: dict[type[Element], tuple[str, ...]] = {}

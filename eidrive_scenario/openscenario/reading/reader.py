@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields, replace
+from functools import cache
 from typing import Any, cast
 
 from lxml import etree
@@ -25,8 +26,8 @@ from eidrive_scenario.openscenario.model import (
 from eidrive_scenario.openscenario.reading.parsing import line_of
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
 from eidrive_scenario.openscenario.reading.structure import check_children
-from eidrive_scenario.openscenario.values.expressions import ExpressionError
-from eidrive_scenario.openscenario.values.parameters import REFERENCE, Assignment, Parameter, Scope, declare
+from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
+from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope, declare
 from eidrive_scenario.openscenario.values.scalars import DOUBLE, STRING, Version, availability
 
 _SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
@@ -281,14 +282,12 @@ def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> N
 
 def make(cls: type[Element], values: Mapping[str, Any]) -> Element:
     """Return an element with these values and its defaults; it may be incomplete, as errors are reported separately."""
-    defaults = _DEFAULTS.get(cls)
-    if defaults is None:
-        defaults = {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}
-        _DEFAULTS[cls] = defaults
     element = object.__new__(cls)
-    element.__dict__.update(defaults)
+    element.__dict__.update(_defaults(cls))
     element.__dict__.update(values)
     return element
 
 
-_DEFAULTS: dict[type[Element], dict[str, Any]] = {}
+@cache
+def _defaults(cls: type[Element]) -> dict[str, Any]:
+    return {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}

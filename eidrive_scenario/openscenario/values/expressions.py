@@ -22,7 +22,8 @@ Value: TypeAlias = float | int | bool | str
 MAX_LENGTH = 1000
 """Maximum number of characters of an expression."""
 
-_PARAMETER = re.compile(r"\$([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
+REFERENCE = re.compile(r"\$([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
+"""Reference to a parameter."""
 _WORD = re.compile(r"(?<![\w$.])[A-Za-z_]\w*", re.ASCII)
 _NUMBER_BEFORE_WORD = re.compile(r"(?<![\w$.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?+[A-Za-z_]", re.ASCII)
 _PREFIX = "parameter_"
@@ -86,7 +87,7 @@ _KEYWORDS = {"and", "or", "not"}
 
 def parameters_of(text: str) -> list[str]:
     """Return the parameters in an expression."""
-    return _PARAMETER.findall(text)
+    return REFERENCE.findall(text)
 
 
 def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
@@ -95,7 +96,7 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
         raise ExpressionError(f"the expression has {len(text)} characters", f"at most {MAX_LENGTH} are allowed")
     if _NUMBER_BEFORE_WORD.search(text):
         raise ExpressionError(f"{quoted(text)} is not an expression", "separate numbers from words")
-    source = _PARAMETER.sub(rf" {_PREFIX}\1 ", text).strip()
+    source = REFERENCE.sub(rf" {_PREFIX}\1 ", text).strip()
     names = {_PREFIX + name: _number(name, value) for name, value in parameters.items()}
     evaluator = simpleeval.SimpleEval(
         operators=dict(_OPERATORS), functions=dict(FUNCTIONS), names=names | dict(CONSTANTS)
@@ -118,7 +119,7 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
 def concatenate(text: str, parameters: Mapping[str, str]) -> str:
     """Concatenate the words and parameter values of an expression such as `brake_ + $side`."""
     parts = [part.strip() for part in text.split("+")]
-    return "".join(_PARAMETER.sub(lambda match: parameters[match.group(1)], part) for part in parts)
+    return "".join(REFERENCE.sub(lambda match: parameters[match.group(1)], part) for part in parts)
 
 
 def joins_text(text: str, parameters: Mapping[str, Value]) -> bool:

@@ -14,7 +14,7 @@ from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
 from eidrive_scenario.openscenario.model.scalars import Limits
 from eidrive_scenario.openscenario.values import expressions
-from eidrive_scenario.openscenario.values.expressions import ExpressionError, Value
+from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError, Value
 from eidrive_scenario.openscenario.values.scalars import (
     BOOLEAN,
     DATE_TIME,
@@ -25,7 +25,6 @@ from eidrive_scenario.openscenario.values.scalars import (
     whole_number,
 )
 
-REFERENCE = re.compile(r"\$([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 EXPRESSION = re.compile(r"\$\{[ A-Za-z0-9_+\-*/%$().,]*\}", re.ASCII)
 
 TYPES: Mapping[ParameterType, Scalar] = {
@@ -132,9 +131,8 @@ class Scope:
             return self._convert(parameter.text, scalar, f"${parameter.name} is {quoted(parameter.text)}")
         if not (text.startswith("${") and text.endswith("}") and scalar.takes_expressions):
             return scalar.convert(text)
-        if scalar is not STRING and not EXPRESSION.fullmatch(text):
-            raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
-        return self._evaluate_as(text[2:-1], scalar)
+        result = written(self._evaluate(text, as_text=scalar is STRING))
+        return self._convert(result, scalar, f"the expression {quoted(text[2:-1])} is {result}")
 
     def evaluate(self, text: str) -> Value:
         """Return the value of `$name` or `${expression}` in its own type, for texts outside of attributes.
@@ -145,22 +143,18 @@ class Scope:
         if match:
             parameter = self.find(match.group(1))
             return parameter.value if isinstance(parameter.value, bool | int | float | str) else parameter.text
+        return self._evaluate(text, as_text=True)
+
+    def _evaluate(self, text: str, *, as_text: bool) -> Value:
+        """Return the value of `${expression}`; only if `as_text` is True may it concatenate texts."""
         body = text[2:-1]
         used = {name: self.find(name) for name in expressions.parameters_of(body)}
         operands = {name: parameter.operand for name, parameter in used.items()}
-        if expressions.joins_text(body, operands):
+        if as_text and expressions.joins_text(body, operands):
             return self._concatenate(body, {name: parameter.text for name, parameter in used.items()})
         if not EXPRESSION.fullmatch(text):
-            raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
+            raise ExpressionError(f"{quoted(text)} has characters that an expression may not have", expressions.HELP)
         return expressions.evaluate(body, operands)
-
-    def _evaluate_as(self, text: str, scalar: Scalar) -> Any:
-        used = {name: self.find(name) for name in expressions.parameters_of(text)}
-        operands = {name: parameter.operand for name, parameter in used.items()}
-        if scalar is STRING and expressions.joins_text(text, operands):
-            return self._concatenate(text, {name: parameter.text for name, parameter in used.items()})
-        result = written(expressions.evaluate(text, operands))
-        return self._convert(result, scalar, f"the expression {quoted(text)} is {result}")
 
     def _concatenate(self, text: str, values: Mapping[str, str]) -> str:
         length = len(text) + sum(len(values[name]) for name in expressions.parameters_of(text))

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.openscenario.values.expressions import ExpressionError
-from eidrive_scenario.openscenario.values.parameters import REFERENCE, Scope
+from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
+from eidrive_scenario.openscenario.values.parameters import Scope
 
 
 def is_reference(value: object) -> bool:
