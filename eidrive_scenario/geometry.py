@@ -94,13 +94,6 @@ def overlap(a: Box, b: Box) -> bool:
     return _plan_overlap(a, b, dx, dy, math.cos(a[6]), math.sin(a[6]), math.cos(b[6]), math.sin(b[6]))
 
 
-def boxes_distance(a: Array, b: Array) -> Array:
-    """Return distances (...) between boxes (..., 7), broadcast [m]; 0 where they touch or overlap."""
-    a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
-    gap = np.maximum(np.abs(a[..., 2] - b[..., 2]) - (a[..., 5] + b[..., 5]) / 2, 0.0)
-    return np.hypot(_footprints_distance(a, b), gap)
-
-
 def iou_bev(a: Array, b: Array) -> Array:
     """Return the intersection over union (N, M) of the footprints of boxes (N, 7) and (M, 7)."""
     a, b = np.reshape(a, (-1, 7)), np.reshape(b, (-1, 7))
@@ -173,19 +166,6 @@ def _nearest_corner(
         if square < nearest:
             nearest = square
     return nearest
-
-
-def _footprints_distance(a: Array, b: Array) -> Array:
-    plan_a, plan_b = footprint(a), footprint(b)
-    beside_a, beside_b = _in_frame(plan_b, a), _in_frame(plan_a, b)
-    disjoint = np.zeros(a.shape[:-1], dtype=bool)
-    nearest = np.full(a.shape[:-1], np.inf)
-    for corners, box in ((beside_a, a), (beside_b, b)):
-        half = box[..., 3:5] / 2
-        disjoint |= np.any((corners.min(axis=-2) > half) | (corners.max(axis=-2) < -half), axis=-1)
-        excess = np.maximum(np.abs(corners) - half[..., None, :], 0.0)
-        nearest = np.minimum(nearest, np.hypot(excess[..., 0], excess[..., 1]).min(axis=-1))
-    return np.where(disjoint, nearest, 0.0)
 
 
 def _in_frame(points: Array, box: Array) -> Array:

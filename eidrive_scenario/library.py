@@ -13,7 +13,10 @@ from eidrive_scenario.files.untrusted_xml import first_elements
 Kind = Literal["channels", "weather"]
 Definition = Literal["scenario", "catalog", "distribution", "roads", "unreadable", "other"]
 
-_SUFFIX = ".xosc"
+SCENARIO_SUFFIX = ".xosc"
+"""Suffix of scenarios, catalogs and distributions."""
+ROADS_SUFFIX = ".xodr"
+"""Suffix of road files."""
 _MAX_BYTES = 256 * MIB
 _MAX_ELEMENTS = 100_000
 """Maximum number of elements that are read to determine the definition of a file."""
@@ -41,7 +44,7 @@ def scenarios() -> list[str]:
     root = library_path()
     return sorted(
         path.relative_to(root).with_suffix("").as_posix()
-        for path in root.rglob(f"*{_SUFFIX}")
+        for path in root.rglob(f"*{SCENARIO_SUFFIX}")
         if definition(path) == "scenario"
     )
 
@@ -62,7 +65,7 @@ def resolve_scenario(name: str | Path) -> Path:
         raise SettingError(Diagnostic(f"{quoted(str(name))} is a folder", "give one .xosc file"))
     if str(name) and os.path.exists(path):
         return path  # a pipe or a device: the reader refuses it and states what it is
-    hint = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
+    hint = suggestion(str(name).removesuffix(SCENARIO_SUFFIX), scenarios())
     raise SettingError(Diagnostic(f"no scenario {quoted(str(name))}: neither a file nor in the library", hint))
 
 
@@ -76,8 +79,8 @@ def _inside(path: Path) -> Path | None:
     if path.is_absolute() or not path.name or ".." in path.parts:
         return None
     inside = library_path() / path
-    for candidate in (inside.with_name(inside.name + _SUFFIX), inside):
-        if is_regular_file(candidate) and candidate.suffix == _SUFFIX:
+    for candidate in (inside.with_name(inside.name + SCENARIO_SUFFIX), inside):
+        if is_regular_file(candidate) and candidate.suffix == SCENARIO_SUFFIX:
             return candidate
     return None
 

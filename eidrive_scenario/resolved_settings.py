@@ -80,7 +80,7 @@ class ResolvedSettings:
     @cached_property
     def digest(self) -> str:
         """Return the SHA-256 of the canonical form, 64 hexadecimal digits."""
-        return hashlib.sha256(self.canonical.encode()).hexdigest()
+        return sha256_of(self.canonical.encode())
 
     @property
     def short_digest(self) -> str:

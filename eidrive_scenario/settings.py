@@ -11,9 +11,6 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.files.yaml_text import key_lines as key_lines
-from eidrive_scenario.files.yaml_text import load_yaml as load_yaml
-from eidrive_scenario.files.yaml_text import load_yaml_file as load_yaml_file
 
 MAX_NUMBER = 1e12
 """Maximum absolute value of a number in settings; no length, time, rate or power comes near it."""

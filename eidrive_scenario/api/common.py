@@ -15,11 +15,12 @@ from eidrive_scenario.errors import (
     WallLimitError,
     suggestion,
 )
+from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
-from eidrive_scenario.settings import Settings, load_yaml, parse_settings
+from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.tolerances import EPSILON, TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.view import Contact, WorldView

@@ -16,14 +16,11 @@ from eidrive_scenario.cli.option_values import check_seconds
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
-from eidrive_scenario.library import definition, resolve_scenario
+from eidrive_scenario.library import ROADS_SUFFIX, SCENARIO_SUFFIX, definition, resolve_scenario
 from eidrive_scenario.wall_limit import LimitReached, limit_wall_time
 
 if TYPE_CHECKING:
     from eidrive_scenario.checks.report import CheckReport
-
-_SUFFIX = ".xosc"
-_ROADS = ".xodr"
 
 
 def check(
@@ -92,7 +89,7 @@ def _check_file(path: Path, ignored: tuple[str, ...], wall_limit: float | None) 
             kind = definition(path)
             if kind == "catalog":
                 return check_catalog(path, ignored)
-            if kind == "roads" or path.suffix == _ROADS:
+            if kind == "roads" or path.suffix == ROADS_SUFFIX:
                 return check_road_file(path, ignored)
             return (check_distribution if kind == "distribution" else check_scenario)(path, ignored)
         except LimitReached as error:
@@ -119,9 +116,9 @@ def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
             except InputError as error:
                 missing += error.diagnostics
             continue
-        found = _files_below(given, _SUFFIX) or _files_below(given, _ROADS)
+        found = _files_below(given, SCENARIO_SUFFIX) or _files_below(given, ROADS_SUFFIX)
         if not found:
-            missing.append(Diagnostic(f"no {_SUFFIX} or {_ROADS} file in {given!r}", "give another folder"))
+            missing.append(Diagnostic(f"no {SCENARIO_SUFFIX} or {ROADS_SUFFIX} file in {given!r}", "give another folder"))
         yield from found
 
 

@@ -14,13 +14,14 @@ from eidrive_scenario.driving.planner_settings import (
     split_planner_settings,
 )
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
+from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.values.references import resolve_references
 from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.sensor import default_sensor, parse_sensor
 from eidrive_scenario.sensing.settings import MAX_RANGE, MountSetting, SensorSettings, TruthSettings
-from eidrive_scenario.settings import Settings, load_yaml, parse_settings
+from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.messages.clock import StationClock
 
 MODULE = "eidrive"

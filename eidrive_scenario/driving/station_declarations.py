@@ -11,12 +11,12 @@ from eidrive_scenario.driving.agent_factory import build_detector, build_fusion,
 from eidrive_scenario.driving.planner_settings import NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
+from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
 from eidrive_scenario.registry import registry
-from eidrive_scenario.settings import load_yaml
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.specs import actor_spec
 

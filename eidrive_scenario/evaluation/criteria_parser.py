@@ -16,13 +16,14 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
+from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
 from eidrive_scenario.openscenario.scenario_runner import CRITERION_PREFIX, criteria_of
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.values.references import resolve_references
 from eidrive_scenario.registry import construct, registry
-from eidrive_scenario.settings import key_lines, load_yaml, parse_settings
+from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 EXITS = {"exitSuccess": True, "exitFailure": False}

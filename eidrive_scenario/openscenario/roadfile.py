@@ -8,13 +8,12 @@ from pathlib import Path, PurePosixPath
 
 from eidrive_scenario.errors import shortened, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.library import place_of
+from eidrive_scenario.library import ROADS_SUFFIX, place_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import File, RoadNetwork
 
 MAPS = "EIDRIVE_MAPS"
 """Environment variable with the folders in which a road file is searched by its name."""
-SUFFIX = ".xodr"
 
 
 def find_road_file(network: RoadNetwork | None, folder: Path, collector: DiagnosticCollector) -> Path | None:
@@ -45,7 +44,7 @@ def _location(folder: Path) -> str:
 
 def _candidates(logic: File, folder: Path) -> Iterator[Path]:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
-    for name in (named, named.with_name(named.name + SUFFIX)) if named.name else ():
+    for name in (named, named.with_name(named.name + ROADS_SUFFIX)) if named.name else ():
         yield place_of(Path(name), folder)
         for maps in _map_folders():
             yield maps / name.name
@@ -58,7 +57,7 @@ def _map_folders() -> list[Path]:
 def _hint(logic: File, folder: Path) -> str:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     places = [(folder / named).parent, *_map_folders()]
-    known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{SUFFIX}")}
+    known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{ROADS_SUFFIX}")}
     if known:
-        return suggestion(named.name.removesuffix(SUFFIX), known)
+        return suggestion(named.name.removesuffix(ROADS_SUFFIX), known)
     return f"check LogicFile, or set {MAPS} to the folders of the maps"

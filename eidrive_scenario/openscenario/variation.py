@@ -15,11 +15,12 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.openscenario.values.references import resolve_references, without
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.settings import Settings, load_yaml, parse_settings
+from eidrive_scenario.settings import Settings, parse_settings
 
 COMMAND = "eidrive.variation"
 

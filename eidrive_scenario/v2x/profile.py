@@ -8,10 +8,11 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError, quoted, suggestion
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.yaml_text import key_lines, load_yaml, load_yaml_file
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.values.references import is_reference, resolve_references
 from eidrive_scenario.registry import construct, registry
-from eidrive_scenario.settings import Settings, key_lines, load_yaml, load_yaml_file, parse_settings
+from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.channel import Channel
 
 NO_COOPERATION = "none"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
@@ -14,6 +13,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
+from eidrive_scenario.resolved_settings import sha256_of
 
 
 class SupportsGetElement(Protocol):
@@ -54,11 +54,11 @@ class Document:
 def open_document(source: Source) -> Document:
     """Parse a file or its bytes, or wrap a parsed tree. Raise ScenarioError with file and line if it is invalid."""
     if isinstance(source, bytes):
-        return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source, _digest(source))
+        return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source, sha256_of(source))
     if not isinstance(source, str | Path):
         return _from_tree(source)
     path, content = Path(source), _content(source)
-    return Document(parse(content, str(source)), str(source), path, path.parent, digest=_digest(content))
+    return Document(parse(content, str(source)), str(source), path, path.parent, digest=sha256_of(content))
 
 
 def text_of(source: Source) -> bytes:
@@ -88,14 +88,14 @@ def _from_tree(source: Any) -> Document:
         root = root.getroot()
     if isinstance(root, etree._Element):
         base = Path(root.base) if root.base else None
-        digest = _digest(etree.tostring(root))
+        digest = sha256_of(etree.tostring(root))
         return Document(root, str(base or "<element>"), base, base.parent if base else Path(), digest=digest)
     if not isinstance(root, ElementTree.Element):
         message = "the source is neither a path nor XML"
         hint = "use a path, bytes, an XML tree, or an object with get_element()"
         raise ScenarioError(Diagnostic(message, hint, name))
     text = _serialize(root, name)
-    return Document(parse(text, name), name, None, Path(), text, _digest(text))
+    return Document(parse(text, name), name, None, Path(), text, sha256_of(text))
 
 
 def _element_of(source: SupportsGetElement, name: str) -> Any:
@@ -140,10 +140,6 @@ def _check_attributes(node: ElementTree.Element, name: str) -> None:
 def parse(content: bytes, name: str) -> etree._Element:
     """Return the root element of the bytes of an XML file. Raise ScenarioError if they are invalid."""
     return parse_untrusted(content, name, LIMITS, ScenarioError)
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
 
 
 def line_of(node: etree._Element) -> int | None:

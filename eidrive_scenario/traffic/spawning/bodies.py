@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
-from eidrive_scenario.library import library_path
+from eidrive_scenario.library import CATALOGS, library_path
 from eidrive_scenario.openscenario import Scenario, model, read_document
 from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
 from eidrive_scenario.settings import Settings, parse_settings
@@ -184,7 +184,7 @@ def _driver_of(spec: ActorSpec) -> IntelligentDriver:
 @cache
 def library_bodies(category: VehicleCategory) -> tuple[tuple[ActorSpec, Role], ...]:
     """Return the library vehicles of a category with their roles (NONE for everyday vehicles)."""
-    document = read_document(library_path() / "catalogs" / "vehicles.xosc")
+    document = read_document(library_path() / CATALOGS / "vehicles.xosc")
     vehicles = document.catalog.vehicle if document.catalog is not None else ()
     return tuple(
         (actor_spec(vehicle.name, vehicle), Role.NONE if vehicle.role in (None, Role.CIVIL) else vehicle.role)

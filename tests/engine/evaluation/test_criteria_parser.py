@@ -16,10 +16,10 @@ from eidrive_scenario.evaluation.criteria_parser import (
     unsupported_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict
+from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import Registry
-from eidrive_scenario.settings import load_yaml
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 

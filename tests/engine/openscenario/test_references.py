@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType
 from eidrive_scenario.openscenario.values.parameters import Scope, declare
 from eidrive_scenario.openscenario.values.references import resolve_references, without
-from eidrive_scenario.settings import key_lines, load_yaml
 
 
 def scope_of(**parameters: tuple[ParameterType, str]) -> Scope:
