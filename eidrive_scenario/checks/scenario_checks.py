@@ -37,8 +37,7 @@ def scenario_diagnostics(source: Source, ignored: Collection[str] = ()) -> Itera
     except InputError as error:
         yield from _errors(error)
         return
-    unsupported = [diagnostic for diagnostic in unsupported_criteria(scenario) if diagnostic not in scenario.warnings]
-    yield from ((Level.WARNING, diagnostic) for diagnostic in (*scenario.warnings, *unsupported))
+    yield from ((Level.WARNING, diagnostic) for diagnostic in (*scenario.warnings, *unsupported_criteria(scenario)))
     errors: set[Diagnostic] = set()
     for level, diagnostic in run_rules(scenario, ignored):
         if level is Level.ERROR:

@@ -111,7 +111,8 @@ class CatalogLibrary:
             return None
         rule = rules(Catalog, catalog.version).children.get(node.tag)
         if rule is None:
-            self._error(reference, f"{node.tag} is not allowed in a catalog", str(catalog.document.name))
+            message = f"catalog entry {quoted(reference.entry_name)} is a {node.tag}, which is not allowed in a catalog"
+            self._error(reference, message, f"remove it from {catalog.document.name}:{line_of(node)}")
             return None
         try:
             self._collector.budget.enter_catalog_element(sum(1 for _ in node.iter()))
@@ -214,6 +215,7 @@ class CatalogLibrary:
                 collector.errors.extend(error.diagnostics)
                 self._files[path] = None
             self._collector.warnings.extend(collector.warnings)
+            self._collector.unlisted_warnings += collector.unlisted_warnings
             if collector.errors:
                 self._unreadable[path] = tuple(collector.errors)
         return self._files[path]

@@ -24,7 +24,7 @@ def load_for_seed(
                 changes), or any other source of `load_scenario`
     parameters  values that take precedence over drawn ones and over those of the distribution
 
-    Raise ScenarioError for an invalid file, SettingError for an invalid variation.
+    Raise ScenarioError for an invalid file, InputError for an invalid variation.
     """
     scenario = _load(source, parameters)
     return _draw(scenario, seed, parameters)

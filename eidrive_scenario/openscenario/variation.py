@@ -9,13 +9,14 @@ The parameters are declared in the file like all others; other engines use their
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.files.yaml_text import load_yaml
+from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, quoted, suggestion
+from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.openscenario.values.references import resolve_references, without
@@ -23,6 +24,7 @@ from eidrive_scenario.randomness import generator
 from eidrive_scenario.settings import Settings, parse_settings
 
 COMMAND = "eidrive.variation"
+_EXPECTED = "give either uniform: [low, high] or normal: [mean, sd]"
 
 
 class Distribution(Settings):
@@ -36,7 +38,7 @@ class Distribution(Settings):
     @model_validator(mode="after")
     def _exactly_one(self) -> Distribution:
         if (self.uniform is None) == (self.normal is None):
-            raise ValueError("give either uniform: [low, high] or normal: [mean, sd]")
+            raise ValueError(_EXPECTED)
         if self.uniform is not None and self.uniform[0] > self.uniform[1]:
             raise ValueError("the lower bound of uniform is above the upper one")
         return self
@@ -53,50 +55,71 @@ class Distribution(Settings):
 def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
     """Return the parameters that this scenario draws for `seed`.
 
-    The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but not to drawn ones. Raise SettingError with
-    file and line if a command is invalid.
+    The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but not to drawn ones. Raise InputError with
+    file and line of every error in the commands.
     """
-    found: list[tuple[CustomCommandAction, dict[Any, Any]]] = []
-    for action in _commands(scenario):
-        data = load_yaml(action.content, source=action.source, line=action.line)
-        if not isinstance(data, dict):
-            raise SettingError(
-                Diagnostic(
-                    f"{COMMAND} is {quoted(data)}",
-                    "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}",
-                    action.source,
-                    action.line,
-                )
-            )
-        found.append((action, data))
-    names = {str(name) for _, data in found for name in data}
+    errors = ErrorCollector()
+    specified: list[_Specification] = []
+    for command in scenario.custom_commands:
+        if command.type == COMMAND:
+            with errors:
+                specified += _specifications(scenario, command)
+    names = {one.name for one in specified}
     drawn: dict[str, str] = {}
-    for action, data in found:
-        scope = without(action.scope, names)
-        bounds = resolve_references(data, scope, source=action.source, line=action.line)
-        for name, spec in bounds.items():
-            drawn[name] = repr(_distribution(scenario, action, str(name), spec).draw(seed, str(name)))
+    for one in specified:
+        with errors:
+            if one.name in drawn:
+                raise one.error(f"parameter {quoted(one.name)} is drawn twice", "remove one")
+            drawn[one.name] = repr(one.distribution(scenario, names).draw(seed, one.name))
+    errors.raise_if_any()
     return drawn
 
 
-def _distribution(scenario: Scenario, action: CustomCommandAction, name: str, spec: Any) -> Distribution:
-    if name not in scenario.parameters:
-        raise SettingError(
-            Diagnostic(
-                f"{COMMAND}: parameter {quoted(name)} is not declared",
-                suggestion(name, scenario.parameters),
-                action.source,
-                action.line,
+@dataclass(frozen=True)
+class _Specification:
+    """Parameter and its bounds, as a command specifies them.
+
+    lines  line of each setting of the command, by its dotted path
+    """
+
+    command: CustomCommandAction
+    name: str
+    bounds: Any
+    lines: Mapping[str, int]
+
+    @property
+    def line(self) -> int:
+        return self.lines.get(self.name, self.command.line)
+
+    def error(self, message: str, hint: str) -> SettingError:
+        """Return an error with the line of the parameter in the command."""
+        return SettingError(Diagnostic(f"{COMMAND}: {message}", hint, self.command.source, self.line))
+
+    def distribution(self, scenario: Scenario, drawn: Collection[str]) -> Distribution:
+        """Return the distribution, whose bounds must not refer to parameters that are `drawn`."""
+        if self.name not in scenario.parameters:
+            raise self.error(
+                f"parameter {quoted(self.name)} is not declared", suggestion(self.name, scenario.parameters)
             )
-        )
-    if not isinstance(spec, dict):
-        spec = {"": spec}
-    return parse_settings(Distribution, spec, source=action.source, line=action.line)
+        if not isinstance(self.bounds, dict) or not self.bounds:
+            raise self.error(f"parameter {quoted(self.name)} is {quoted(self.bounds)}", _EXPECTED)
+        source = self.command.source
+        prefix = f"{self.name}."
+        own = {path.removeprefix(prefix): line for path, line in self.lines.items() if path.startswith(prefix)}
+        scope = without(self.command.scope, drawn)
+        bounds = resolve_references(self.bounds, scope, source=source, line=self.line, lines=own)
+        return parse_settings(Distribution, bounds, source=source, line=self.line, lines=own)
 
 
-def _commands(scenario: Scenario) -> Iterator[CustomCommandAction]:
-    init = scenario.storyboard.init
-    for user_defined in init.actions.user_defined_action:
-        command = user_defined.custom_command_action
-        if command.type == COMMAND:
-            yield command
+def _specifications(scenario: Scenario, command: CustomCommandAction) -> Iterator[_Specification]:
+    """Yield the parameters of a command. Raise SettingError if it is not a mapping or not in Init."""
+    source, line = command.source, command.line
+    if not any(command is one.custom_command_action for one in scenario.storyboard.init.actions.user_defined_action):
+        raise SettingError(Diagnostic(f"{COMMAND} has no effect in an event", "move it to Init", source, line))
+    data = load_yaml(command.content, source=source, line=line)
+    if not isinstance(data, dict):
+        hint = "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}"
+        raise SettingError(Diagnostic(f"{COMMAND} is {quoted(data)}", hint, source, line))
+    lines = key_lines(command.content, line)
+    for name, bounds in data.items():
+        yield _Specification(command, str(name), bounds, lines)

@@ -13,7 +13,7 @@ Intervals = tuple[tuple[float, float], ...]
 NEVER: Intervals = ()
 ALWAYS: Intervals = ((0.0, math.inf),)
 STEP = 0.25
-"""Upper bound of the time step [s]: an edge is observed at the first tick after it."""
+"""Assumed upper bound of the time step [s], five default steps: an edge is observed at the first tick after it."""
 
 
 def times_that_satisfy(rule: Rule, value: float) -> Intervals:
