@@ -212,3 +212,20 @@ def test_missing_catalog_beside_unlistable_folder_is_an_error(
     monkeypatch.setattr(Path, "iterdir", refused)
     with pytest.raises(ScenarioError, match="no catalog 'drivers'"):
         load_scenario(path)
+
+
+def test_entry_of_foreign_kind_is_an_error_with_its_location(write_catalog: Write, write_scenario: Write) -> None:
+    catalog = write_catalog("Drivers.xosc", "Drivers", '\n<Story name="driver"/>')
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(write_scenario(reference("Drivers", "driver")))
+    (error,) = caught.value.diagnostics
+    assert error.message == "catalog entry 'driver' is a Story, which is not allowed in a catalog"
+    assert error.hint == f"remove it from {catalog}:3"
+
+
+def test_warnings_of_a_catalog_beyond_the_limit_are_counted(write_catalog: Write, write_scenario: Write) -> None:
+    islands = "".join(f'\n<MiscObject name="{n}" miscObjectCategory="grafficIsland"/>' for n in range(250))
+    write_catalog("Drivers.xosc", "Drivers", CONTROLLER.format(limit=3) + islands)
+    warnings = load_scenario(write_scenario(reference("Drivers", "driver"))).warnings
+    assert len(warnings) == 201
+    assert warnings[-1].message == "50 more are not listed"
