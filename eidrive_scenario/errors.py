@@ -9,7 +9,9 @@ EidriveError
 ├── RegistryError        two extensions have the same name, or one does not load
 └── SimulationError      the run was aborted by an internal error
     ├── ExtensionError   an extension raised an exception or returned an invalid result
-    └── WallLimitError   a run exceeded its limit of wall time
+    └── WallLimitError   a run or a check exceeded its limit of wall time
+
+InvalidResult is internal: a run reports it as ExtensionError of the extension that returned the result.
 """
 
 from __future__ import annotations
@@ -175,7 +177,7 @@ class WallLimitError(SimulationError):
 
 
 class InvalidResult(Exception):
-    """Invalid result of an extension; the run reports it as ExtensionError.
+    """Invalid result of an extension.
 
     extension  object whose `method` returned the result
     """

@@ -179,23 +179,21 @@ def exit_verdict(command: CustomCommand, time: float) -> Verdict:
     return Verdict(command.type, passed, None, None, "", None if passed else time, reason, fatal=True)
 
 
-def stop_trigger_criteria(scenario: Scenario, taken: Collection[str] = ()) -> list[Criterion]:
+def stop_trigger_criteria(scenario: Scenario) -> list[Criterion]:
     """Return the criteria about the ego vehicle that a file for ScenarioRunner specifies.
 
     Unsupported criteria are omitted and reported by `unsupported_criteria`. Raise SettingError if the value of a
     condition is invalid or no entity is the ego vehicle.
     """
-    criteria: list[Criterion] = []
+    declarations = []
     for condition in criteria_of(scenario.storyboard):
         translated = _TRANSLATIONS.get(condition.name.removeprefix(CRITERION_PREFIX))
         if translated is None:
             continue
         kind, settings_of = translated
         settings = {"of": _ego(scenario, condition), **settings_of(_value(condition))}
-        criterion = _declare(kind, settings, condition.source, condition.line, {}).build()
-        criterion.name = _free_name(criterion.name, {*taken, *(other.name for other in criteria)})
-        criteria.append(criterion)
-    return criteria
+        declarations.append(_declare(kind, settings, condition.source, condition.line, {}))
+    return build_criteria(declarations)
 
 
 def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
