@@ -20,7 +20,7 @@ from eidrive_scenario.openscenario.reading.parsing import Document, line_of, ope
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
-from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope
+from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope
 from eidrive_scenario.openscenario.values.scalars import Version
 
 
@@ -278,7 +278,7 @@ def _missing_catalog(name: str, places: Iterable[Path], known: set[str]) -> tupl
 def _assignments(reference: CatalogReference) -> dict[str, Assignment]:
     assignments = reference.parameter_assignments
     return {
-        one.parameter_ref: Assignment(one.value, Diagnostic("", "", one.source, one.line))
+        one.parameter_ref: Assignment(one.value, Location.of(one))
         for one in (assignments.parameter_assignment if assignments else ())
         if isinstance(one.parameter_ref, str) and isinstance(one.value, str)
     }

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Deterministic,
@@ -22,7 +21,7 @@ from eidrive_scenario.openscenario.model import (
     Element,
     Range,
 )
-from eidrive_scenario.openscenario.values.parameters import Assignment, written
+from eidrive_scenario.openscenario.values.parameters import Assignment, Location, written
 
 Assignments = Mapping[str, Assignment]
 
@@ -35,7 +34,7 @@ class ValueSource(Protocol):
         """Return the number of choices."""
 
     @property
-    def names(self) -> Mapping[str, Diagnostic]:
+    def names(self) -> Mapping[str, Location]:
         """Return the parameters with the locations of their first values."""
 
     def at(self, index: int) -> Assignments:
@@ -54,7 +53,7 @@ class CartesianProduct:
         return math.prod(one.count for one in self.choices)
 
     @property
-    def names(self) -> Mapping[str, Diagnostic]:
+    def names(self) -> Mapping[str, Location]:
         """Return the parameters with the locations of their first values."""
         return {name: origin for one in reversed(self.choices) for name, origin in one.names.items()}
 
@@ -74,10 +73,10 @@ class ListedValues:
     choices: tuple[Assignments, ...]
 
     @property
-    def names(self) -> Mapping[str, Diagnostic]:
+    def names(self) -> Mapping[str, Location]:
         """Return the parameters with the locations of their first values."""
         assignments = [item for choice in reversed(self.choices) for item in choice.items()]
-        return {name: assignment.origin or _NO_LOCATION for name, assignment in assignments}
+        return {name: assignment.origin or Location() for name, assignment in assignments}
 
     @property
     def count(self) -> int:
@@ -100,19 +99,16 @@ class SteppedRange:
     lower: Fraction
     step: Fraction
     count: int
-    origin: Diagnostic
+    origin: Location
 
     @property
-    def names(self) -> Mapping[str, Diagnostic]:
+    def names(self) -> Mapping[str, Location]:
         """Return the parameter and the location of its range."""
         return {self.name: self.origin}
 
     def at(self, index: int) -> Assignments:
         """Return the choice of an index."""
         return {self.name: Assignment(written(float(self.lower + index * self.step)), self.origin)}
-
-
-_NO_LOCATION = Diagnostic("")
 
 
 def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
@@ -140,9 +136,9 @@ def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector
     return CartesianProduct(tuple(found))
 
 
-def varied_once(names: Iterable[tuple[str, Diagnostic]], collector: DiagnosticCollector) -> None:
+def varied_once(names: Iterable[tuple[str, Location]], collector: DiagnosticCollector) -> None:
     """Report every parameter that more than one distribution assigns."""
-    seen: dict[str, Diagnostic] = {}
+    seen: dict[str, Location] = {}
     for name, origin in names:
         if name in seen:
             message = f"parameter {name!r} is also varied by another distribution"
@@ -162,7 +158,7 @@ def _value_sets(distribution: DeterministicMultiParameterDistribution, collector
                     source=one.source,
                     line=one.line,
                 )
-            choice[one.parameter_ref] = Assignment(one.value, place(one))
+            choice[one.parameter_ref] = Assignment(one.value, Location.of(one))
         choices.append(choice)
     return ListedValues(tuple(choices))
 
@@ -173,7 +169,7 @@ def _single(
     name = distribution.parameter_name
     if distribution.distribution_set is not None:
         elements = distribution.distribution_set.element
-        return ListedValues(tuple({name: Assignment(one.value, place(one))} for one in elements))
+        return ListedValues(tuple({name: Assignment(one.value, Location.of(one))} for one in elements))
     if distribution.distribution_range is not None:
         return _steps(name, distribution.distribution_range, collector)
     reject_user_defined(distribution, name, "DistributionSet or DistributionRange", collector)
@@ -195,7 +191,7 @@ def _steps(name: str, given: DistributionRange, collector: DiagnosticCollector) 
     lower, upper, step = (
         _exact(value) for value in (given.range.lower_limit, given.range.upper_limit, given.step_width)
     )
-    return SteppedRange(name, lower, step, (upper - lower) // step + 1, place(given))
+    return SteppedRange(name, lower, step, (upper - lower) // step + 1, Location.of(given))
 
 
 def _exact(value: float) -> Fraction:
@@ -224,8 +220,3 @@ def reject_user_defined(element: Element, name: str, instead: str, collector: Di
         source=element.source,
         line=element.line,
     )
-
-
-def place(element: Element) -> Diagnostic:
-    """Return the location of a value."""
-    return Diagnostic("", "", element.source, element.line)

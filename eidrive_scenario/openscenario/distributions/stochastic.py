@@ -18,11 +18,9 @@ from typing import Any
 import numpy as np
 from scipy.special import log_ndtr, ndtri_exp, pdtr, pdtrc
 
-from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import (
     Assignments,
-    place,
     reject_user_defined,
     valid_range,
     varied_once,
@@ -41,7 +39,7 @@ from eidrive_scenario.openscenario.model import (
     StochasticDistribution,
     UniformDistribution,
 )
-from eidrive_scenario.openscenario.values.parameters import Assignment, written
+from eidrive_scenario.openscenario.values.parameters import Assignment, Location, written
 from eidrive_scenario.randomness import generator
 
 Quantile = Callable[[float], "float | str"]
@@ -81,7 +79,7 @@ class StochasticSampler:
     count: int
     seed: float
     quantiles: Mapping[str, Quantile]
-    names: Mapping[str, Diagnostic]
+    names: Mapping[str, Location]
 
     def at(self, index: int) -> Assignments:
         """Return the values in the run of an index."""
@@ -102,13 +100,13 @@ def draws_of(stochastic: Stochastic, seed: float, collector: DiagnosticCollector
         message = f"Stochastic has numberOfTestRuns {stochastic.number_of_test_runs}"
         collector.error(message, "specify a number above zero", source=stochastic.source, line=stochastic.line)
     distributions = stochastic.stochastic_distribution
-    varied_once(((one.parameter_name, place(one)) for one in distributions), collector)
+    varied_once(((one.parameter_name, Location.of(one)) for one in distributions), collector)
     found = {one.parameter_name: quantile_of(one, collector) for one in distributions}
     return StochasticSampler(
         stochastic.number_of_test_runs,
         float(seed if stochastic.random_seed is None else stochastic.random_seed),
         {name: quantile for name, quantile in found.items() if quantile is not None},
-        {one.parameter_name: place(one) for one in distributions},
+        {one.parameter_name: Location.of(one) for one in distributions},
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from lxml import etree
 
-from eidrive_scenario.errors import Diagnostic, quoted, suggestion
+from eidrive_scenario.errors import quoted, suggestion
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Action,
@@ -27,7 +27,7 @@ from eidrive_scenario.openscenario.reading.parsing import line_of
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
 from eidrive_scenario.openscenario.reading.structure import check_children
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
-from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope, declare
+from eidrive_scenario.openscenario.values.parameters import Assignment, Location, Parameter, Scope, declare
 from eidrive_scenario.openscenario.values.scalars import DOUBLE, STRING, Version, availability
 
 _SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
@@ -245,7 +245,7 @@ class Reader:
 
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
-            origin = assignment.origin or Diagnostic("", "", self.source)
+            origin = assignment.origin or Location(self.source)
             hint = suggestion(name, declared)
             self.collector.error(f"unknown parameter {name!r}", hint, source=origin.source, line=origin.line)
 

@@ -6,12 +6,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, NamedTuple
 
-from eidrive_scenario.errors import Diagnostic, quoted, shortened, suggestion
+from eidrive_scenario.errors import quoted, shortened, suggestion
 from eidrive_scenario.openscenario.budget import MAX_TEXT, Budget, BudgetError
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
+from eidrive_scenario.openscenario.model import Element, ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
 from eidrive_scenario.openscenario.model.scalars import Limits
 from eidrive_scenario.openscenario.values import expressions
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError, Value
@@ -66,12 +66,24 @@ class Parameter:
         return int(number) if number.is_integer() and "." not in self.text else number
 
 
+class Location(NamedTuple):
+    """File and line of a value; "" and None if unknown."""
+
+    source: str = ""
+    line: int | None = None
+
+    @classmethod
+    def of(cls, element: Element) -> Location:
+        """Return the location of an element."""
+        return cls(element.source, element.line)
+
+
 @dataclass(frozen=True)
 class Assignment:
     """Value of a parameter from outside the file, with its location if that is a file too."""
 
     text: str
-    origin: Diagnostic | None = None
+    origin: Location | None = None
 
 
 def as_assignments(values: Mapping[str, str | Assignment] | None) -> dict[str, Assignment]:
@@ -185,7 +197,7 @@ def declare(
 ) -> None:
     """Add a parameter to its scope; report a value that does not match its type or its constraints."""
     scalar = TYPES[declaration.parameter_type]
-    origin = (assignment and assignment.origin) or Diagnostic("", "", declaration.source, declaration.line)
+    origin = (assignment and assignment.origin) or Location.of(declaration)
     name, text = declaration.name, assignment.text if assignment else declaration.value
     text = _without_fraction(text, scalar)
     if not fits_type(_without_fraction(declaration.value, scalar), scalar):
