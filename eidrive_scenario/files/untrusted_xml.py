@@ -14,7 +14,7 @@ from xml.parsers import expat
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.files.xml_lines import parse_numbered
+from eidrive_scenario.files.xml_lines import line_of, parse_numbered
 
 MAX_DEPTH = 100
 """Maximum nesting depth of elements."""
@@ -84,10 +84,10 @@ def parse_untrusted(
         refuse("the file has a document type declaration (DOCTYPE)", "remove it", 1)
     too_deep = next(iter(cast(list[etree._Element], root.xpath("/*" * (MAX_DEPTH + 1)))), None)
     if too_deep is not None:
-        refuse(f"elements are nested deeper than {MAX_DEPTH} levels", "flatten them", _line(too_deep))
+        refuse(f"elements are nested deeper than {MAX_DEPTH} levels", "flatten them", line_of(too_deep))
     if content.count(b"=") > MAX_ATTRIBUTES:
         for element in cast(list[etree._Element], _TOO_MANY(root)):
-            refuse(f"an element has more than {MAX_ATTRIBUTES} attributes", "remove them", _line(element))
+            refuse(f"an element has more than {MAX_ATTRIBUTES} attributes", "remove them", line_of(element))
     return root
 
 
@@ -156,10 +156,6 @@ def _scan(content: bytes, limits: XmlLimits, refuse: Callable[[str, str, int | N
         parser.Parse(content, True)
     except _Done:
         return
-
-
-def _line(element: etree._Element) -> int | None:
-    return cast("int | None", element.sourceline)
 
 
 def _describe_error(error: etree.XMLSyntaxError) -> str:

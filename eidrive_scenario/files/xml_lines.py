@@ -29,6 +29,12 @@ class _NumberedElement(etree.ElementBase):
         return self.line if self.line is not None else cast("int | None", super().sourceline)
 
 
+def line_of(element: etree._Element | None) -> int | None:
+    """Return the line of the start tag of an element; None for an element that was not read from a text."""
+    line = None if element is None else element.sourceline
+    return line if isinstance(line, int) else None
+
+
 def parse_numbered(content: bytes, parser: etree.XMLParser) -> etree._Element:
     """Return the root of an XML text, with the exact `sourceline` of each element in texts of any length.
 

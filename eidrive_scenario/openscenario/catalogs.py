@@ -11,12 +11,13 @@ from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path, place_of
 from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
-from eidrive_scenario.openscenario.reading.parsing import Document, line_of, open_document
+from eidrive_scenario.openscenario.reading.parsing import Document, open_document
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.reading.schema import rules
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds

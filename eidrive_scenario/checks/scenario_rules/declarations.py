@@ -14,6 +14,7 @@ from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.outline import WORD
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.files.bounded import absolute
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.openscenario.catalogs import catalog_place
 from eidrive_scenario.openscenario.model import (
     EntitySelection,
@@ -43,7 +44,7 @@ def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:
                     f"parameter {name!r} is never used",
                     f"remove it, or use its value as ${name}",
                     context.scenario.document.source,
-                    cast("int | None", declaration.sourceline),
+                    line_of(declaration),
                 )
 
 

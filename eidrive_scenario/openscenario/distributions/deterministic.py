@@ -118,7 +118,7 @@ def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector
         *deterministic.deterministic_single_parameter_distribution,
     ]
     found: list[ValueSource] = []
-    for distribution in sorted(distributions, key=lambda one: one.line):
+    for distribution in sorted(distributions, key=lambda one: one.line or 0):
         if isinstance(distribution, DeterministicMultiParameterDistribution):
             found.append(_value_sets(distribution, collector))
         else:

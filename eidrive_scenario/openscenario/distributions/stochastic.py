@@ -227,7 +227,7 @@ def _histogram(given: Histogram, collector: DiagnosticCollector) -> Quantile:
 def _check_overlap(bins: tuple[HistogramBin, ...], collector: DiagnosticCollector) -> None:
     for before, after in pairwise(sorted(bins, key=lambda one: (one.range.lower_limit, one.range.upper_limit))):
         if after.range.lower_limit < before.range.upper_limit:
-            later = max(before, after, key=lambda one: one.line)
+            later = max(before, after, key=lambda one: one.line or 0)
             _report(later, "overlaps another bin", "specify disjoint ranges", collector)
 
 

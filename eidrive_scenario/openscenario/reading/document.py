@@ -8,9 +8,10 @@ from typing import cast
 
 from lxml import etree
 
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import OpenScenario
-from eidrive_scenario.openscenario.reading.parsing import Document, Source, line_of, open_document
+from eidrive_scenario.openscenario.reading.parsing import Document, Source, open_document
 from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, cast
+from typing import Any, Protocol, TypeAlias
 from xml.etree import ElementTree
 
 from lxml import etree
@@ -140,8 +140,3 @@ def _check_attributes(node: ElementTree.Element, name: str) -> None:
 def parse(content: bytes, name: str) -> etree._Element:
     """Return the root element of the bytes of an XML file. Raise ScenarioError if they are invalid."""
     return parse_untrusted(content, name, LIMITS, ScenarioError)
-
-
-def line_of(node: etree._Element) -> int | None:
-    """Return the line of the start tag of an element."""
-    return cast("int | None", node.sourceline)

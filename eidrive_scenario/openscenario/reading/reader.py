@@ -10,6 +10,7 @@ from typing import Any, cast
 from lxml import etree
 
 from eidrive_scenario.errors import quoted, suggestion
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Action,
@@ -23,7 +24,6 @@ from eidrive_scenario.openscenario.model import (
     ParameterDeclarations,
     Property,
 )
-from eidrive_scenario.openscenario.reading.parsing import line_of
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
 from eidrive_scenario.openscenario.reading.structure import check_children
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
@@ -88,7 +88,7 @@ class Reader:
         self, node: etree._Element, cls: type[Element], scope: Scope, assignments: dict[str, Assignment]
     ) -> Element:
         known = rules(cls, self.version)
-        values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
+        values: dict[str, Any] = {"line": line_of(node), "source": self.source}
         children = list(node.iterchildren(etree.Element))
         if "ParameterDeclarations" in known.children:
             declarations = next((child for child in children if child.tag == "ParameterDeclarations"), None)
@@ -205,7 +205,7 @@ class Reader:
     def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> Element:
         """Read declarations in their order, so that each may use those before it."""
         known = rules(ParameterDeclarations, self.version)
-        values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
+        values: dict[str, Any] = {"line": line_of(node), "source": self.source}
         children = list(node.iterchildren(etree.Element))
         self._attributes(node, known, scope, values)
         self._text(node, known, values)

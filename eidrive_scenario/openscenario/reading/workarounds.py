@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from lxml import etree
 
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.reading.parsing import line_of
 from eidrive_scenario.openscenario.values.scalars import Version
 
 

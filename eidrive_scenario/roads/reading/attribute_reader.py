@@ -8,6 +8,7 @@ from typing import Literal, overload
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.roads.model.map_warnings import ROAD_MARK, MapRule, MapWarning
 
 MAX_ERRORS = 100
@@ -16,12 +17,6 @@ MAX_WARNINGS = 5000
 """Maximum number of warnings that are stored."""
 LARGEST = 1e9
 """Maximum magnitude of a number, far above any length, position or coefficient of a road."""
-
-
-def line_of(element: etree._Element | None) -> int | None:
-    """Return the line of an element in its file."""
-    line = None if element is None else element.sourceline
-    return line if isinstance(line, int) else None
 
 
 class AttributeReader:

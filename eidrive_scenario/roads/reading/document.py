@@ -11,6 +11,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.roads.model.map_warnings import ROAD_LINK, ROAD_SURFACE, MapWarning
 from eidrive_scenario.roads.model.polynomials import Polynomials
 from eidrive_scenario.roads.model.road_map import (
@@ -24,7 +25,7 @@ from eidrive_scenario.roads.model.road_map import (
     RoadObject,
     RoadType,
 )
-from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 from eidrive_scenario.roads.reading.extent import check_extent
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
 from eidrive_scenario.roads.reading.objects_and_signals import read_controllers, read_objects, read_signals

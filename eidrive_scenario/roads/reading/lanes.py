@@ -10,10 +10,11 @@ from typing import Literal
 
 from lxml import etree
 
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.roads.model.map_warnings import LANE_SIDE
 from eidrive_scenario.roads.model.polynomials import Polynomials, combine
 from eidrive_scenario.roads.model.road_map import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
-from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 MARK_WIDTHS = {"standard": 0.12, "bold": 0.25}

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from lxml import etree
 
 from eidrive_scenario.errors import suggestion
+from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.roads.model import curves
 from eidrive_scenario.roads.model.curves import Arc, Cubic, Curve, ReferenceLine
 from eidrive_scenario.roads.model.map_warnings import GEOMETRY_GAP
-from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6

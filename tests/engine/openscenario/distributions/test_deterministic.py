@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
+from lxml import etree
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_distribution, load_scenario
@@ -69,6 +70,15 @@ def test_values_have_lines(distribution_file: Write) -> None:
     path = distribution_file(deterministic(values("A", "1"), steps("B", "0", "1", "1"), sets({"C": "x"})))
     origins = {name: given.origin for name, given in load_distribution(path)[0].assignments.items()}
     assert origins == {"A": (str(path), 6), "B": (str(path), 7), "C": (str(path), 8)}
+
+
+def test_tree_without_lines_is_expanded(distribution_file: Write) -> None:
+    """Elements that a program creates have no lines."""
+    tree = etree.parse(distribution_file(deterministic(values("A", "1", "2"), sets({"C": "x"}, {"C": "y"}))))
+    for node in tree.iter("*"):
+        node.sourceline = 0
+    found = {tuple(run.parameters.items()) for run in load_distribution(tree)}
+    assert found == {(("C", c), ("A", a)) for c in "xy" for a in "12"}
 
 
 @pytest.mark.element("DistributionRange")
