@@ -118,7 +118,9 @@ def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
             continue
         found = _files_below(given, SCENARIO_SUFFIX) or _files_below(given, ROADS_SUFFIX)
         if not found:
-            missing.append(Diagnostic(f"no {SCENARIO_SUFFIX} or {ROADS_SUFFIX} file in {given!r}", "give another folder"))
+            missing.append(
+                Diagnostic(f"no {SCENARIO_SUFFIX} or {ROADS_SUFFIX} file in {given!r}", "give another folder")
+            )
         yield from found
 
 

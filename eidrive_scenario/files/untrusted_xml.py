@@ -14,6 +14,7 @@ from xml.parsers import expat
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.files.bounded import MIB
 from eidrive_scenario.files.xml_lines import line_of, parse_numbered
 
 MAX_DEPTH = 100
@@ -60,7 +61,7 @@ def parse_untrusted(
         raise error(Diagnostic(message, hint, source, line))
 
     if len(content) > limits.max_bytes:
-        refuse(f"the file is larger than {limits.max_bytes // 2**20} MiB", "split it", None)
+        refuse(f"the file is larger than {limits.max_bytes // MIB} MiB", "split it", None)
     try:
         _scan(content, limits, refuse)
     except expat.ExpatError as failure:

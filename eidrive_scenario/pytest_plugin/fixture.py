@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import pytest
 
 from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
+from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.library import definition, library_path, resolve_scenario
 from eidrive_scenario.pytest_plugin.options import RunVariant, run_variants
 from eidrive_scenario.pytest_plugin.outcome import explain, properties, run_variant
@@ -97,7 +98,7 @@ def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
             found = sorted(path for path in folder.glob(glob) if definition(path) in ("scenario", "unreadable"))
             if found:
                 return found
-    elif Path(glob).is_file():
+    elif is_regular_file(glob):
         return [Path(glob)]
     raise ValueError(f"no scenario matches {str(pattern)!r} beside the test file, below the root or in the library")
 

@@ -131,4 +131,3 @@ def _describe_intervals(conditions: tuple[ConditionAnalysis, ...]) -> str:
 def _time(condition: Condition) -> SimulationTimeCondition | None:
     by_value = condition.by_value_condition
     return by_value.simulation_time_condition if by_value is not None else None
-

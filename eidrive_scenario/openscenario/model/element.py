@@ -156,4 +156,3 @@ def alternatives(cls: type[Element]) -> tuple[str, ...]:
         model = next((part for part in model.parts if isinstance(part, Choice)), model)
     named = tuple(part for part in model.parts if isinstance(part, str)) if isinstance(model, Choice) else ()
     return named or field_names(cls)
-

@@ -211,4 +211,3 @@ def _describe_group(group: Group) -> str:
     if not group.parts:
         return "nothing"
     return (" or " if group.exclusive else ", ").join(describe(part) for part in group.parts)
-
