@@ -85,13 +85,13 @@ def _inside(path: Path) -> Path | None:
     return None
 
 
-def place_of(path: str | Path, folder: Path) -> Path:
-    """Return the location of a path that a file in `folder` specifies.
+def resolve_path(path: str, folder: Path) -> Path:
+    """Return the location of a path that a file in `folder` specifies; a backslash separates folders like a slash.
 
     A path that begins with `eidrive_library/` is resolved in a copy of the library in that folder; without a copy, in
     the library itself, never outside of it. Any other path is relative to the folder.
     """
-    named = Path(path)
+    named = Path(path.strip().replace("\\", "/"))
     beside = folder / named
     if named.parts[:1] != (LIBRARY_FOLDER,) or ".." in named.parts or os.path.lexists(beside):
         return beside

@@ -9,7 +9,7 @@ from eidrive_scenario.checks.registry import check_rule_names
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.rule import Level
 from eidrive_scenario.errors import Diagnostic, ScenarioError
-from eidrive_scenario.openscenario.catalogs import twins_in
+from eidrive_scenario.openscenario.catalogs import duplicate_entries
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import OpenScenario
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
@@ -41,7 +41,7 @@ def _diagnostics(path: Path) -> Iterator[tuple[Level, Diagnostic]]:
             check_values(list(root.walk()), version, collector)
         catalog = document.root.find("Catalog")
         if catalog is not None:
-            collector.errors.extend(twins_in(catalog, document.name).values())
+            collector.errors.extend(duplicate_entries(catalog, document.name).values())
     except ScenarioError as error:
         collector.errors.extend(error.diagnostics)
     yield from ((Level.ERROR, diagnostic) for diagnostic in collector.errors)

@@ -12,7 +12,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
 from eidrive_scenario.files.xml_lines import line_of
-from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path, place_of
+from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
 from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
@@ -33,7 +33,7 @@ class CatalogFile:
     document: Document
     version: Version
     entries: dict[str, etree._Element]
-    twins: Mapping[str, Diagnostic]
+    duplicates: Mapping[str, Diagnostic]
     """Error for each name that several entries have."""
 
 
@@ -58,7 +58,7 @@ class CatalogLibrary:
             directory = getattr(location, "directory", None)
             if directory is not None and isinstance(directory.path, str):
                 kind = type(location).__name__.removesuffix("CatalogLocation")
-                self._places[kind] = catalog_place(directory.path, folder)
+                self._places[kind] = resolve_path(directory.path, folder)
         self._circular: set[CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
         self._unreadable: dict[Path, tuple[Diagnostic, ...]] = {}
@@ -107,8 +107,8 @@ class CatalogLibrary:
                 suggestion(reference.entry_name, catalog.entries),
             )
             return None
-        if reference.entry_name in catalog.twins:
-            self._collector.errors.append(catalog.twins[reference.entry_name])
+        if reference.entry_name in catalog.duplicates:
+            self._collector.errors.append(catalog.duplicates[reference.entry_name])
             return None
         rule = rules(Catalog, catalog.version).children.get(node.tag)
         if rule is None:
@@ -233,11 +233,6 @@ def _listing(folder: Path) -> list[Path]:
         return []
 
 
-def catalog_place(directory: str, folder: Path) -> Path:
-    """Return the folder or file of a Directory; `eidrive_library/catalogs` is in the library for any folder."""
-    return place_of(directory.replace("\\", "/"), folder)
-
-
 def _read(path: Path, collector: DiagnosticCollector) -> CatalogFile | None:
     document = open_document(path)
     catalog = document.root.find("Catalog")
@@ -248,10 +243,12 @@ def _read(path: Path, collector: DiagnosticCollector) -> CatalogFile | None:
         return None
     catalog = apply_workarounds(catalog, document.name, version, collector)
     entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
-    return CatalogFile(catalog.get("name", path.stem), document, version, entries, twins_in(catalog, document.name))
+    return CatalogFile(
+        catalog.get("name", path.stem), document, version, entries, duplicate_entries(catalog, document.name)
+    )
 
 
-def twins_in(catalog: etree._Element, source: str) -> dict[str, Diagnostic]:
+def duplicate_entries(catalog: etree._Element, source: str) -> dict[str, Diagnostic]:
     """Return an error for each name that several entries of a catalog have, at the second of them."""
     first: dict[str, etree._Element] = {}
     found: dict[str, Diagnostic] = {}

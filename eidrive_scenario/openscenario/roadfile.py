@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 from eidrive_scenario.errors import shortened, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.library import ROADS_SUFFIX, place_of
+from eidrive_scenario.library import ROADS_SUFFIX, resolve_path
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import File, RoadNetwork
 
@@ -45,7 +45,7 @@ def _location(folder: Path) -> str:
 def _candidates(logic: File, folder: Path) -> Iterator[Path]:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     for name in (named, named.with_name(named.name + ROADS_SUFFIX)) if named.name else ():
-        yield place_of(Path(name), folder)
+        yield resolve_path(str(name), folder)
         for maps in _map_folders():
             yield maps / name.name
 

@@ -19,7 +19,7 @@ from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, qu
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.scenario import Scenario
-from eidrive_scenario.openscenario.values.references import resolve_references, without
+from eidrive_scenario.openscenario.values.references import hide_parameters, resolve_references
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.settings import Settings, parse_settings
 
@@ -106,7 +106,7 @@ class _Specification:
         source = self.command.source
         prefix = f"{self.name}."
         own = {path.removeprefix(prefix): line for path, line in self.lines.items() if path.startswith(prefix)}
-        scope = without(self.command.scope, drawn)
+        scope = hide_parameters(self.command.scope, drawn)
         bounds = resolve_references(self.bounds, scope, source=source, line=self.line, lines=own)
         return parse_settings(Distribution, bounds, source=source, line=self.line, lines=own)
 

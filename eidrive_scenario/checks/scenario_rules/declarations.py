@@ -15,7 +15,7 @@ from eidrive_scenario.checks.scenario_rules.outline import WORD
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.files.bounded import absolute
 from eidrive_scenario.files.xml_lines import line_of
-from eidrive_scenario.openscenario.catalogs import catalog_place
+from eidrive_scenario.library import resolve_path
 from eidrive_scenario.openscenario.model import (
     EntitySelection,
     MonitorDeclaration,
@@ -110,7 +110,7 @@ def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:
         directory = getattr(location, "directory", None)
         if directory is None:
             continue
-        place = absolute(catalog_place(directory.path, folder))
+        place = absolute(resolve_path(directory.path, folder))
         if not any(file == place or file.parent == place for file in used):
             missing = "" if os.path.exists(place) else ", which does not exist"
             yield at(location, f"no entry of the {kind} {directory.path!r} is used{missing}", "remove it")

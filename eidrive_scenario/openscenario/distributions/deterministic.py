@@ -21,7 +21,7 @@ from eidrive_scenario.openscenario.model import (
     Element,
     Range,
 )
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, written
+from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
 
 Assignments = Mapping[str, Assignment]
 
@@ -108,7 +108,7 @@ class SteppedRange:
 
     def at(self, index: int) -> Assignments:
         """Return the choice of an index."""
-        return {self.name: Assignment(written(float(self.lower + index * self.step)), self.origin)}
+        return {self.name: Assignment(format_value(float(self.lower + index * self.step)), self.origin)}
 
 
 def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
@@ -182,7 +182,7 @@ def _steps(name: str, given: DistributionRange, collector: DiagnosticCollector) 
         return None
     if not (math.isfinite(given.step_width) and given.step_width > 0):
         collector.error(
-            f"stepWidth is {written(given.step_width)}",
+            f"stepWidth is {format_value(given.step_width)}",
             "specify a number above zero",
             source=given.source,
             line=given.line,
@@ -202,11 +202,11 @@ def valid_range(given: Range, collector: DiagnosticCollector, *, finite: bool = 
     """Whether the limits are ordered numbers; report an error otherwise."""
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:
-        message = f"the range from {written(lower)} to {written(upper)} is empty"
+        message = f"the range from {format_value(lower)} to {format_value(upper)} is empty"
         collector.error(message, "lowerLimit must be at most upperLimit", source=given.source, line=given.line)
         return False
     if math.inf in (lower, -upper) or (finite and math.inf in (-lower, upper)):
-        message = f"the range from {written(lower)} to {written(upper)} is infinite"
+        message = f"the range from {format_value(lower)} to {format_value(upper)} is infinite"
         collector.error(message, "specify finite limits", source=given.source, line=given.line)
         return False
     return True

@@ -11,7 +11,7 @@ from typing import overload
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.library import place_of
+from eidrive_scenario.library import resolve_path
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of
@@ -128,7 +128,7 @@ def _varied(
 
 
 def _scenario_file(file: File, folder: Path, report: Callable[..., None]) -> Path:
-    path = place_of(file.filepath.strip().replace("\\", "/"), folder)
+    path = resolve_path(file.filepath, folder)
     if not is_regular_file(path):
         siblings = path.parent.glob("*.xosc") if is_folder(path.parent) else ()
         report(

@@ -39,7 +39,7 @@ from eidrive_scenario.openscenario.model import (
     StochasticDistribution,
     UniformDistribution,
 )
-from eidrive_scenario.openscenario.values.parameters import Assignment, Location, written
+from eidrive_scenario.openscenario.values.parameters import Assignment, Location, format_value
 from eidrive_scenario.randomness import generator
 
 Quantile = Callable[[float], "float | str"]
@@ -88,7 +88,7 @@ class StochasticSampler:
     def _drawn(self, name: str, run: int) -> str:
         share = float(generator(0, "parameter value distribution", repr(self.seed), name, run).random())
         value = self.quantiles[name](max(share, _SMALLEST))
-        return value if isinstance(value, str) else written(value)
+        return value if isinstance(value, str) else format_value(value)
 
 
 def draws_of(stochastic: Stochastic, seed: float, collector: DiagnosticCollector) -> StochasticSampler:
@@ -132,7 +132,7 @@ def _log_normal(given: LogNormalDistribution, collector: DiagnosticCollector) ->
     if given.range is not None and lower <= 0:
         _report(
             given.range,
-            f"has the lower limit {written(lower)}",
+            f"has the lower limit {format_value(lower)}",
             "specify a limit above 0 for LogNormalDistribution",
             collector,
         )
@@ -141,9 +141,11 @@ def _log_normal(given: LogNormalDistribution, collector: DiagnosticCollector) ->
 
 def _check_normal(given: NormalDistribution | LogNormalDistribution, collector: DiagnosticCollector) -> None:
     if not math.isfinite(given.expected_value):
-        _report(given, f"has the expected value {written(given.expected_value)}", "specify a finite number", collector)
+        _report(
+            given, f"has the expected value {format_value(given.expected_value)}", "specify a finite number", collector
+        )
     if not 0 < given.variance < math.inf:
-        _report(given, f"has the variance {written(given.variance)}", "specify a number above zero", collector)
+        _report(given, f"has the variance {format_value(given.variance)}", "specify a number above zero", collector)
 
 
 def _from_normal(mean: float, deviation: float, lower: float, upper: float, share: float) -> float:
@@ -179,7 +181,10 @@ def _poisson(given: PoissonDistribution, collector: DiagnosticCollector) -> Quan
     high = math.floor(upper) if math.isfinite(upper) else None
     if not 0 < mean < _MAX_EVENTS:
         _report(
-            given, f"has the expected value {written(mean)}", f"specify one between 0 and {_MAX_EVENTS:.0f}", collector
+            given,
+            f"has the expected value {format_value(mean)}",
+            f"specify one between 0 and {_MAX_EVENTS:.0f}",
+            collector,
         )
     elif high is not None and high < low:
         _report(given, "has a range without a whole number from 0 on", "specify a range of event counts", collector)
@@ -253,10 +258,10 @@ def _accumulated(
     """Return the cumulative weights; report invalid ones."""
     for one in parts:
         if not 0 <= one.weight < math.inf:
-            _report(one, f"has the weight {written(one.weight)}", "specify a number of at least zero", collector)
+            _report(one, f"has the weight {format_value(one.weight)}", "specify a number of at least zero", collector)
     sums = tuple(accumulate(one.weight for one in parts))
     if not 0 < sums[-1] < math.inf and all(0 <= one.weight < math.inf for one in parts):
-        _report(given, f"has weights with the sum {written(sums[-1])}", "specify weights above zero", collector)
+        _report(given, f"has weights with the sum {format_value(sums[-1])}", "specify weights above zero", collector)
     return sums
 
 

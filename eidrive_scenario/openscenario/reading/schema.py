@@ -15,7 +15,7 @@ from eidrive_scenario.openscenario.model.element import ABOUT, USAGE, Usage, alt
 from eidrive_scenario.openscenario.model.scalars import Limits, NameOf
 from eidrive_scenario.openscenario.reading.matching import Automaton, Group, Leaf, automaton
 from eidrive_scenario.openscenario.values import scalars
-from eidrive_scenario.openscenario.values.scalars import Scalar, Version, is_known, parsed
+from eidrive_scenario.openscenario.values.scalars import Scalar, Version, is_known, parse_version
 
 _SCALARS = {
     float: scalars.DOUBLE,
@@ -109,7 +109,7 @@ def rules(cls: type[Element], version: Version) -> Rules:
             )
     content = cls.content_model
     if isinstance(content, Changed):
-        content = content.before if version < parsed(content.since) else content.after
+        content = content.before if version < parse_version(content.since) else content.after
     group = _group(content, children, spelling, version)
     return Rules(
         cls,
@@ -147,7 +147,7 @@ def _scalar(kind: Any, extras: tuple[Any, ...], version: Version) -> Scalar:
 
 def _child(entry: Field[Any], usage: Usage, kind: type[Element], many: bool, version: Version) -> ChildRule:
     minimum = usage.minimum if _required(entry, usage, version) else 0
-    single = many and bool(usage.single_until) and version <= parsed(usage.single_until)
+    single = many and bool(usage.single_until) and version <= parse_version(usage.single_until)
     return ChildRule(entry.name, kind, minimum, many, single or not many, _deprecated(usage, version))
 
 
@@ -156,13 +156,13 @@ def _required(entry: Field[Any], usage: Usage, version: Version) -> bool:
     return (
         without_default
         or usage.required
-        or (bool(usage.required_until) and version <= parsed(usage.required_until))
-        or (bool(usage.required_since) and version >= parsed(usage.required_since))
+        or (bool(usage.required_until) and version <= parse_version(usage.required_until))
+        or (bool(usage.required_since) and version >= parse_version(usage.required_since))
     )
 
 
 def _deprecated(usage: Usage, version: Version) -> str:
-    return usage.deprecated if usage.deprecated and version >= parsed(usage.deprecated) else ""
+    return usage.deprecated if usage.deprecated and version >= parse_version(usage.deprecated) else ""
 
 
 def _xml_name(field_name: str, *, capital: bool) -> str:
@@ -187,18 +187,18 @@ def _group(content: Content, children: dict[str, ChildRule], spelling: dict[str,
             parts.append(Leaf(spelling[part], minimum, 1 if child.single or repeated else None))
     if not isinstance(content, Choice):
         return Group(tuple(parts), exclusive=False)
-    empty = bool(content.empty_until) and version <= parsed(content.empty_until)
+    empty = bool(content.empty_until) and version <= parse_version(content.empty_until)
     return Group(tuple(parts), True, content.minimum == 0 or empty or not parts, content.maximum is None)
 
 
 def _required_choice(cls: type[Element], spelling: dict[str, str], version: Version) -> tuple[str, ...]:
     content = cls.content_model
     if isinstance(content, Changed):
-        lenient = version < parsed(content.since)
+        lenient = version < parse_version(content.since)
     else:
         parts = content.parts if isinstance(content, Sequence) else (content,)
         choices = [part for part in parts if isinstance(part, Choice)]
-        lenient = any(part.empty_until and version <= parsed(part.empty_until) for part in choices)
+        lenient = any(part.empty_until and version <= parse_version(part.empty_until) for part in choices)
     return tuple(spelling[name] for name in alternatives(cls) if name in spelling) if lenient else ()
 
 

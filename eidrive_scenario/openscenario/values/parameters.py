@@ -96,7 +96,7 @@ def as_assignments(values: Mapping[str, str | Assignment] | None) -> dict[str, A
 
 def _text_of(value: object) -> str:
     """Return the text of a Python value in a file: `True` is `true`."""
-    return written(value) if isinstance(value, bool) else str(value)
+    return format_value(value) if isinstance(value, bool) else str(value)
 
 
 @dataclass
@@ -143,7 +143,7 @@ class Scope:
             return self._convert(parameter.text, scalar, f"${parameter.name} is {quoted(parameter.text)}")
         if not (text.startswith("${") and text.endswith("}") and scalar.takes_expressions):
             return scalar.convert(text)
-        result = written(self._evaluate(text, as_text=scalar is STRING))
+        result = format_value(self._evaluate(text, as_text=scalar is STRING))
         return self._convert(result, scalar, f"the expression {quoted(text[2:-1])} is {result}")
 
     def evaluate(self, text: str) -> Value:
@@ -183,7 +183,7 @@ class Scope:
             raise ExpressionError(f"{subject}, which is not {scalar.name}", str(error)) from error
 
 
-def written(value: Value) -> str:
+def format_value(value: Value) -> str:
     """Return the text of a value in a file."""
     if isinstance(value, bool):
         return "true" if value else "false"

@@ -82,12 +82,12 @@ def _below(path: str, key: object) -> str:
     return f"{path}.{key}" if path else str(key)
 
 
-def without(scope: Scope | None, names: Iterable[str]) -> Scope | None:
+def hide_parameters(scope: Scope | None, names: Iterable[str]) -> Scope | None:
     """Return the scope without some parameters, such as those without a value yet."""
     if scope is None:
         return None
     hidden = set(names)
-    outer = without(scope.outer, hidden)
+    outer = hide_parameters(scope.outer, hidden)
     return Scope(
         outer, {name: one for name, one in scope.parameters.items() if name not in hidden}, scope.lent, scope.budget
     )

@@ -111,12 +111,14 @@ def enumeration(cls: type[Enumeration], version: Version) -> Scalar:
         return member
 
     deprecated = {
-        member for member in literals.values() if member.usage.deprecated and version >= parsed(member.usage.deprecated)
+        member
+        for member in literals.values()
+        if member.usage.deprecated and version >= parse_version(member.usage.deprecated)
     }
     return Scalar(f"a literal of {cls.__name__}", convert, deprecated=frozenset(deprecated))
 
 
-def parsed(version: str) -> Version:
+def parse_version(version: str) -> Version:
     """Return the numbers of a version such as "1.2"."""
     major, minor = version.split(".")
     return int(major), int(minor)
@@ -124,10 +126,14 @@ def parsed(version: str) -> Version:
 
 def is_known(usage: Usage, version: Version) -> bool:
     """Whether a version has the literal, attribute or element."""
-    return not (usage.since and version < parsed(usage.since)) and not (usage.until and version > parsed(usage.until))
+    return not (usage.since and version < parse_version(usage.since)) and not (
+        usage.until and version > parse_version(usage.until)
+    )
 
 
 def availability(usage: Usage, version: Version) -> str:
     """Describe the versions that have a literal, attribute or element, and the version of the file."""
-    span = f"since {usage.since}" if usage.since and version < parsed(usage.since) else f"up to {usage.until} only"
+    span = (
+        f"since {usage.since}" if usage.since and version < parse_version(usage.since) else f"up to {usage.until} only"
+    )
     return f"part of OpenSCENARIO {span}; the version of the file is {version[0]}.{version[1]}"

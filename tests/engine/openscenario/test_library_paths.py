@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.library import library_path, place_of
+from eidrive_scenario.library import library_path, resolve_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.library_catalogs import library_catalog_entries
 
@@ -101,13 +101,13 @@ def test_distribution_may_refer_to_library_scenario(tmp_path: Path) -> None:
     ],
 )
 def test_other_paths_are_relative_to_the_folder(tmp_path: Path, path: str) -> None:
-    assert place_of(path, tmp_path) == tmp_path / path
+    assert resolve_path(path, tmp_path) == tmp_path / path
 
 
 def test_broken_link_in_scenario_folder_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "eidrive_library").mkdir()
     (tmp_path / PLACE).symlink_to(tmp_path / "gone")
-    assert place_of(PLACE, tmp_path) == tmp_path / PLACE
+    assert resolve_path(PLACE, tmp_path) == tmp_path / PLACE
 
 
 def test_missing_catalog_error_suggests_library_path(tmp_path: Path) -> None:

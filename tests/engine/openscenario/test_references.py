@@ -11,7 +11,7 @@ from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType
 from eidrive_scenario.openscenario.values.parameters import Scope, declare
-from eidrive_scenario.openscenario.values.references import resolve_references, without
+from eidrive_scenario.openscenario.values.references import hide_parameters, resolve_references
 
 
 def scope_of(**parameters: tuple[ParameterType, str]) -> Scope:
@@ -106,9 +106,9 @@ def test_settings_without_scope_are_unchanged() -> None:
 
 def test_hidden_parameter_is_unknown() -> None:
     inner = Scope(SCOPE)
-    assert without(inner, ["Side"]).evaluate("$Latency") == 0.2  # type: ignore[union-attr]
+    assert hide_parameters(inner, ["Side"]).evaluate("$Latency") == 0.2  # type: ignore[union-attr]
     with pytest.raises(SettingError, match=r"unknown parameter \$Side"):
-        resolved("{a: $Side}", without(inner, ["Side"]))
+        resolved("{a: $Side}", hide_parameters(inner, ["Side"]))
 
 
 @pytest.mark.parametrize("text", ["{a: ${1 + 2}", "{a: ${1 + 2, b: 3}", "{a: ${{}}}", "{a: ${1}2}"])
