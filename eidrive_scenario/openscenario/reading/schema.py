@@ -15,7 +15,7 @@ from eidrive_scenario.openscenario.model.element import ABOUT, USAGE, Usage, alt
 from eidrive_scenario.openscenario.model.scalars import Limits, NameOf
 from eidrive_scenario.openscenario.reading.matching import Automaton, Group, Leaf, automaton
 from eidrive_scenario.openscenario.values import scalars
-from eidrive_scenario.openscenario.values.scalars import Scalar, Version, is_known, parse_version
+from eidrive_scenario.openscenario.values.scalars import Scalar, Version, is_deprecated, is_known, parse_version
 
 _SCALARS = {
     float: scalars.DOUBLE,
@@ -162,7 +162,7 @@ def _required(entry: Field[Any], usage: Usage, version: Version) -> bool:
 
 
 def _deprecated(usage: Usage, version: Version) -> str:
-    return usage.deprecated if usage.deprecated and version >= parse_version(usage.deprecated) else ""
+    return usage.deprecated if is_deprecated(usage, version) else ""
 
 
 def _xml_name(field_name: str, *, capital: bool) -> str:

@@ -110,12 +110,8 @@ def enumeration(cls: type[Enumeration], version: Version) -> Scalar:
             raise ValueError(availability(other.usage, version))
         return member
 
-    deprecated = {
-        member
-        for member in literals.values()
-        if member.usage.deprecated and version >= parse_version(member.usage.deprecated)
-    }
-    return Scalar(f"a literal of {cls.__name__}", convert, deprecated=frozenset(deprecated))
+    deprecated = frozenset(member for member in literals.values() if is_deprecated(member.usage, version))
+    return Scalar(f"a literal of {cls.__name__}", convert, deprecated=deprecated)
 
 
 def parse_version(version: str) -> Version:
@@ -126,14 +122,20 @@ def parse_version(version: str) -> Version:
 
 def is_known(usage: Usage, version: Version) -> bool:
     """Whether a version has the literal, attribute or element."""
-    return not (usage.since and version < parse_version(usage.since)) and not (
-        usage.until and version > parse_version(usage.until)
-    )
+    return not _is_later(usage, version) and not (usage.until and version > parse_version(usage.until))
+
+
+def is_deprecated(usage: Usage, version: Version) -> bool:
+    """Whether a version deprecates the literal, attribute or element."""
+    return bool(usage.deprecated) and version >= parse_version(usage.deprecated)
 
 
 def availability(usage: Usage, version: Version) -> str:
     """Describe the versions that have a literal, attribute or element, and the version of the file."""
-    span = (
-        f"since {usage.since}" if usage.since and version < parse_version(usage.since) else f"up to {usage.until} only"
-    )
+    span = f"since {usage.since}" if _is_later(usage, version) else f"up to {usage.until} only"
     return f"part of OpenSCENARIO {span}; the version of the file is {version[0]}.{version[1]}"
+
+
+def _is_later(usage: Usage, version: Version) -> bool:
+    """Whether a literal, attribute or element exists only in later versions."""
+    return bool(usage.since) and version < parse_version(usage.since)
