@@ -19,7 +19,7 @@ from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, c
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
 from eidrive_scenario.evaluation.criterion import Criterion
-from eidrive_scenario.registry import is_built_in, registration, third_party_files
+from eidrive_scenario.registry import Registration, is_built_in, registration, third_party_files
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition
 from eidrive_scenario.storyboard.context.controller_model import ControllerModel
@@ -120,11 +120,11 @@ def extension_place(
     calls: Sequence[Any], time: float | None = None, observers: Collection[object] = ()
 ) -> ExtensionPlace | None:
     """Return which extension runs in a stack, outermost call first: a third party's before one of this project."""
-    found: list[tuple[int, tuple[str, str, str]]] = []
+    found: list[tuple[int, Registration]] = []
     for row, call in enumerate(calls):
         subject = call.subject
         if any(subject is observer for observer in observers) and not is_built_in(type(subject)):
-            found.append((row, ("observer", type(subject).__name__, "")))
+            found.append((row, Registration("observer", type(subject).__name__, "")))
         elif subject is not _ABSENT and (known := _registration(subject)) is not None:
             found.append((row, known))
     third_party = [entry for entry in found if not _is_ours(calls[entry[0]].subject)] or _by_file(calls)
@@ -164,7 +164,7 @@ def _calls(trace: TracebackType | None) -> Iterator[_Call]:
         yield _Call(frame, line)
 
 
-def _registration(subject: Any) -> tuple[str, str, str] | None:
+def _registration(subject: Any) -> Registration | None:
     return registration(subject if isinstance(subject, type) else type(subject))
 
 
@@ -172,7 +172,7 @@ def _is_ours(subject: Any) -> bool:
     return is_built_in(subject if isinstance(subject, type) else type(subject))
 
 
-def _by_file(calls: Sequence[_Call]) -> list[tuple[int, tuple[str, str, str]]]:
+def _by_file(calls: Sequence[_Call]) -> list[tuple[int, Registration]]:
     """Frames of functions without an object, such as static methods, in the modules of third parties."""
     files = third_party_files()
     found = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 
 from lxml import etree
@@ -245,13 +245,18 @@ def _places(action: PrivateAction) -> bool:
     return any(isinstance(below, TeleportAction | FollowTrajectoryAction) for below in action.walk())
 
 
-@cache
 def _reference_fields(cls: type[Element]) -> tuple[tuple[str, str], ...]:
     """Return the kinds to which attributes of a class refer in any version, and the names of their fields."""
-    pairs = [
-        (rule.points_to, rule.field)
-        for version in VERSIONS
-        for rule in rules(cls, version).attributes.values()
-        if rule.points_to
-    ]
-    return tuple(dict.fromkeys(pairs))
+    known = _REFERENCE_FIELDS.get(cls)
+    if known is None:
+        pairs = [
+            (rule.points_to, rule.field)
+            for version in VERSIONS
+            for rule in rules(cls, version).attributes.values()
+            if rule.points_to
+        ]
+        known = _REFERENCE_FIELDS[cls] = tuple(dict.fromkeys(pairs))
+    return known
+
+
+_REFERENCE_FIELDS: dict[type[Element], tuple[tuple[str, str], ...]] = {}

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from functools import cache
 from typing import Any, ClassVar
 
 from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choice, Content, Sequence
@@ -141,10 +140,13 @@ class Element:
         return first[0] if isinstance(first, tuple) else first
 
 
-@cache
 def field_names(cls: type[Element]) -> tuple[str, ...]:
     """Return the fields of a class with XML content: all except `ABOUT`."""
-    return tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
+    known = _FIELD_NAMES.get(cls)
+    if known is None:
+        known = tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
+        _FIELD_NAMES[cls] = known
+    return known
 
 
 def alternatives(cls: type[Element]) -> tuple[str, ...]:
@@ -156,3 +158,6 @@ def alternatives(cls: type[Element]) -> tuple[str, ...]:
         model = next((part for part in model.parts if isinstance(part, Choice)), model)
     named = tuple(part for part in model.parts if isinstance(part, str)) if isinstance(model, Choice) else ()
     return named or field_names(cls)
+
+
+_FIELD_NAMES: dict[type[Element], tuple[str, ...]] = {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields, replace
-from functools import cache
 from typing import Any, cast
 
 from lxml import etree
@@ -282,12 +281,14 @@ def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> N
 
 def make(cls: type[Element], values: Mapping[str, Any]) -> Element:
     """Return an element with these values and its defaults; it may be incomplete, as errors are reported separately."""
+    defaults = _DEFAULTS.get(cls)
+    if defaults is None:
+        defaults = {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}
+        _DEFAULTS[cls] = defaults
     element = object.__new__(cls)
-    element.__dict__.update(_defaults(cls))
+    element.__dict__.update(defaults)
     element.__dict__.update(values)
     return element
 
 
-@cache
-def _defaults(cls: type[Element]) -> dict[str, Any]:
-    return {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}
+_DEFAULTS: dict[type[Element], dict[str, Any]] = {}

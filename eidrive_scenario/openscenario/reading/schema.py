@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import MISSING, Field, dataclass, fields
 from datetime import datetime
-from functools import cache
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -74,9 +73,16 @@ class Rules:
     """Children of which one is required by meaning, although the schema of this version allows none."""
 
 
-@cache
 def rules(cls: type[Element], version: Version) -> Rules:
     """Return the rules of a class in a version."""
+    key = (cls, version)
+    known = _KNOWN.get(key)
+    if known is None:
+        known = _KNOWN[key] = _read(cls, version)
+    return known
+
+
+def _read(cls: type[Element], version: Version) -> Rules:
     hints = get_type_hints(cls, localns=vars(model), include_extras=True)
     attributes: dict[str, AttributeRule] = {}
     children: dict[str, ChildRule] = {}
@@ -211,3 +217,7 @@ def _describe_group(group: Group) -> str:
     if not group.parts:
         return "nothing"
     return (" or " if group.exclusive else ", ").join(describe(part) for part in group.parts)
+
+
+_KNOWN: dict[tuple[type[Element], Version], Rules] = {}
+"""Cache of `rules`; mypy rejects classes of dataclasses as arguments of a function with functools.cache."""

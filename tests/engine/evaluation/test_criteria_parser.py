@@ -248,4 +248,5 @@ def test_stop_condition_with_prefix_but_without_parameter_ends_run() -> None:
     assert text.count('<Condition name="end"') == 1
     with Simulation(text.replace('<Condition name="end"', '<Condition name="criteria_end"').encode()) as simulation:
         result = simulation.run()
-    assert (result.end_reason, result.simulated_s) == ("stop trigger", pytest.approx(3.0))
+    assert result.end_reason == "stop trigger"
+    assert result.simulated_s == pytest.approx(3.0)
