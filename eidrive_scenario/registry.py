@@ -74,6 +74,10 @@ class Registry:
         """Return module and object of an extension as `package.module:Object`."""
         return self._points[name].value
 
+    def describe(self, name: str) -> str:
+        """Return an extension for messages, such as `detector 'oracle' (package.module:Object)`."""
+        return f"{singular(self.kind)} {name!r} ({self.value(name)})"
+
     def distribution(self, name: str) -> str | None:
         """Return package, version and entry point of an extension; None if it is built-in or unknown."""
         point = self._points.get(name)
@@ -94,7 +98,7 @@ class Registry:
         extension = self._import(point)
         if extension in _checked.get((self.kind, name, base), ()):
             return extension
-        described = self._described(point)
+        described = self.describe(name)
         if base is not None and not (isinstance(extension, type) and issubclass(extension, base)):
             got = extension.__name__ if isinstance(extension, type) else f"an object of type {type(extension).__name__}"
             raise RegistryError(f"{described} is not a class derived from {base.__name__} (got {got})")
@@ -115,10 +119,7 @@ class Registry:
             location = _raised_at(error)
             text = str(error) if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {error}"
             location = f" ({location})" if location else ""
-            raise RegistryError(f"{self._described(point)} does not load: {text}{location}") from error
-
-    def _described(self, point: EntryPoint) -> str:
-        return f"{singular(self.kind)} {point.name!r} ({point.value})"
+            raise RegistryError(f"{self.describe(point.name)} does not load: {text}{location}") from error
 
 
 _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}

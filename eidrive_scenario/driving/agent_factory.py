@@ -38,7 +38,7 @@ def _detector_class(name: str) -> type[Detector]:
     kind: type[Detector] = registry("detectors").load(name, Detector)
     sensors = frozenset(registry("sensors"))
     if not isinstance(kind.needs, frozenset | set) or not kind.needs <= sensors:
-        described = f"detectors {name!r} ({registry('detectors').value(name)})"
+        described = registry("detectors").describe(name)
         raise RegistryError(f"{described}: needs is {kind.needs!r} (expected a frozenset out of {sorted(sensors)})")
     _check_settings_type("detectors", name, kind.settings_type)
     return kind
@@ -46,7 +46,7 @@ def _detector_class(name: str) -> type[Detector]:
 
 def _check_settings_type(kind: str, name: str, settings_type: object) -> None:
     if settings_type is not None and not (isinstance(settings_type, type) and issubclass(settings_type, Settings)):
-        described = f"{kind} {name!r} ({registry(kind).value(name)})"
+        described = registry(kind).describe(name)
         raise RegistryError(f"{described}: settings_type is {settings_type!r} (expected a class derived from Settings)")
 
 

@@ -49,7 +49,7 @@ def planner_settings_type(name: str | None) -> type[PlannerSettings]:
     if found is None:
         return PlannerSettings
     if not (isinstance(found, type) and issubclass(found, PlannerSettings)):
-        described = f"planners {name!r} ({planners.value(name or DEFAULT_PLANNER)})"
+        described = planners.describe(name or DEFAULT_PLANNER)
         raise RegistryError(f"{described}: settings_type is {found!r} (expected a class derived from PlannerSettings)")
     return found
 

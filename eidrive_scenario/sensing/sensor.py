@@ -51,7 +51,7 @@ def sensor_class(kind: str) -> type[Sensor]:
     found: type[Sensor] = registry("sensors").load(kind, Sensor)
     model = getattr(found, "settings_type", None)
     if not (isinstance(model, type) and issubclass(model, SensorSettings)):
-        described = f"sensors {kind!r} ({registry('sensors').value(kind)})"
+        described = registry("sensors").describe(kind)
         raise RegistryError(f"{described}: settings_type is {model!r} (expected a class derived from SensorSettings)")
     return found
 

@@ -153,6 +153,6 @@ def _parse(
         raise SettingError(diagnostic)
     settings = getattr(models.load(model, Channel), "settings", None)
     if not (isinstance(settings, type) and issubclass(settings, ChannelProfile)):
-        raise RegistryError(f"channel model {model!r}: attribute `settings` is not a subclass of ChannelProfile")
+        raise RegistryError(f"{models.describe(model)}: attribute `settings` is not a subclass of ChannelProfile")
     profile = parse_settings(settings, data, source=source, line=line, lines=lines)
     return profile if profile.name else profile.model_copy(update={"name": name})

@@ -67,8 +67,8 @@ def build_controller_models(
             if controller.name in models:
                 instance = construct(models[controller.name], controller, context, actor)
                 if not isinstance(instance, ControllerModel):
-                    name = assignments[controller.name]
-                    raise RegistryError(f"controllers {name!r} is not a subclass of ControllerModel")
+                    described = known.describe(assignments[controller.name])
+                    raise RegistryError(f"{described} is not a subclass of ControllerModel")
                 built.append(instance)
     return built
 

@@ -175,9 +175,7 @@ class Builder:
                         parent=parent_element,
                     )
                     if not isinstance(behaviour, ActionBehaviour):
-                        raise RegistryError(
-                            f"actions {name!r} ({self._actions.value(name)}) is not a subclass of ActionBehaviour"
-                        )
+                        raise RegistryError(f"{self._actions.describe(name)} is not a subclass of ActionBehaviour")
                     behaviours.append(behaviour)
             except ScenarioError as error:
                 self._diagnostics += error.diagnostics
@@ -211,9 +209,7 @@ class Builder:
             return None
         make = self._conditions.load(name, Condition)
         base = Condition if by_entity is None else EntityCondition
-        type_error = RegistryError(
-            f"conditions {name!r} ({self._conditions.value(name)}) is not a subclass of {base.__name__}"
-        )
+        type_error = RegistryError(f"{self._conditions.describe(name)} is not a subclass of {base.__name__}")
         if by_entity is None:
             condition = construct(make, leaf)
             if not isinstance(condition, Condition):
