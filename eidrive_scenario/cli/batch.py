@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
-from eidrive_scenario.exit_codes import INVALID_INPUT
+from eidrive_scenario.exit_codes import INVALID_INPUT, PASSED
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution
 
 RunSeeds = Callable[[ConcreteRun], Sequence[int]]
@@ -50,7 +50,7 @@ def run_distribution(
                 raise
             typer.echo(f"run {run.number} ({run}): {error}", err=True)
             codes = [INVALID_INPUT] * repeat
-        passed = codes.count(0)
+        passed = codes.count(PASSED)
         counts["passed"] += passed
         counts["not passed"] += len(codes) - passed
         code = max(code, *codes)
