@@ -44,7 +44,7 @@ def check_rule_names(ignored: Collection[str]) -> None:
     known = {rule.name for rule in ALL_RULES}
     for name in ignored:
         if name not in known:
-            raise SettingError(Diagnostic(f"rule {name!r} does not exist", suggestion(name, known)))
+            raise SettingError(Diagnostic(f"unknown rule {name!r}", suggestion(name, known)))
 
 
 def _run(rules: Iterable[Rule[S]], context: S, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:

@@ -197,5 +197,5 @@ def test_run_rules_ignored_rule_yields_nothing(folder: Path) -> None:
     diagnostics_of(folder, "<StopTrigger/>")
     scenario = load_scenario(folder / "scenario.xosc")
     assert list(run_rules(scenario, ["no-stop-trigger"])) == []
-    with pytest.raises(SettingError, match="rule 'no-stop' does not exist; did you mean 'no-stop-trigger'"):
+    with pytest.raises(SettingError, match="unknown rule 'no-stop'; did you mean 'no-stop-trigger'"):
         list(run_rules(scenario, ["no-stop"]))

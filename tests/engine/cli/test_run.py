@@ -1,6 +1,7 @@
 """`eidrive run`: verdicts, exit codes, files."""
 
 import csv
+import inspect
 import json
 import re
 import subprocess
@@ -10,9 +11,10 @@ from pathlib import Path
 import pytest
 from command_fixtures import Eidrive
 
+from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.verdicts import show
 from eidrive_scenario.recording import read_recording
-from eidrive_scenario.simulation import RunResult
+from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings
 
 
 def test_run_of_passing_scenario_prints_verdicts(eidrive: Eidrive, passing_by: Path) -> None:
@@ -28,6 +30,14 @@ def test_run_with_collision_prints_actors_and_time(eidrive: Eidrive, passing_by:
     assert result.exit_code == 1, result.output
     # 4 m long, reference points 20 m apart: a gap of 16 m closes at 10 m/s.
     assert re.search(r"collision +failed .*Ego and Parked hit each other at 1\.6[05] s", result.stdout)
+
+
+def test_run_options_have_the_defaults_of_run_settings() -> None:
+    """The command defines them again, as it imports the simulation only when it is executed."""
+    defaults = {name: option.default for name, option in inspect.signature(run).parameters.items()}
+    settings = RunSettings()
+    expected = {"dt": settings.dt, "time_limit": settings.time_limit, "seed": DEFAULT_SEED}
+    assert {name: defaults[name] for name in expected} == expected
 
 
 def test_json_option_prints_one_object_per_run(eidrive: Eidrive, passing_by: Path) -> None:

@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from command_fixtures import Eidrive
 
+from eidrive_scenario.cli.show import Names
+from eidrive_scenario.registry import GROUPS
+
 
 def test_help_lists_commands_without_importing_engine() -> None:
     script = (
@@ -47,6 +50,10 @@ def test_list_prints_names_of_each_kind(eidrive: Eidrive, what: str, expected: s
     result = eidrive("list", what)
     assert result.exit_code == 0
     assert expected in [line.split()[0] for line in result.stdout.splitlines()]
+
+
+def test_list_has_every_group_of_extensions() -> None:
+    assert set(GROUPS) <= {name.value for name in Names}
 
 
 def test_list_without_argument_prints_scenarios(eidrive: Eidrive) -> None:
