@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
 
 MAX_DIAGNOSTICS = 200
 """Maximum number of diagnostics of one kind that are collected for one file."""
@@ -68,6 +68,11 @@ class InputError(EidriveError):
 
     def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Diagnostic, ...]]]:
         return type(self), (self.diagnostics,)
+
+    def at(self, source: str, line: int | None = None) -> Self:
+        """Return the error with this location at each diagnostic that has none."""
+        located = [one if one.source else replace(one, source=source, line=line) for one in self.diagnostics]
+        return type(self)(located)
 
 
 class ScenarioError(InputError):

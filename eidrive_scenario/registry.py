@@ -10,7 +10,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, NamedTuple
 
-from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, quoted, suggestion
 
 GROUPS = (
     "actions",
@@ -86,6 +86,11 @@ class Registry:
         package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "unknown package"
         return f"{package} ({point.value})"
 
+    def unknown(self, name: str, *, also: Iterable[str] = (), source: str = "", line: int | None = None) -> Diagnostic:
+        """Return the diagnostic of a name that no extension has; hints list the names in `also` as well."""
+        hint = suggestion(name, [*self._points, *also])
+        return Diagnostic(f"unknown {singular(self.kind)} {quoted(name)}", hint, source, line)
+
     def load(self, name: str, base: type | None = None) -> Any:
         """Return the extension of that name, a class derived from `base`.
 
@@ -94,7 +99,7 @@ class Registry:
         """
         point = self._points.get(name)
         if point is None:
-            raise SettingError(Diagnostic(f"unknown {singular(self.kind)} {name!r}", suggestion(name, self._points)))
+            raise SettingError(self.unknown(name))
         extension = self._import(point)
         if extension in _checked.get((self.kind, name, base), ()):
             return extension

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
@@ -12,6 +13,7 @@ from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNE
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
+from eidrive_scenario.extension_settings import parse_own_settings
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer, motion_noise
@@ -22,7 +24,7 @@ from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
-from eidrive_scenario.settings import Settings, parse_settings
+from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -40,27 +42,20 @@ def _detector_class(name: str) -> type[Detector]:
     if not isinstance(kind.needs, frozenset | set) or not kind.needs <= sensors:
         described = registry("detectors").describe(name)
         raise RegistryError(f"{described}: needs is {kind.needs!r} (expected a frozenset out of {sorted(sensors)})")
-    _check_settings_type("detectors", name, kind.settings_type)
     return kind
 
 
-def _check_settings_type(kind: str, name: str, settings_type: object) -> None:
-    if settings_type is not None and not (isinstance(settings_type, type) and issubclass(settings_type, Settings)):
-        described = registry(kind).describe(name)
-        raise RegistryError(f"{described}: settings_type is {settings_type!r} (expected a class derived from Settings)")
+def _construct(extension: type, *arguments: Any, own: Settings | None) -> Any:
+    """Return an instance of an extension, whose last argument are its own settings if it has any."""
+    return construct(extension, *arguments, *(() if own is None else (own,)))
 
 
 def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
     """Build the detector of a station. Raise SettingError with this location if its settings are invalid."""
-    kind: type[Detector] = _detector_class(settings.detector)
-    given = settings.detector_settings
-    if kind.settings_type is not None:
-        own = parse_settings(kind.settings_type, given, source=source, line=line)
-        return construct(kind, own)  # type: ignore[no-any-return]
-    if given:
-        message = f"detector {settings.detector!r} has no settings"
-        raise SettingError(Diagnostic(message, "remove the property 'detector_settings'", source, line))
-    return construct(kind)  # type: ignore[no-any-return]
+    name, given = settings.detector, settings.detector_settings
+    kind = _detector_class(name)
+    own = parse_own_settings("detectors", name, kind, given, setting="detector_settings", source=source, line=line)
+    return _construct(kind, own=own)  # type: ignore[no-any-return]
 
 
 def build_fusion(
@@ -71,19 +66,13 @@ def build_fusion(
     Raise SettingError with this location if its settings are invalid, or if it shares points that the detector does not
     read.
     """
-    kind: type[FusionMethod] = registry("fusion").load(settings.fusion, FusionMethod)
-    _check_settings_type("fusion", settings.fusion, kind.settings_type)
-    given = settings.fusion_settings
-    if given and kind.settings_type is None:
-        message = f"fusion {settings.fusion!r} has no settings"
-        raise SettingError(Diagnostic(message, "remove the property 'fusion_settings'", source, line))
+    name, given = settings.fusion, settings.fusion_settings
+    kind: type[FusionMethod] = registry("fusion").load(name, FusionMethod)
+    own = parse_own_settings("fusion", name, kind, given, setting="fusion_settings", source=source, line=line)
     if kind.shares_points and "lidar" not in detector.needs:
-        message = f"fusion {settings.fusion!r} shares points, which detector {settings.detector!r} does not read"
-        raise SettingError(Diagnostic(message, "give it a detector for LiDAR: lidar", source, line))
-    if kind.settings_type is None:
-        return construct(kind)  # type: ignore[no-any-return]
-    own = parse_settings(kind.settings_type, given, source=source, line=line)
-    return construct(kind, own)  # type: ignore[no-any-return]
+        message = f"fusion method {name!r} shares points, which detector {settings.detector!r} does not read"
+        raise SettingError(Diagnostic(message, "select a detector that reads lidars, such as 'lidar'", source, line))
+    return _construct(kind, own=own)  # type: ignore[no-any-return]
 
 
 def vehicle_controller_settings(
@@ -95,13 +84,8 @@ def vehicle_controller_settings(
     """
     name, given = settings.vehicle_controller, settings.vehicle_controller_settings
     kind: type[VehicleController] = registry("vehicle_controllers").load(name, VehicleController)
-    _check_settings_type("vehicle_controllers", name, kind.settings_type)
-    if kind.settings_type is not None:
-        return parse_settings(kind.settings_type, given, source=source, line=line)
-    if given:
-        message = f"vehicle controller {name!r} has no settings"
-        raise SettingError(Diagnostic(message, "remove the property 'vehicle_controller_settings'", source, line))
-    return None
+    setting = "vehicle_controller_settings"
+    return parse_own_settings("vehicle_controllers", name, kind, given, setting=setting, source=source, line=line)
 
 
 def build_agent(
@@ -122,7 +106,9 @@ def build_agent(
     wheels = spec.wheelbase > 0.0
     planner = settings.planner or (DEFAULT_PLANNER if wheels else NO_PLANNER)
     if planner != NO_PLANNER and not wheels:
-        raise SettingError(Diagnostic(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
+        raise SettingError(
+            Diagnostic(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property 'planner'")
+        )
     detector = detector or build_detector(settings)
     sensors = settings.rig_sensors(detector.needs, detector.default_sensors)
     installation = DetectorContext(spec, sensors, roads, seed)
@@ -155,8 +141,7 @@ def build_agent(
 
 def _vehicle_controller(settings: AgentSettings, spec: ActorSpec, dt: float) -> VehicleController:
     kind = registry("vehicle_controllers").load(settings.vehicle_controller, VehicleController)
-    own = vehicle_controller_settings(settings)
-    return construct(kind, spec, dt, *(() if own is None else (own,)))  # type: ignore[no-any-return]
+    return _construct(kind, spec, dt, own=vehicle_controller_settings(settings))  # type: ignore[no-any-return]
 
 
 def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception:

@@ -7,7 +7,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, ValidationError
 
-from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
+from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError, quoted
+from eidrive_scenario.extension_settings import settings_type_of
 from eidrive_scenario.registry import registry
 from eidrive_scenario.settings import Settings, parse_settings
 
@@ -44,14 +45,13 @@ def planner_settings_type(name: str | None) -> type[PlannerSettings]:
 
     Raise RegistryError if the planner does not load, or if its `settings_type` does not derive from PlannerSettings.
     """
-    planners = registry("planners")
-    found = getattr(planners.load(name or DEFAULT_PLANNER), "settings_type", None) if name != NO_PLANNER else None
-    if found is None:
+    if name == NO_PLANNER:
         return PlannerSettings
-    if not (isinstance(found, type) and issubclass(found, PlannerSettings)):
-        described = planners.describe(name or DEFAULT_PLANNER)
-        raise RegistryError(f"{described}: settings_type is {found!r} (expected a class derived from PlannerSettings)")
-    return found
+    name = name or DEFAULT_PLANNER
+    planner = registry("planners").load(name)
+    if getattr(planner, "settings_type", None) is None:
+        return PlannerSettings
+    return settings_type_of("planners", name, planner, PlannerSettings)
 
 
 def split_planner_settings(
@@ -76,8 +76,9 @@ def split_planner_settings(
     rest = {key: value for key, value in data.items() if key != "planner_settings"}
     nested = data.get("planner_settings", {})
     if not isinstance(nested, Mapping):
-        message = f"setting 'planner_settings' is {nested!r}"
-        diagnostics.append(Diagnostic(message, "a mapping is expected: {key: value, …}", source, lines.get("planner")))
+        message = f"setting 'planner_settings' is {quoted(nested)}"
+        hint = "a mapping is expected: {key: value, …}"
+        diagnostics.append(Diagnostic(message, hint, source, lines.get("planner_settings", line)))
         nested = {}
     name = data.get("planner")
     is_known = isinstance(name, str) and (name == NO_PLANNER or name in registry("planners"))

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel
-
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.stack import StackSettings
+from eidrive_scenario.extension_settings import optional_settings_type
 from eidrive_scenario.registry import distributions, registry
 from eidrive_scenario.v2x.profile import ChannelProfile
 
@@ -44,7 +43,7 @@ def resolved_stations(
 def _resolved(settings: AgentSettings) -> dict[str, Any]:
     found = settings.model_dump(mode="json")
     for kind, name in _WITH_SETTINGS:
-        model = getattr(registry(kind).load(found[name]), "settings_type", None)
-        if isinstance(model, type) and issubclass(model, BaseModel):
+        model = optional_settings_type(kind, found[name], registry(kind).load(found[name]))
+        if model is not None:
             found[f"{name}_settings"] = model.model_validate(found[f"{name}_settings"]).model_dump(mode="json")
     return found

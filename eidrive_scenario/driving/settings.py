@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, field_validator, model_validator
 
 from eidrive_scenario.driving.planner_settings import (
     NO_PLANNER,
@@ -19,7 +19,7 @@ from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.values.references import resolve_references
 from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
 from eidrive_scenario.registry import registry
-from eidrive_scenario.sensing.sensor import default_sensor, parse_sensor
+from eidrive_scenario.sensing.sensor import check_unique, default_sensor, parse_sensor
 from eidrive_scenario.sensing.settings import MAX_RANGE, MountSetting, SensorSettings, TruthSettings
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.messages.clock import StationClock
@@ -149,12 +149,11 @@ class AgentSettings(Settings):
     target_speed: Annotated[float, Field(ge=0.0, le=1e4)] | None = None
     planner_settings: SerializeAsAny[PlannerSettings] = PlannerSettings()
 
-    @model_validator(mode="after")
-    def _one_truth_sensor(self) -> AgentSettings:
-        truths = [name for name, sensor in (self.sensors or {}).items() if isinstance(sensor, TruthSettings)]
-        if len(truths) > 1:
-            raise ValueError(f"a station has one truth sensor, found {', '.join(truths)}")
-        return self
+    @field_validator("sensors")
+    @classmethod
+    def _check_unique_sensors(cls, sensors: dict[str, SensorSettings] | None) -> dict[str, SensorSettings] | None:
+        check_unique(sensors or {})
+        return sensors
 
     @model_validator(mode="after")
     def _one_way_to_generate(self) -> AgentSettings:
@@ -249,10 +248,9 @@ def agent_settings(controller: Controller) -> AgentSettings:
         except SettingError as error:
             diagnostics += error.diagnostics
     for name, kind in _SELECTED.items():
-        known = [*registry(kind), *((NO_PLANNER,) if name == "planner" else ())]
-        if name in data and data[name] not in known:
-            message = f"unknown {name} {data[name]!r}"
-            diagnostics.append(Diagnostic(message, suggestion(data[name], known), source, lines[name]))
+        also = (NO_PLANNER,) if name == "planner" else ()
+        if name in data and data[name] not in (*registry(kind), *also):
+            diagnostics.append(registry(kind).unknown(data[name], also=also, source=source, line=lines[name]))
     return parse_station_settings(data, source=source, line=controller.line, lines=lines, diagnostics=diagnostics)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
 from eidrive_scenario.registry import registry
+from eidrive_scenario.sensing.sensor import sensor_class
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.specs import actor_spec
 
@@ -26,8 +26,7 @@ def declared_settings(
 ) -> dict[str, AgentSettings]:
     """Return the settings of every station, with options applied. Raise SettingError with all diagnostics."""
     if detector is not None and detector not in registry("detectors"):
-        hint = suggestion(detector, registry("detectors"))
-        raise SettingError(Diagnostic(f"unknown detector {detector!r}", hint, "--detector"))
+        raise SettingError(registry("detectors").unknown(detector, source="--detector"))
     diagnostics: list[Diagnostic] = []
     found: dict[str, AgentSettings] = {}
     controllers: dict[str, Controller] = {}
@@ -102,16 +101,14 @@ def declared_detectors(
             if load_weights:
                 found[name].load_weights(allow_torchscript=allow_torchscript)
             source, line = controller.source, _line(controller, "sensors")
-            station.rig_sensors(found[name].needs, found[name].default_sensors)
+            for sensor in station.rig_sensors(found[name].needs, found[name].default_sensors).values():
+                sensor_class(sensor.kind).check_settings(sensor)
             line = _line(controller, "fusion_settings", "fusion")
             build_fusion(station, found[name], source=controller.source, line=line)
             line = _line(controller, "vehicle_controller_settings", "vehicle_controller")
             vehicle_controller_settings(station, source=controller.source, line=line)
         except SettingError as error:
-            diagnostics += [
-                diagnostic if diagnostic.source else replace(diagnostic, source=source, line=line)
-                for diagnostic in error.diagnostics
-            ]
+            diagnostics += error.at(source, line).diagnostics
     if diagnostics:
         raise SettingError(list(dict.fromkeys(diagnostics)))
     return found

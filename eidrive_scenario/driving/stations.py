@@ -24,7 +24,7 @@ from eidrive_scenario.driving.station_declarations import (
 )
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.image_detections import ImageDetections
@@ -285,7 +285,10 @@ class Stations(DrivingStack):
     def _set_channel(self, source: str | Path, *, origin: str, line: int | None, scope: Scope | None) -> None:
         profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
         before = self._channel or self._retired_channel
-        self._channel = build_channel(profile, self._context.seed, previous=before)
+        try:
+            self._channel = build_channel(profile, self._context.seed, previous=before)
+        except SettingError as error:
+            raise error.at(origin, line) from error
         third_party = self._channel is not None and not is_built_in(type(self._channel))
         self._checked_channel = self._channel if third_party else None
         self._retired_channel = before if self._channel is None else None

@@ -41,6 +41,12 @@ class Camera(Sensor):
         self._ignored = (spec.name,) if spec.wheelbase <= 0.0 else ()
         self._key = (seed, "camera", spec.name, name)
 
+    @classmethod
+    def check_settings(cls, settings: SensorSettings) -> None:
+        """Raise SettingError if the distortion of the lens cannot be inverted."""
+        if isinstance(settings, CameraSettings):
+            Optics(settings)
+
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
         """Return an image from the actor in this row."""
         seed, *key = self._key

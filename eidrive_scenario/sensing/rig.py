@@ -9,7 +9,7 @@ from typing import Any
 from eidrive_scenario.registry import construct
 from eidrive_scenario.sensing.readings import FIELDS, EgoState, Readings
 from eidrive_scenario.sensing.scene import Scene
-from eidrive_scenario.sensing.sensor import Sensor, sensor_class
+from eidrive_scenario.sensing.sensor import Sensor, check_unique, sensor_class
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
@@ -23,16 +23,12 @@ class Rig:
     """
 
     def __init__(self, spec: ActorSpec, sensors: Mapping[str, SensorSettings], *, seed: int = 0) -> None:
+        check_unique(sensors)
         self.station = spec.name
         self._sensors: dict[str, Sensor] = {
             name: _sensor(settings, spec, name, seed) for name, settings in sensors.items()
         }
         self._periods: dict[str, int] = {}
-        kinds = [settings.kind for settings in sensors.values()]
-        for sensor in self._sensors.values():
-            if sensor.unique and kinds.count(sensor.settings.kind) > 1:
-                kind = sensor.settings.kind
-                raise ValueError(f"sensors: station {spec.name!r} has more than one sensor of kind {kind!r}")
 
     def read(self, scene: Scene, view: WorldView) -> Readings:
         """Return the ego motion and the readings of due sensors. Raise KeyError if the actor is not in the world."""

@@ -6,14 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
-from pydantic import ValidationError
-from pydantic_core import InitErrorDetails, PydanticCustomError
-
-from eidrive_scenario.errors import RegistryError, suggestion
+from eidrive_scenario.extension_settings import settings_type_of, validate_by_kind
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.settings import SensorSettings
-from eidrive_scenario.settings import validate_nested
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
@@ -36,6 +32,10 @@ class Sensor(ABC):
         self.name = name
         self.seed = seed
 
+    @classmethod
+    def check_settings(cls, settings: SensorSettings) -> None:
+        """Raise SettingError, before the run, if valid settings of this type still permit no sensor."""
+
     @abstractmethod
     def read(self, scene: Scene, view: WorldView, row: int) -> Any:
         """Return the reading of the sensor on the actor in this row of the view."""
@@ -49,10 +49,7 @@ class Sensor(ABC):
 def sensor_class(kind: str) -> type[Sensor]:
     """Return the class of a kind of sensor. Raise RegistryError if its `settings_type` is invalid."""
     found: type[Sensor] = registry("sensors").load(kind, Sensor)
-    model = getattr(found, "settings_type", None)
-    if not (isinstance(model, type) and issubclass(model, SensorSettings)):
-        described = registry("sensors").describe(kind)
-        raise RegistryError(f"{described}: settings_type is {model!r} (expected a class derived from SensorSettings)")
+    settings_type_of("sensors", kind, found, SensorSettings)
     return found
 
 
@@ -63,11 +60,14 @@ def default_sensor(kind: str) -> SensorSettings:
 
 def parse_sensor(value: Any) -> Any:
     """Return the settings of one sensor from a mapping with its kind."""
-    if not isinstance(value, Mapping):
-        return value
-    kind = value.get("kind")
-    if not (isinstance(kind, str) and kind in registry("sensors")):
-        error = PydanticCustomError("value_error", "{hint}", {"hint": suggestion(str(kind), registry("sensors"))})
-        details = InitErrorDetails(type=error, loc=("kind",), input=kind)
-        raise ValidationError.from_exception_data("sensor", [details])
-    return validate_nested(sensor_class(kind).settings_type, value)
+    return validate_by_kind("sensors", value, SensorSettings, Sensor) if isinstance(value, Mapping) else value
+
+
+def check_unique(sensors: Mapping[str, SensorSettings]) -> None:
+    """Raise ValueError if there are several sensors of a kind of which a station has at most one."""
+    names: dict[str, list[str]] = {}
+    for name, settings in sensors.items():
+        names.setdefault(settings.kind, []).append(name)
+    for kind, found in names.items():
+        if len(found) > 1 and sensor_class(kind).unique:
+            raise ValueError(f"a station has at most one sensor of kind {kind!r} (got {', '.join(found)})")

@@ -19,7 +19,7 @@ class Channel(ABC):
     A message is never delivered before it arrives or in the tick in which it is sent. Loss and delay are drawn once
     per message and link, from a generator keyed by (seed, purpose, sender, receiver, message number).
 
-    A channel model is a class with an attribute `settings`, its subclass of ChannelProfile. It is constructed as
+    A channel model is a class with a `settings_type`, its subclass of ChannelProfile. It is constructed as
     `Model(profile, seed)`. Each tick calls `update_environment`, then `deliver` for every station, then `transmit`.
     """
 

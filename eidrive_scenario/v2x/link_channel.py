@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.radio_environment import EMPTY_RADIO_ENVIRONMENT, RadioEnvironment
@@ -59,11 +60,10 @@ class LinkChannel(Channel):
         return None
 
     def continue_from(self, previous: Channel) -> None:
-        """Take the links of the previous channel. Raise TypeError if it is not a LinkChannel."""
+        """Take the links of the previous channel. Raise SettingError if it is not a LinkChannel."""
         if not isinstance(previous, LinkChannel):
-            raise TypeError(
-                f"{type(self).__name__} cannot replace a {type(previous).__name__} (expected a LinkChannel)"
-            )
+            message = f"{type(self).__name__} cannot take over the messages of {type(previous).__name__}"
+            raise SettingError(Diagnostic(message, "select only channels that are derived from LinkChannel"))
         previous.finalize()
         self._links = previous._links
         self._remaining = list(previous.drain_events())

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.extension_settings import settings_type_of
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml, load_yaml_file
 from eidrive_scenario.openscenario.values.parameters import Scope
@@ -147,12 +148,8 @@ def _parse(
     model = data.get("model", ChannelProfile.model_fields["model"].default)
     models = registry("channels")
     if not isinstance(model, str) or model not in models:
-        diagnostic = Diagnostic(
-            f"unknown channel model {quoted(model)}", suggestion(str(model), models), source, lines.get("model", line)
-        )
-        raise SettingError(diagnostic)
-    settings = getattr(models.load(model, Channel), "settings", None)
-    if not (isinstance(settings, type) and issubclass(settings, ChannelProfile)):
-        raise RegistryError(f"{models.describe(model)}: attribute `settings` is not a subclass of ChannelProfile")
-    profile = parse_settings(settings, data, source=source, line=line, lines=lines)
+        message, hint = f"unknown channel model {quoted(model)}", suggestion(str(model), models)
+        raise SettingError(Diagnostic(message, hint, source, lines.get("model", line)))
+    settings_type = settings_type_of("channels", model, models.load(model, Channel), ChannelProfile)
+    profile = parse_settings(settings_type, data, source=source, line=line, lines=lines)
     return profile if profile.name else profile.model_copy(update={"name": name})

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording import RunLog, read_recording
 from eidrive_scenario.recording.frame import Frame
@@ -147,6 +147,14 @@ def test_run_without_loss_and_delay_equals_shared_memory(scenario: str) -> None:
     simulation.run()
     assert shared.motion == collector.motion
     assert shared.known == collector.known
+
+
+def test_channel_that_cannot_continue_another_is_error_with_line() -> None:
+    with Simulation(load_for_seed(ONE, 1, {}), seed=1) as simulation:
+        assert isinstance(simulation.stack, Stations)
+        simulation.stack._channel = SharedMemory()
+        with pytest.raises(SettingError, match=r"a\.xosc:7: ComposedChannel cannot take over .* of SharedMemory"):
+            simulation.stack.request_channel("ideal", source="a.xosc", line=7)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 from pydantic import Field, PositiveInt, model_validator
 
+from eidrive_scenario.extension_settings import validate_by_kind
 from eidrive_scenario.perception.tracking.existence import BIRTH_DENSITY, DETECTION_PROBABILITY, LIFETIME
-from eidrive_scenario.registry import registry
 from eidrive_scenario.settings import Settings, validate_nested
 
 NO_TRACKER = "none"
@@ -66,9 +66,8 @@ def tracker_setting(value: Any) -> Any:
     """
     if isinstance(value, str):
         value = {"kind": value}
-    if value is None or isinstance(value, TrackerKind) or not isinstance(value, Mapping):
+    if not isinstance(value, Mapping):
         return value
-    kind = value.get("kind")
-    if isinstance(kind, str) and kind in registry("trackers"):
-        return validate_nested(registry("trackers").load(kind).settings_type, value)
-    return validate_nested(TrackerSettings, value)
+    if value.get("kind", NO_TRACKER) == NO_TRACKER:
+        return validate_nested(TrackerSettings, value)
+    return validate_by_kind("trackers", value, TrackerKind, also=(NO_TRACKER,))

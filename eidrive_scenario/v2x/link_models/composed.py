@@ -37,7 +37,7 @@ class ComposedChannel(LinkChannel):
     smaller one.
     """
 
-    settings: ClassVar[type[ChannelProfile]] = ComposedProfile
+    settings_type: ClassVar[type[ChannelProfile]] = ComposedProfile
 
     def __init__(self, profile: ComposedProfile, seed: int) -> None:
         super().__init__()

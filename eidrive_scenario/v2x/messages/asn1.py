@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -80,9 +79,7 @@ class Asn1Encoder:
             for kind in kinds:
                 self._try(kind)
         except SettingError as error:
-            raise SettingError(
-                [replace(diagnostic, source=source, line=line) for diagnostic in error.diagnostics]
-            ) from error
+            raise error.at(source, line) from error
 
     def _try(self, kind: str) -> None:
         """Encode messages of this kind with and without the optional components."""

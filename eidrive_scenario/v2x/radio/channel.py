@@ -49,7 +49,7 @@ class RadioChannel(LinkChannel):
     the current antenna positions. Stations are sorted by name, so that results do not depend on their order.
     """
 
-    settings: ClassVar[type[ChannelProfile]] = RadioProfile
+    settings_type: ClassVar[type[ChannelProfile]] = RadioProfile
 
     def __init__(self, profile: RadioProfile, seed: int) -> None:
         super().__init__()

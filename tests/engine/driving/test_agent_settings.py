@@ -128,7 +128,9 @@ WRONG = [
     ([("target_speed", "-3")], "s.xosc:12: setting 'target_speed' is -3"),
     ([("planner", "conflict_area")], "s.xosc:12: setting 'conflict_area' is missing"),
     ([("planner", "route"), ("planner_settings", "{gap: 1}")], "s.xosc:13: unknown setting 'gap'"),
-    ([("planner_settings", "[1]")], "setting 'planner_settings' is [1]; a mapping is expected"),
+    ([("planner_settings", "[1]")], "s.xosc:12: setting 'planner_settings' is [1]; a mapping is expected"),
+    ([("vehicle_controller", "pdi")], "s.xosc:12: unknown vehicle controller 'pdi'; did you mean 'pid'?"),
+    ([("tracker", "cvt")], "s.xosc:12: setting 'tracker.kind' is 'cvt'; did you mean 'cv"),
     (
         [("min_existence", "0.2"), ("planner_settings", "{min_existence: 0.4}")],
         "s.xosc:12: setting 'min_existence' of the planner is given twice; remove it from 'planner_settings'",
@@ -140,7 +142,8 @@ WRONG = [
     ([("range", "2001-13-45")], "s.xosc:12: property 'range' is '2001-13-45', which is not valid YAML: month must be"),
     ([("sensors", "{truth: {range: 5}, truth: {}}")], "not valid YAML: duplicate key 'truth'"),
     ([("sensors", "truth, radar")], "sensor 'radar' needs a kind"),
-    ([("sensors", "{a: {kind: truth}, b: {kind: truth}}")], "a station has one truth sensor, found a, b"),
+    ([("sensors", "{a: {kind: truth}, b: {kind: truth}}")], "at most one sensor of kind 'truth' (got a, b)"),
+    ([("sensors", "{a: {kind: gnss}, b: {kind: gnss}}")], "at most one sensor of kind 'gnss' (got a, b)"),
     (
         [("sensors", "{truth: {rnge: 5}}")],
         "s.xosc:12: unknown setting 'sensors.truth.rnge'; did you mean 'range'?",

@@ -145,7 +145,9 @@ def test_early_fusion_uses_boxes_of_stations_without_points() -> None:
 
 
 def test_early_fusion_without_lidar_detector_raises() -> None:
-    with pytest.raises(SettingError, match=r"fusion 'early' shares points, which detector 'oracle' does not read"):
+    with pytest.raises(
+        SettingError, match=r"fusion method 'early' shares points, which detector 'oracle' does not read"
+    ):
         agent(EGO, detector="oracle")
 
 

@@ -119,7 +119,7 @@ def test_tables_contain_every_numeric_setting() -> None:
     for group in ("detectors", "fusion", "criteria", "planners"):
         kinds = [registry(group).load(name, object) for name in registry(group)]
         roots += [kind.settings_type for kind in kinds if kind.settings_type is not None]
-    roots += [registry("channels").load(name, Channel).settings for name in registry("channels")]
+    roots += [registry("channels").load(name, Channel).settings_type for name in registry("channels")]
     seen: set[type[BaseModel]] = set()
     needed = {entry for root in roots for entry in numeric_fields(root, seen)}
     given = {

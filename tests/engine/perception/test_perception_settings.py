@@ -48,7 +48,7 @@ def line_of(path: Path, word: str) -> int:
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        ("tracker", "ukf", "'none', 'cv' or 'ctrv'"),
+        ("tracker", "ukf", "'tracker.kind' is 'ukf'; known: ctrv, cv, none"),
         ("tracker", "{kind: cv, confirm: [3, 2]}", "n exceeds m (got [3, 2]"),
         ("tracker", "{kind: cv, coasting: 1}", "did you mean 'coast'?"),
         ("localization", "slam", "'oracle' or 'ekf'"),
@@ -74,6 +74,11 @@ def test_invalid_property_is_error_with_line(write: Write, name: str, value: str
         ("{camera: {fov: 200}}", "less than 180"),
         ("{camera: {mount: [1, 2]}}", "three to five numbers"),
         ("{camera: {distortion: [-2]}}", "folds the image"),
+        (
+            "{truth: {}, camera: {width: 64, height: 48, fov: 139.363, distortion: [0, 0.977637, 0, 0.271634, -0.110679]}}",
+            "distortion: the coefficients cannot be inverted",
+        ),
+        ("{truth: {}, a: {kind: imu}, b: {kind: imu}}", "at most one sensor of kind 'imu' (got a, b)"),
         ("{lidar: {channels: -3}}", "greater than or equal to 1"),
         ("{truth: {}, gnss: {position_noise: -2}}", "'sensors.gnss.position_noise' is -2"),
         ("{truth: {}, imu: {gyroscope_walk: -1}}", "'sensors.imu.gyroscope_walk' is -1"),

@@ -38,7 +38,7 @@ def test_rig_keeps_rates_that_divide_step_exactly(boxes: Any, rate: float) -> No
 
 
 def test_rig_with_two_truth_sensors_raises(boxes: Any) -> None:
-    with pytest.raises(ValueError, match="more than one sensor of kind 'truth'"):
+    with pytest.raises(ValueError, match="at most one sensor of kind 'truth'"):
         Rig(boxes.spec("Ego"), {"a": TruthSettings(), "b": TruthSettings()})
 
 

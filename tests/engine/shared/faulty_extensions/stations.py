@@ -87,7 +87,7 @@ class FaultyProfile(ChannelProfile):
 
 
 class FaultyChannel(LinkChannel):
-    settings = FaultyProfile
+    settings_type = FaultyProfile
 
     def __init__(self, profile, seed):
         super().__init__()
