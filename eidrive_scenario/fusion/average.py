@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.assignment import MAX_SCALAR as MAX_SCALAR_PAIRS
+from eidrive_scenario.assignment import associate, associate_small
 from eidrive_scenario.detections import NOT_ESTIMATED, Detections
-from eidrive_scenario.fusion.association import MAX_SCALAR as MAX_SCALAR_PAIRS
-from eidrive_scenario.fusion.association import associate, associate_small
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.records import replaced
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.fusion.association import assign
+from eidrive_scenario.assignment import assign
 
 Table = NDArray[np.void]
 Integers = NDArray[np.intp]

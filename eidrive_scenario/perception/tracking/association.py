@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.assignment import assign_matrix
 from eidrive_scenario.perception.tracking.motion_models import Estimates
 
 UNKNOWN_DEVIATION = 0.5
 """Standard deviation of positions for which the detector states no covariance [m]."""
 LEAST_DEVIATION = 0.05
 """Standard deviation that is added to positions with a smaller one, such as 0 [m]."""
-OUTSIDE = 1e6
-"""Cost of a pair outside the gate; larger than any sum of costs within."""
-
 
 def associate(
     tracks: Estimates, confirmed: Bools, boxes: Array, noise: Array, gate: float
@@ -33,12 +30,12 @@ def associate(
     size = a * d - b * b
     distance = (d * x * x - 2.0 * b * x * y + a * y * y) / size
     # Minus twice the log-likelihood: its normalization prevents that an uncertain track wins by its wide gate.
-    cost = np.where(distance <= gate, distance + np.log(size), OUTSIDE)
+    cost, inside = distance + np.log(size), distance <= gate
     rows: list[int] = []
     columns: list[int] = []
     for group in (np.flatnonzero(confirmed), np.flatnonzero(~confirmed)):
         free = np.setdiff1d(np.arange(len(boxes)), columns) if columns else np.arange(len(boxes))
-        for row, column in _assign(cost[group][:, free]):
+        for row, column in assign_matrix(cost[group][:, free], inside[group][:, free]):
             rows.append(int(group[row]))
             columns.append(int(free[column]))
     return rows, columns
@@ -50,14 +47,3 @@ def position_noise(covariance: Array) -> Array:
     noise = np.where(unknown[:, None, None], UNKNOWN_DEVIATION**2 * np.eye(2), covariance)
     thin = (noise[:, 0, 0] < LEAST_DEVIATION**2) | (noise[:, 1, 1] < LEAST_DEVIATION**2)
     return np.where(thin[:, None, None], noise + LEAST_DEVIATION**2 * np.eye(2), noise)
-
-
-def _assign(cost: Array) -> list[tuple[int, int]]:
-    """Return the pairs of rows and columns with the minimum total cost, restricted to pairs within the gate."""
-    if not cost.size:
-        return []
-    inside = cost < OUTSIDE
-    rows, columns = np.nonzero(inside)
-    if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
-        rows, columns = linear_sum_assignment(cost)
-    return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]

@@ -175,6 +175,14 @@ def test_object_ids_without_tracker_are_constant() -> None:
     assert assigner.assign_ids(objects(4.0, (500.0, 0.0, 0.0, "car"))) == (2,)
 
 
+def test_object_ids_near_objects_keep_ids_beside_unmatched_ones() -> None:
+    """All pairs together are 6.4 m apart, the crossed pairs 6.2 m; but only the first pair is within the gate of 3 m."""
+    assigner = ObjectIdAssigner()
+    still = 0.0
+    assert assigner.assign_ids(objects(0.0, (0.0, still, 0.0, "car"), (3.2, still, 0.0, "car"))) == (0, 1)
+    assert assigner.assign_ids(objects(0.1, (0.1, still, 0.0, "car"), (-3.1, still, 0.0, "car"))) == (0, 2)
+
+
 def test_object_ids_of_a_tracker_are_kept() -> None:
     seen = objects(0.0, (0.0, 0.0, 0.0, "car"), (9.0, 0.0, 0.0, "car"))
     tracked = Detections(0.0, seen.boxes, seen.scores, seen.classes, seen.velocity, seen.covariance, (7, 3))

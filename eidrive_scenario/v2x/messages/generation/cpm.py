@@ -11,6 +11,11 @@ from eidrive_scenario.geometry import wrap_angle
 
 SHORTEST, LONGEST = 0.1, 1.0
 """T_GenCpmMin and T_GenCpmMax [s]."""
+RETENTION = 2.0 * LONGEST
+"""Time after which an object that is no longer detected is forgotten, so that it is new afterwards [s].
+
+A design choice: an object that is in sight is reported at least every `LONGEST`, so two reports of it are missing.
+"""
 SENSORS = 1.0
 """T_AddSensorInformation: minimum time between two lists of the sensors of the station [s]."""
 HEADING, DISTANCE, SPEED = math.radians(4.0), 4.0, 0.5
@@ -79,7 +84,7 @@ class CpmGenerationRules:
         for row in chosen:
             self._reported[numbers[row]] = present[row]
         self._reported = {
-            number: report for number, report in self._reported.items() if now - report.time <= 2.0 * LONGEST
+            number: report for number, report in self._reported.items() if now - report.time <= RETENTION
         }
         self._sent = now
         self._sensors = now if sensors else self._sensors

@@ -1,4 +1,4 @@
-"""Association of two lists of boxes."""
+"""Gated assignment of two lists: the maximum number of pairs, and among these the minimum sum of costs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools
 
 MAX_SCALAR = 64
 """Maximum number of pairs for scalar evaluation, which is then faster than arrays."""
@@ -17,7 +17,7 @@ OUTSIDE = 1e6
 
 
 def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]:
-    """Return pairs (row of first, row of second) of centers (N, 3) and (M, 3) within `gate` [m].
+    """Return pairs (row of first, row of second) of points (N, D) and (M, D) within `gate` [m].
 
     The assignment has the maximum number of pairs, and among these the minimum sum of distances. Each row is used at
     most once.
@@ -28,11 +28,7 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
         return associate_small(first.tolist(), second.tolist(), gate)
     offset = first[:, None, :] - second[None, :, :]
     distance = np.sqrt(np.einsum("nmi,nmi->nm", offset, offset))
-    inside = distance < gate
-    rows, columns = np.nonzero(inside)
-    if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
-        rows, columns = linear_sum_assignment(np.where(inside, distance, OUTSIDE))
-    return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
+    return assign_matrix(distance, distance < gate)
 
 
 def associate_small(
@@ -46,6 +42,17 @@ def associate_small(
         if (distance := math.dist(one, other)) < gate
     ]
     return assign(*zip(*near, strict=True)) if near else []
+
+
+def assign_matrix(cost: Array, inside: Bools) -> list[tuple[int, int]]:
+    """Return the assigned pairs (row, column) of a cost matrix (N, M), restricted to pairs `inside` the gate (N, M).
+
+    Costs are smaller than OUTSIDE by more than their sum. Each row and column is used at most once.
+    """
+    rows, columns = np.nonzero(inside)
+    if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
+        rows, columns = linear_sum_assignment(np.where(inside, cost, OUTSIDE))
+    return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
 
 
 def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
