@@ -18,6 +18,12 @@ MOST_CELLS = 16_000_000
 BEYOND = 20.0
 """Margin of the mask around the center lines of the lanes [m]."""
 UNKNOWN, OFF, ON = -1, 0, 1
+LANE_DEVIATION = math.radians(25.0)
+"""Standard deviation between the headings of vehicles and of their lanes [rad].
+
+A design choice: a heading across the lane, as while turning, deviates by 3.6 standard deviations, so it is possible if
+the points or the image show it clearly.
+"""
 
 
 class MapContext:

@@ -11,6 +11,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
+from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION
 from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
 from eidrive_scenario.perception.lidar.l_shape import Rectangle, bounds, rectangles
 from eidrive_scenario.perception.lidar.span import RANGE_NOISE, Span, blend_size, complete_span, size_cost
@@ -21,12 +22,13 @@ SHAPELESS = 0.4
 """Maximum size of a rectangle around points that show no heading [m]."""
 FEW_COLUMNS = 1.6
 """Number of gaps between columns of rays below which the heading of a rectangle is worse than that of the lane."""
-LANE_DEVIATION = math.radians(25.0)
-"""Standard deviation between the heading of an object and the expected one [rad]."""
 HEADING_DEVIATION = 0.4
 """Standard deviation of an assumed heading [rad]."""
 NEGLIGIBLE = 12.0
 """Excess cost above which a hypothesis is neglected."""
+DOUBTFUL = 9.0
+"""Sum of squared size deviations of a fit above which its points may be a part of an object, or several objects. With
+three sizes, three in a hundred objects of the class exceed it."""
 ABOVE_TOP = 0.3
 """Height of a sensor above an object from which its top is visible [m]."""
 

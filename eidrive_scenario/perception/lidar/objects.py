@@ -13,15 +13,13 @@ from eidrive_scenario.arrays import Integers
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
-from eidrive_scenario.perception.lidar.box_fit import Fit
+from eidrive_scenario.perception.lidar.box_fit import DOUBTFUL, Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
 
 UNLIKELY = 16.0
 """Sum of squared size deviations above which a cluster is not a road user: with three sizes, one in a thousand exceeds
 it."""
-DOUBTFUL = 9.0
-"""Sum of squared size deviations above which a cluster is split, as it may be several objects close to each other."""
 FEW = 12
 """Number of points below which the heading of the lane is used, as they may show none."""
 

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.perception.geometry.map_context import MapContext
+from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION, MapContext
 from eidrive_scenario.perception.geometry.projection import NEAREST, level_frame, straight_boxes
 from eidrive_scenario.perception.geometry.size_priors import prior_of
 from eidrive_scenario.sensing.readings import CameraReading
 
 HEADINGS = 12
 """Number of tested headings over half a turn."""
-LANE_DEVIATION = math.radians(25.0)
-"""Standard deviation between the headings of vehicles and of their lanes [rad]."""
 EDGE_DEVIATION = 1.5
 """Standard deviation between the edges of a box and of the object [px]; EDGE_SHARE of the box size is added."""
 EDGE_SHARE = 0.02

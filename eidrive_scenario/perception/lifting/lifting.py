@@ -17,7 +17,7 @@ from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.geometry.size_priors import prior_of
-from eidrive_scenario.perception.lidar.box_fit import Fit
+from eidrive_scenario.perception.lidar.box_fit import DOUBTFUL, Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.perception.lifting.ground import AT_BORDER, ByGround, lift_by_ground
@@ -34,14 +34,14 @@ MOST_TRIED = 3
 LEAST_DEVIATION, LARGEST_DEVIATION = 0.1, 0.4
 """Minimum and maximum standard deviation of the logarithm of the distance expected from a box."""
 LEAST_OVERLAP = 0.3
-"""Minimum overlap of the projected box from points with the image box (intersection over union)."""
-DOUBTFUL = 9.0
-"""Sum of squared size deviations up to which points fit the class."""
+"""Minimum overlap of the projected box from points with the image box (intersection over union). A design choice: two
+boxes of equal size that are shifted by half of their width have an overlap of one third."""
 BODY_DEVIATION = 0.15
 """Standard deviation between the centers of a body and of the rectangle around its points: bumpers, mirrors and wheel
 arches [m]."""
 UNLIKELY = 60.0
-"""Sum of squared size deviations above which points are not the object."""
+"""Sum of squared size deviations above which points are not the object: 4.5 standard deviations in each of three sizes.
+A design choice: it is larger than that of the detector `lidar`, because the image shows that there is an object."""
 MAY_BE: Mapping[str, tuple[str, ...]] = {
     "car": ("car", "van"),
     "truck": ("truck", "van", "bus"),
