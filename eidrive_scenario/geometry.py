@@ -18,6 +18,11 @@ from eidrive_scenario.arrays import Array
 
 Box = Sequence[float] | Array
 
+BOX_SAMPLES: Array = np.array(
+    [[x, y, z] for x in (1.0, -1.0) for y in (1.0, -1.0) for z in (1.0, -1.0)] + [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+)
+"""Points (10, 3) of a box, in half lengths from its center: eight corners, the center, the middle of the top."""
+
 _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 
 
@@ -60,6 +65,17 @@ def box_corners(boxes: Array) -> Array:
     bottom, top = boxes[..., 2:3] - boxes[..., 5:6] / 2, boxes[..., 2:3] + boxes[..., 5:6] / 2
     heights = np.concatenate([np.repeat(bottom, 4, axis=-1), np.repeat(top, 4, axis=-1)], axis=-1)
     return np.concatenate([np.concatenate([plan, plan], axis=-2), heights[..., None]], axis=-1)
+
+
+def points_of_boxes(boxes: Array, samples: Array) -> Array:
+    """Return points (N, K, 3) of boxes (N, 7) at `samples` (K, 3), in half lengths from the center."""
+    local = samples * (boxes[:, None, 3:6] / 2.0)
+    cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
+    points = np.empty_like(local)
+    points[..., 0] = boxes[:, 0:1] + cos * local[..., 0] - sin * local[..., 1]
+    points[..., 1] = boxes[:, 1:2] + sin * local[..., 0] + cos * local[..., 1]
+    points[..., 2] = boxes[:, 2:3] + local[..., 2]
+    return points
 
 
 def box_distance(a: Box, b: Box) -> float:
@@ -112,6 +128,17 @@ def points_in_polygon(points: Array, polygon: Array) -> NDArray[np.bool_]:
     straddles = (y0 > y) != (y1 > y)
     rise = np.where(y1 == y0, 1.0, y1 - y0)
     inside: NDArray[np.bool_] = np.count_nonzero(straddles & (x < x0 + (y - y0) / rise * (x1 - x0)), axis=-1) % 2 == 1
+    return inside
+
+
+def point_in_polygon(x: float, y: float, polygon: Sequence[tuple[float, float]]) -> bool:
+    """Return whether one point is inside a polygon by the even-odd rule."""
+    inside = False
+    x0, y0 = polygon[-1]
+    for x1, y1 in polygon:
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
+            inside = not inside
+        x0, y0 = x1, y1
     return inside
 
 

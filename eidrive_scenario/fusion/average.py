@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,6 @@ from eidrive_scenario.assignment import associate, associate_small
 from eidrive_scenario.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.records import replaced
-
-Indices = NDArray[np.intp]
 
 MAX_SCALAR = 16
 """Maximum number of boxes for scalar evaluation, which is then faster than arrays."""
@@ -33,6 +32,8 @@ class AverageFusion(FusionMethod):
     known values, and the class is the most frequent one. The covariance is the mean of the known ones, an upper bound
     for any correlation of the errors. The existence probability is that of at least one correct report.
     """
+
+    is_finite_by_construction: ClassVar[bool] = True
 
     def __init__(self, gate: float = GATE) -> None:
         self.gate = gate
@@ -179,14 +180,14 @@ def _mean_of_known(rows: list[list[float]]) -> list[float]:
     return known[0] if len(known) == 1 else _mean(known)
 
 
-def _sums(values: Array, labels: Indices, count: int) -> Array:
+def _sums(values: Array, labels: NDArray[np.intp], count: int) -> Array:
     """Return the sums (count, ...) of the values (K, ...) of each label, added in order."""
     total = np.zeros((count, *values.shape[1:]))
     np.add.at(total, labels, values)
     return total
 
 
-def _means_of_known(values: Array, labels: Indices, count: int) -> Array:
+def _means_of_known(values: Array, labels: NDArray[np.intp], count: int) -> Array:
     """Return the means (count, ...) of the values (K, ...) without NaN of each label; NaN if there is none."""
     flat = values.reshape(len(values), -1)
     known = ~np.isnan(flat).any(axis=1)

@@ -41,15 +41,16 @@ class FusionMethod(ABC):
 
     settings_type: ClassVar[type[Settings] | None] = None
     """Settings class of the property `fusion_settings`; None if the method has no settings."""
+    shares_points: ClassVar[bool] = False
+    """Whether stations send lidar points beside their detections and detect in the points of all stations."""
+    is_finite_by_construction: ClassVar[bool] = False
+    """Whether a built-in method only copies and averages finite numbers, so that its results are not checked."""
 
     def add_report(self, report: Report) -> None:  # noqa: B027 - optional
         """Process a received report. Every report is passed in order of arrival, before the next `fuse`.
 
         This includes out-of-sequence and incomplete reports.
         """
-
-    shares_points: ClassVar[bool] = False
-    """Whether stations send lidar points beside their detections and detect in the points of all stations."""
 
     @property
     def max_point_age(self) -> float:

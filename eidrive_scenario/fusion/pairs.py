@@ -12,7 +12,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.assignment import assign
 
 Table = NDArray[np.void]
-Integers = NDArray[np.intp]
+"""Structured array of tracks; see `fusion.tracks.TRACK`."""
 
 UNASSIGNED_GATE = -2.0 * math.log(1e-6)
 """Maximum squared Mahalanobis distance of pairs of tracks without a partner within the gate.

@@ -12,14 +12,12 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
 from eidrive_scenario.fusion.headings import initiate_heading, predict_heading, significant_turn_rate, update_heading
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import AssociationGate, assigned_pairs, gated_pairs
+from eidrive_scenario.fusion.pairs import AssociationGate, Table, assigned_pairs, gated_pairs
 from eidrive_scenario.fusion.prediction import predict
-from eidrive_scenario.perception.tracking.association import LEAST_DEVIATION, UNKNOWN_DEVIATION
-from eidrive_scenario.perception.tracking.existence import LIFETIME, detected, likelihood_ratio
+from eidrive_scenario.perception.tracking.association import make_plausible
+from eidrive_scenario.perception.tracking.existence import detected, likelihood_ratio, survived
 from eidrive_scenario.perception.tracking.existence import missed as after_miss
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
-
-Table = NDArray[np.void]
 
 TRACK = np.dtype(
     [
@@ -66,7 +64,7 @@ def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table
     counts = [len(found) for found in lists]
     covariance = table["covariance"]
     covariance[:, :2, :2] = np.concatenate([found.covariance for found in lists])
-    table["vague"] = _make_plausible(covariance)
+    table["vague"] = make_plausible(covariance)
     table["mean"][:, :2] = boxes[:, :2]
     table["body"] = boxes[:, 2:6]
     table["score"] = table["weight"] = table["existence"] = np.minimum(np.maximum(scores, 0.0), 1.0)
@@ -119,7 +117,7 @@ def predict_tracks(tracks: Table, time: Array) -> None:
     )
     mean[:], covariance[:] = predict(mean, covariance, step, significant_turn_rate(heading, of_heading))
     heading[:], of_heading[:] = predict_heading(heading, of_heading, step)
-    tracks["existence"] *= np.exp(np.abs(step) / -LIFETIME)
+    tracks["existence"] = survived(tracks["existence"], step)
     tracks["time"] = time
 
 
@@ -221,19 +219,3 @@ def _coast(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], incomple
         after = 0.0 if station in tracked else float(after_miss(np.array(before)))
         tracks["existence"][row] = after
         tracks["score"][row] *= after / before if before > 0.0 else 0.0
-
-
-def _make_plausible(covariance: Array) -> NDArray[np.bool_]:
-    """Replace unknown position covariances in (N, 4, 4) and raise implausibly small ones.
-
-    Return whether each was unknown (N,).
-    """
-    xx, yy = covariance[:, 0, 0], covariance[:, 1, 1]
-    vague: NDArray[np.bool_] = ~np.isfinite(xx + yy + covariance[:, 0, 1])
-    if vague.any():
-        covariance[vague, :2, :2] = UNKNOWN_DEVIATION**2 * np.eye(2)
-    least = LEAST_DEVIATION**2
-    more = np.where(np.minimum(xx, yy) < least, least, 0.0)
-    xx += more
-    yy += more
-    return vague

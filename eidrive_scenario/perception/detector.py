@@ -53,6 +53,8 @@ class Detector(ABC):
     map and the line of sight."""
     settings_type: ClassVar[type[Settings] | None] = None
     """Type of the property `detector_settings`; None if the detector has no settings."""
+    is_finite_by_construction: ClassVar[bool] = False
+    """Whether a built-in detector only copies finite numbers, so that its results are not checked."""
     library_versions: Mapping[str, str] = MappingProxyType({})
     """Versions of the libraries that compute the detections, by name; part of the resolved settings."""
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})

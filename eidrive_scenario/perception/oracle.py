@@ -18,6 +18,7 @@ class OracleDetector(Detector):
 
     needs: ClassVar[frozenset[str]] = frozenset({"truth"})
     provides_velocity: ClassVar[bool] = True
+    is_finite_by_construction: ClassVar[bool] = True
 
     def detect(self, readings: Readings) -> Detections:
         truth = readings.truth

@@ -9,6 +9,7 @@ from eidrive_scenario.driving.communication.partial_reports import PartialReport
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.world.view import WorldView
 
@@ -65,9 +66,10 @@ class SnapshotBuilder:
         self._heard = {
             key: held
             for key, held in self._heard.items()
-            if now - held.message.detections.time <= self._lifetime(held.message) + 1e-9
+            if now - held.message.detections.time <= self._lifetime(held.message) + TIME_TOLERANCE
         }
-        self._links = {name: event for name, event in self._links.items() if now - event.sent <= LINK_LIFETIME + 1e-9}
+        oldest = now - LINK_LIFETIME - TIME_TOLERANCE
+        self._links = {name: event for name, event in self._links.items() if event.sent >= oldest}
         return StationSnapshot(
             station=self.station,
             view=frame.view,

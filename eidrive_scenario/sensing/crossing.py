@@ -41,16 +41,16 @@ def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array
     return enter, leave
 
 
-def is_occluded_by(origins: Array, targets: Array, boxes: Array) -> Array:
-    """Return starts (P, K, 3) of the rays: behind the box if the ray intersects it, else unchanged."""
+def ray_starts(origins: Array, targets: Array, boxes: Array) -> Array:
+    """Return starts (P, K, 3) of rays (P, K, 3) behind boxes (P, 7); unchanged if a ray does not intersect its box."""
     enter, leave = crossing(origins, targets, boxes)
     crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
     share = np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
     return np.asarray(origins + share[..., None] * (targets - origins))
 
 
-def is_occluded_by_small(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
-    """Return the same as `is_occluded_by` in scalar arithmetic, for a few rays from one origin.
+def few_ray_starts(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
+    """Return the same as `ray_starts` in scalar arithmetic, for a few rays from one origin.
 
     Targets above each other are faster if they are consecutive.
     """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.crossing import crossing, is_occluded_by
+from eidrive_scenario.sensing.crossing import crossing, ray_starts
 from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
@@ -59,7 +59,7 @@ class Lidar(Sensor):
         targets = origin + settings.range * rays
         own = view.boxes[row][None]
         if self._on_mast:
-            starts, clear = is_occluded_by(origin[None], targets[None], own)[0], np.arange(len(origin))
+            starts, clear = ray_starts(origin[None], targets[None], own)[0], np.arange(len(origin))
         else:
             enter, leave = crossing(origin[None], targets[None], own)
             starts, clear = origin, np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])

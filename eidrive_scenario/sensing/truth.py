@@ -9,7 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.sensing.crossing import is_occluded_by, is_occluded_by_small
+from eidrive_scenario.geometry import BOX_SAMPLES, points_of_boxes
+from eidrive_scenario.sensing.crossing import few_ray_starts, ray_starts
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
 from eidrive_scenario.sensing.scene import NOTHING, Point, Scene
@@ -22,11 +23,8 @@ INSET = 0.9
 """Position of the sampled corners as a share of the distance from center to corner, so that a ray to one hits the body.
 """
 
-SAMPLES = np.array(
-    [[x * INSET, y * INSET, z * INSET] for x in (1, -1) for y in (1, -1) for z in (1, -1)]
-    + [[0.0, 0.0, 0.0], [0.0, 0.0, INSET]]
-)
-"""Points (10, 3) of a box, in half lengths from its center: eight corners, the center, the middle of the top."""
+SAMPLES: Array = INSET * BOX_SAMPLES
+"""Sampled points (10, 3) of a box, in half lengths from its center."""
 
 FEW_PAIRS, FEW_RAYS = 64, 80
 """Maximum number of sensor-actor pairs, and of rays, for which scalar arithmetic is faster than arrays."""
@@ -79,9 +77,7 @@ def read_truth(
         shares = (few_visibilities if few else visibilities)(sensors, rows, targets, scene, view)
     readings, start = [], 0
     for sensor, found in zip(sensors, targets, strict=True):
-        least = sensor.settings.visibility - 1e-9
-        pairs = zip(found, shares[start : start + len(found)], strict=True)
-        readings.append(_reading(view, [(row, share) for row, share in pairs if share >= least]))
+        readings.append(_reading(sensor, found, shares[start : start + len(found)], view))
         start += len(found)
     return readings
 
@@ -90,12 +86,13 @@ def _read_single(sensor: TruthSensor, row: int, scene: Scene, view: WorldView) -
     unseen = [view.rows[name] for name in view.hidden_from(sensor.name) if name in view.rows]
     targets = candidates([sensor], [row], view, unseen)
     shares = visibilities([sensor], [row], targets, scene, view, sensor.name) if targets[0] else []
+    return _reading(sensor, targets[0], shares, view)
+
+
+def _reading(sensor: TruthSensor, targets: Sequence[int], shares: Sequence[float], view: WorldView) -> TruthReading:
+    """Return the objects in the rows `targets` with a sufficient share of their points in sight."""
     least = sensor.settings.visibility - 1e-9
-    seen = zip(targets[0], shares, strict=True)
-    return _reading(view, [(target, share) for target, share in seen if share >= least])
-
-
-def _reading(view: WorldView, seen: Sequence[tuple[int, float]]) -> TruthReading:
+    seen = [(row, share) for row, share in zip(targets, shares, strict=True) if share >= least]
     rows = np.array([row for row, _ in seen], dtype=np.intp)
     return TruthReading(
         names=tuple([view.names[row] for row, _ in seen]),
@@ -165,9 +162,9 @@ def visibilities(
     sensor_of = np.repeat(np.arange(len(sensors)), [len(rows) for rows in targets])
     target_of = np.concatenate([np.asarray(rows, dtype=np.intp) for rows in targets])
     mounts = np.array([sensor.mounting.position(view, row) for sensor, row in zip(sensors, own, strict=True)])
-    points = _points(boxes[target_of])
+    points = points_of_boxes(boxes[target_of], SAMPLES)
     origins = np.repeat(mounts[sensor_of][:, None], len(SAMPLES), axis=1)
-    starts = is_occluded_by(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
+    starts = ray_starts(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
     begin, end = starts.reshape(-1, 3), points.reshape(-1, 3)
     hits = scene.raycast(begin, end, sensor=name) if name else scene.raycast(begin, end)
     met = np.asarray(hits.rows).reshape(len(target_of), len(SAMPLES))
@@ -191,7 +188,7 @@ def few_visibilities(
                 starts += (
                     [origin] * len(aims)
                     if _above(origin, body, boxes[row])
-                    else is_occluded_by_small(origin, aims, body)
+                    else few_ray_starts(origin, aims, body)
                 )
                 points += aims
     met = scene.first_hit(starts, points)
@@ -212,17 +209,6 @@ def _above(origin: Point, own: Sequence[float], other: Sequence[float]) -> bool:
     nearest = math.hypot(other[0] - x, other[1] - y) - math.hypot(other[3], other[4]) / 2.0
     fall = z - other[2] + other[5] / 2.0
     return fall * reach < drop * nearest
-
-
-def _points(boxes: Array) -> Array:
-    """Return sampled points (P, 10, 3) of boxes (P, 7)."""
-    local = SAMPLES * (boxes[:, None, 3:6] / 2.0)
-    cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
-    points = np.empty_like(local)
-    points[..., 0] = boxes[:, 0:1] + cos * local[..., 0] - sin * local[..., 1]
-    points[..., 1] = boxes[:, 1:2] + sin * local[..., 0] + cos * local[..., 1]
-    points[..., 2] = boxes[:, 2:3] + local[..., 2]
-    return points
 
 
 def _few_points(box: Sequence[float]) -> list[Point]:

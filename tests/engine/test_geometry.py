@@ -16,6 +16,7 @@ from eidrive_scenario.geometry import (
     footprint_distance,
     iou_bev,
     overlap,
+    point_in_polygon,
     points_in_box,
     points_in_polygon,
     rotation_matrix,
@@ -122,7 +123,9 @@ def test_iou_by_hand() -> None:
 def test_points_in_polygon() -> None:
     arrow = np.array([[0, 0], [4, 0], [4, 4], [2, 1.0], [0, 4]])
     points = np.array([[1.0, 0.5], [2, 2], [3.9, 3], [-1, 1], [5, 1]])
-    assert points_in_polygon(points, arrow).tolist() == [True, False, True, False, False]
+    expected = [True, False, True, False, False]
+    assert points_in_polygon(points, arrow).tolist() == expected
+    assert [point_in_polygon(x, y, arrow.tolist()) for x, y in points] == expected
 
 
 def test_points_in_box_agree_with_the_corners() -> None:

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from eidrive_scenario.driving.planner_settings import Polygon
-from eidrive_scenario.driving.planning.conflict_area import inside
 from eidrive_scenario.driving.settings import AgentSettings, is_agent_controller
 from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.geometry import point_in_polygon
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
 
@@ -50,7 +50,7 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
     centers = [
         (low[0] + (i + 0.5) * step[0], low[1] + (j + 0.5) * step[1]) for i in range(_CELLS) for j in range(_CELLS)
     ]
-    points = [*area, *(center for center in centers if inside(*center, area))]
+    points = [*area, *(center for center in centers if point_in_polygon(*center, area))]
     reach = math.hypot(*step) / 2.0
     x, y = np.array(points, dtype=float).T
     nearest = float(roads.locate(x, y, reach=np.inf).outside.min())

@@ -13,6 +13,7 @@ from eidrive_scenario.driving.planner_settings import PlannerSettings, Polygon
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.geometry import point_in_polygon
 from eidrive_scenario.records import replaced
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
@@ -102,20 +103,9 @@ class ConflictAreaPlanner(RoutePlanner):
         found = [
             index
             for index, (x, y) in enumerate(objects.boxes[:, :2].tolist())
-            if any([inside(x, y, area) for area in self.planner_settings.conflict_area])
+            if any([point_in_polygon(x, y, area) for area in self.planner_settings.conflict_area])
         ]
         if not found:
             return ()
         existence = objects.confidence.tolist()
         return tuple([index for index in found if existence[index] >= self.planner_settings.min_existence])
-
-
-def inside(x: float, y: float, polygon: Polygon) -> bool:
-    """Whether a point lies inside a polygon, by the even-odd rule."""
-    found = False
-    x0, y0 = polygon[-1]
-    for x1, y1 in polygon:
-        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0):
-            found = not found
-        x0, y0 = x1, y1
-    return found

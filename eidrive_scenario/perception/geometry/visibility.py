@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.geometry import box_corners
+from eidrive_scenario.geometry import BOX_SAMPLES, box_corners, points_of_boxes
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
 from eidrive_scenario.perception.geometry.projection import pixels
+from eidrive_scenario.sensing.crossing import crossing
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
-POINTS = 0.8 * np.array(
-    [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)] + [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]
-)
-"""Points (10, 3) of a box, in sizes from its center."""
+POINTS: Array = 0.8 * BOX_SAMPLES
+"""Sampled points (10, 3) of a box, in half lengths from its center."""
 LEAST_HEIGHT, LEGIBLE_HEIGHT = 8.0, 20.0
 """Objects below the first height in the image are not expected to be detected; from the second on they are [px]. A
 third of the vehicles that the networks miss is below 15 px (docs/perception.md)."""
@@ -27,7 +24,7 @@ def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
     """Return the share (N,) in [0, 1] of boxes (N, 7) that the camera can show past the boxes `others` (M, 7)."""
     if not len(boxes):
         return np.empty(0)
-    points = _points(boxes)
+    points = points_of_boxes(boxes, POINTS)
     height, width = camera.rgb.shape[:2]
     places, _ = pixels(points.reshape(-1, 3), camera)
     places = places.reshape(len(boxes), -1, 2)
@@ -48,7 +45,7 @@ def in_lidar(boxes: Array, lidar: LidarReading, half_field: float, reach: float,
     """
     if not len(boxes):
         return np.empty(0)
-    points = _points(boxes)
+    points = points_of_boxes(boxes, POINTS)
     place = LevelFrame.of(lidar.pose).to_local(points[..., :2])
     bearing = np.abs(np.arctan2(place[..., 1], place[..., 0]))
     visible = (bearing <= half_field) & (np.hypot(place[..., 0], place[..., 1]) <= reach)
@@ -56,30 +53,13 @@ def in_lidar(boxes: Array, lidar: LidarReading, half_field: float, reach: float,
     return np.asarray(visible.mean(axis=1))
 
 
-def _points(boxes: Array) -> Array:
-    """Return points (N, 10, 3) of boxes (N, 7)."""
-    local = POINTS * boxes[:, None, 3:6]
-    cos, sin = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
-    x, y = local[..., 0], local[..., 1]
-    turned = np.stack([cos * x - sin * y, sin * x + cos * y, local[..., 2]], axis=-1)
-    return np.asarray(turned + boxes[:, None, :3])
-
-
 def _hidden(origin: Array, points: Array, boxes: Array, others: Array) -> Bools:
     """Return whether one of `others` (M, 7) is between `origin` (3,) and points (N, P, 3) of boxes (N, 7)."""
     hidden = np.zeros(points.shape[:2], dtype=bool)
-    for x, y, z, length, width, height, yaw in others.tolist():
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        half = np.array([length, width, height]) / 2.0
-        start = turn @ (origin - (x, y, z))
-        if np.all(np.abs(start) <= half):
-            continue
-        ray = (points - (x, y, z)) @ turn.T - start
-        safe = np.where(np.abs(ray) < 1e-9, 1e-9, ray)
-        first, second = (-half - start) / safe, (half - start) / safe
-        enter, leave = np.minimum(first, second).max(axis=-1), np.maximum(first, second).min(axis=-1)
-        near = np.hypot(boxes[:, 0] - x, boxes[:, 1] - y)
-        is_same = near < SAME * np.minimum(length, boxes[:, 3])
+    origins = np.broadcast_to(origin, points.shape)
+    for other in others:
+        enter, leave = crossing(origins, points, np.broadcast_to(other, boxes.shape))
+        near = np.hypot(boxes[:, 0] - other[0], boxes[:, 1] - other[1])
+        is_same = near < SAME * np.minimum(other[3], boxes[:, 3])
         hidden |= (enter < leave) & (enter > 0.0) & (enter < 1.0) & ~is_same[:, None]
     return hidden

@@ -14,8 +14,8 @@ from pydantic import Field, model_validator
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import Detector, DetectorContext
+from eidrive_scenario.perception.geometry.duplicates import without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.visibility import in_camera
@@ -41,10 +41,6 @@ from eidrive_scenario.settings import Settings
 
 SHIPPED = Path(__file__).parents[1] / "weights"
 OWN_SUFFIX, EXTERNAL_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)
-
-SAME_PLACE = 0.1
-"""Overlap in plan view above which lifted boxes are one object; the one with the highest score is kept."""
-
 
 Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
 """Width or height of a network input [px]."""
@@ -250,9 +246,4 @@ def merge_duplicates(parts: list[Detections], time: float) -> Detections:
         np.concatenate([part.velocity for part in parts]),
         np.concatenate([part.covariance for part in parts]),
     )
-    shared = iou_bev(merged.boxes, merged.boxes)
-    kept: list[int] = []
-    for row in np.argsort(-merged.scores, kind="stable").tolist():
-        if not kept or shared[row, kept].max() <= SAME_PLACE:
-            kept.append(row)
-    return merged.subset(sorted(kept))
+    return without_duplicates(merged)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,8 +11,8 @@ from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import Detector, DetectorContext
+from eidrive_scenario.perception.geometry.duplicates import without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import (
     LevelFrame,
     Pattern,
@@ -27,12 +26,10 @@ from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.settings import Settings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 HALF_SURE = 5.0
 """Number of points at which the score is half of its maximum."""
-TIME_TOLERANCE = 1e-6
-SAME = 0.1
-"""Overlap above which boxes of two sensors of one station show one object (intersection over union)."""
 
 
 class LidarDetectorSettings(Settings):
@@ -97,7 +94,7 @@ class LidarDetector(Detector):
             np.full((len(found), 2), np.nan),
             np.concatenate([frame.covariance_to_world(one.fit.covariance[None]) for one, frame in found]),
         )
-        return detections if len(readings.lidars) < 2 else _without_duplicates(detections)
+        return detections if len(readings.lidars) < 2 else without_duplicates(detections)
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show."""
@@ -133,13 +130,3 @@ class _Revolution:
 def _score(found: FittedObject) -> float:
     """Return the score: one half for five points that fit a class well; less for unusual sizes."""
     return len(found.rows) / (len(found.rows) + HALF_SURE) * math.exp(-found.fit.deviation / UNLIKELY)
-
-
-def _without_duplicates(detections: Detections) -> Detections:
-    """Return the box with the highest score of each group of overlapping boxes."""
-    overlap = iou_bev(detections.boxes, detections.boxes)
-    kept: list[int] = []
-    for row in np.argsort(-detections.scores, kind="stable").tolist():
-        if not kept or overlap[row, kept].max() < SAME:
-            kept.append(row)
-    return replace(detections.subset(sorted(kept)))

@@ -43,7 +43,22 @@ def associate(
 
 def position_noise(covariance: Array) -> Array:
     """Return position covariances (N, 2, 2), with defaults for missing and too small ones."""
-    unknown = np.asarray(np.any(~np.isfinite(covariance), axis=(1, 2)))
-    noise = np.where(unknown[:, None, None], UNKNOWN_DEVIATION**2 * np.eye(2), covariance)
-    thin = (noise[:, 0, 0] < LEAST_DEVIATION**2) | (noise[:, 1, 1] < LEAST_DEVIATION**2)
-    return np.where(thin[:, None, None], noise + LEAST_DEVIATION**2 * np.eye(2), noise)
+    noise = covariance.copy()
+    make_plausible(noise)
+    return noise
+
+
+def make_plausible(covariance: Array) -> Bools:
+    """Replace unknown position covariances in (N, D, D), and raise implausibly small ones.
+
+    Return whether each was unknown (N,).
+    """
+    xx, yy = covariance[:, 0, 0], covariance[:, 1, 1]
+    unknown: Bools = ~np.isfinite(xx + yy + covariance[:, 0, 1])
+    if unknown.any():
+        covariance[unknown, :2, :2] = UNKNOWN_DEVIATION**2 * np.eye(2)
+    least = LEAST_DEVIATION**2
+    more = np.where(np.minimum(xx, yy) < least, least, 0.0)
+    xx += more
+    yy += more
+    return unknown

@@ -6,6 +6,7 @@ import math
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 
 class TrackHistory:
@@ -47,5 +48,5 @@ class TrackHistory:
     def is_alive(self, now: float, settings: TrackerSettings) -> bool:
         """Return whether the track is kept."""
         if self.is_often_detected:
-            return now - self._last_detection <= settings.coast + 1e-9
+            return now - self._last_detection <= settings.coast + TIME_TOLERANCE
         return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]

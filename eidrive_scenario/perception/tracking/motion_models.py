@@ -9,6 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.geometry import wrap_angle
 
 ACCELERATION_DENSITY = 6.0
 """Spectral density of white acceleration [m²/s³]: a speed changes by 2.4 m/s in a second (standard deviation)."""
@@ -151,7 +152,7 @@ class TurnRate(MotionModel):
             state[backwards, 3] *= -1.0
             mirror = np.array([1.0, 1.0, 1.0, -1.0, 1.0])
             covariance[backwards] *= mirror[:, None] * mirror
-        state[:, 2] = np.pi - (np.pi - state[:, 2]) % (2.0 * np.pi)
+        state[:, 2] = wrap_angle(state[:, 2])
         return Estimates(state, covariance)
 
     def velocity(self, state: Array) -> Array:

@@ -12,18 +12,14 @@ from scipy.special import chdtri
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.tracking.association import associate, position_noise
-from eidrive_scenario.perception.tracking.existence import (
-    MOST,
-    detected,
-    likelihood_ratio,
-    missed,
-    survived,
-)
+from eidrive_scenario.perception.tracking.existence import MOST, detected, likelihood_ratio, missed, survived
 from eidrive_scenario.perception.tracking.history import TrackHistory
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerKind, TrackerSettings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
@@ -124,8 +120,7 @@ class Tracker(TrackingMethod):
     def _boxes(self, rows: NDArray[np.intp] | list[int], state: Array) -> Array:
         """Return boxes (N, 7) of these tracks with these states (N, D)."""
         shape = self._shape[rows]
-        yaw = math.pi - (math.pi - shape[:, 4:]) % (2.0 * math.pi)
-        return np.concatenate([state[:, :2], shape[:, :4], yaw], axis=1)
+        return np.concatenate([state[:, :2], shape[:, :4], wrap_angle(shape[:, 4:])], axis=1)
 
     def _correct(self, rows: list[int], detections: Detections, columns: list[int], noise: Array) -> None:
         boxes = detections.boxes[columns]
@@ -183,7 +178,7 @@ class Tracker(TrackingMethod):
 
         None before the first detections, and more than `coast` after the last ones.
         """
-        if self._time is None or not 0.0 <= time - self._time <= self.settings.coast + 1e-9:
+        if self._time is None or not 0.0 <= time - self._time <= self.settings.coast + TIME_TOLERANCE:
             return None
         step = time - self._time
         shown = [

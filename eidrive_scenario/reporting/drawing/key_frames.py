@@ -13,6 +13,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import box_distance, points_in_polygon
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 NEAR = 3.0
 """Maximum distance between the center of a detection and the true position of the car at that time [m]."""
@@ -163,7 +164,7 @@ class KeyFrames:
 
     def _shows(self, detections: Detections) -> bool:
         """True if a detection is near the position of the occluded car at the time of measurement."""
-        row = min(bisect.bisect_left(self._times, detections.time - 1e-9), len(self._positions) - 1)
+        row = min(bisect.bisect_left(self._times, detections.time - TIME_TOLERANCE), len(self._positions) - 1)
         x, y = self._positions[row]
         return any(math.hypot(box[0] - x, box[1] - y) <= NEAR for box in detections.boxes.tolist())
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.conflict_area import ConflictAreaPlanner, ConflictAreaSettings, inside
+from eidrive_scenario.driving.planning.conflict_area import ConflictAreaPlanner, ConflictAreaSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.registry import registry
@@ -86,14 +86,6 @@ def test_object_in_any_of_several_areas_brakes(car: ActorSpec) -> None:
     assert rule.plan(EGO, objects(0.0, (4.0, 4.0)), None, 0.0).braking is not None
     rule = planner(car, conflict_area=[[0, 0], [10, 0], [0, 10]])
     assert rule.plan(EGO, objects(0.0, (6.0, 6.0)), None, 0.0).braking is None
-
-
-def test_inside_of_concave_polygon_follows_even_odd_rule() -> None:
-    arrow = ((0.0, 0.0), (4.0, 4.0), (0.0, 2.0), (-4.0, 4.0))
-    assert inside(0.0, 1.0, arrow)
-    assert inside(3.0, 3.2, arrow)
-    assert not inside(0.0, 3.0, arrow)
-    assert not inside(5.0, 1.0, arrow)
 
 
 def test_planner_without_area_raises_setting_error(car: ActorSpec) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.sensing.crossing import is_occluded_by, is_occluded_by_small
+from eidrive_scenario.sensing.crossing import few_ray_starts, ray_starts
 from eidrive_scenario.sensing.settings import Mount, TruthSettings
 from eidrive_scenario.sensing.truth import (
     TruthSensor,
@@ -28,19 +28,19 @@ box = st.tuples(coordinate, coordinate, coordinate, length, length, length, st.f
 
 @settings(max_examples=300, deadline=None)
 @given(origin=point, targets=st.lists(point, min_size=1, max_size=12), box=box)
-def test_is_occluded_by_small_equals_arrays(origin: Any, targets: Any, box: Any) -> None:
-    few = is_occluded_by_small(origin, targets, box)
-    many = is_occluded_by(np.broadcast_to(origin, (1, len(targets), 3)), np.array([targets]), np.array([box]))[0]
+def test_few_ray_starts_equals_arrays(origin: Any, targets: Any, box: Any) -> None:
+    few = few_ray_starts(origin, targets, box)
+    many = ray_starts(np.broadcast_to(origin, (1, len(targets), 3)), np.array([targets]), np.array([box]))[0]
     np.testing.assert_allclose(np.array(few), many, rtol=0.0, atol=1e-9)
 
 
-def test_is_occluded_by_small_along_face_equals_arrays() -> None:
+def test_few_ray_starts_along_face_equals_arrays() -> None:
     """A sensor on the roof and one on the bumper, as in usual mounts."""
     box = (2.0, 1.0, 1.0, 4.0, 2.0, 2.0, 0.0)
     for origin in [(2.0, 1.0, 2.0), (4.0, 1.0, 1.0)]:
         targets = [(9.0, 1.0, 2.0), (9.0, 1.0, 0.0), (-9.0, 1.0, 2.0), (4.0, 7.0, 1.0), (2.0, 1.0, -3.0)]
-        many = is_occluded_by(np.broadcast_to(origin, (1, 5, 3)), np.array([targets]), np.array([box]))[0]
-        np.testing.assert_allclose(np.array(is_occluded_by_small(origin, targets, box)), many, atol=1e-12)
+        many = ray_starts(np.broadcast_to(origin, (1, 5, 3)), np.array([targets]), np.array([box]))[0]
+        np.testing.assert_allclose(np.array(few_ray_starts(origin, targets, box)), many, atol=1e-12)
 
 
 def stations(boxes: Any, view: WorldView) -> list[TruthSensor]:
