@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.average_precision import match
+from eidrive_scenario.experiments.average_precision import match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
 from eidrive_scenario.perception.learned.networks.suppression import overlap
 from training.dataset import Dataset

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.average_precision import match
+from eidrive_scenario.experiments.average_precision import match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.randomness import generator

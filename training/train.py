@@ -21,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from eidrive_scenario.perception.learned.average_precision import Matches, average_precision, best_confidence, match
+from eidrive_scenario.experiments.average_precision import Matches, average_precision, best_confidence, match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, suppression_groups
 from eidrive_scenario.perception.learned.networks.boxes import centered
 from eidrive_scenario.perception.learned.networks.ssd import default_boxes

@@ -79,15 +79,6 @@ class PairedDifference:
     low: float
     high: float
     confidence: float
-    larger: int
-    """Number of pairs with a larger second value."""
-    smaller: int
-    """Number of pairs with a smaller second value."""
-
-    @property
-    def clear(self) -> bool:
-        """True if the interval excludes zero."""
-        return self.low > 0.0 or self.high < 0.0
 
 
 def paired_difference(
@@ -112,43 +103,4 @@ def paired_difference(
             rng=generator(seed, "paired bootstrap"),
         ).confidence_interval
         low, high = float(interval.low), float(interval.high)
-    return PairedDifference(
-        pairs=len(difference),
-        mean=mean,
-        low=low,
-        high=high,
-        confidence=confidence,
-        larger=int((difference > 0).sum()),
-        smaller=int((difference < 0).sum()),
-    )
-
-
-@dataclass(frozen=True)
-class PairedOutcomes:
-    """Outcomes of pairs with equal seeds. `p_value` is that of McNemar's exact two-sided test."""
-
-    both: int
-    first_only: int
-    second_only: int
-    neither: int
-    p_value: float
-
-
-def paired_outcomes(first: Sequence[bool], second: Sequence[bool]) -> PairedOutcomes:
-    """Test whether two arms pass equally often, by their discordant pairs (McNemar 1947, exact binomial form).
-
-    Raise ValueError if the arms differ in length or are empty.
-    """
-    if len(first) != len(second) or not first:
-        raise ValueError(f"pairs: lengths differ or are 0 (got {len(first)} and {len(second)} outcomes)")
-    counts = {(a, b): 0 for a in (True, False) for b in (True, False)}
-    for a, b in zip(first, second, strict=True):
-        counts[bool(a), bool(b)] += 1
-    discordant = counts[True, False] + counts[False, True]
-    return PairedOutcomes(
-        both=counts[True, True],
-        first_only=counts[True, False],
-        second_only=counts[False, True],
-        neither=counts[False, False],
-        p_value=float(binomtest(counts[True, False], discordant).pvalue) if discordant else 1.0,
-    )
+    return PairedDifference(pairs=len(difference), mean=mean, low=low, high=high, confidence=confidence)

@@ -20,7 +20,7 @@ from eidrive_scenario.fusion.average import AverageFusion
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.geometry import iou_bev
-from eidrive_scenario.perception.learned.average_precision import average_precision, match_by_share
+from eidrive_scenario.experiments.average_precision import average_precision, match_by_share
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.propagation.gains import blockage_moments, highway_los

@@ -41,13 +41,7 @@ def covariances(both: Array) -> Array:
     return covariance
 
 
-def intersect(a: Array, cov_a: Array, b: Array, cov_b: Array) -> tuple[Array, Array, Array]:
-    """Return mean, covariance and weight of a, fused from means (..., 2) with covariances (..., 2, 2)."""
-    both, w = intersect_batch(estimates(a, cov_a), estimates(b, cov_b))
-    return means(both), covariances(both), w
-
-
-def intersect_batch(a: Array, b: Array) -> tuple[Array, Array]:
+def intersect(a: Array, b: Array) -> tuple[Array, Array]:
     """Return the fused estimates (5, ...) and the weights (...) of a.
 
     P⁻¹ = w A⁻¹ + (1 - w) B⁻¹, x = P (w A⁻¹ a + (1 - w) B⁻¹ b). P is at least the true covariance of the error for any

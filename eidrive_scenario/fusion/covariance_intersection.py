@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, Detections
-from eidrive_scenario.fusion.covariance import covariances, estimates, intersect_batch, means
+from eidrive_scenario.fusion.covariance import covariances, estimates, intersect, means
 from eidrive_scenario.fusion.grouping import group_tracks
 from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
@@ -121,7 +121,7 @@ def _intersect_states(tracks: Table, objects: list[list[int]]) -> tuple[Array, A
     groups, count = objects, len(tracks)
     while pairs := [pair for members in groups for pair in zip(members[::2], members[1::2], strict=False)]:
         first, second = zip(*pairs, strict=True)
-        fresh, _ = intersect_batch(known.take(first, axis=1), known.take(second, axis=1))
+        fresh, _ = intersect(known.take(first, axis=1), known.take(second, axis=1))
         known = np.concatenate([known, fresh], axis=1)
         places = iter(range(count, count + len(pairs)))
         groups = [[*islice(places, len(members) // 2), *members[len(members) // 2 * 2 :]] for members in groups]

@@ -62,11 +62,6 @@ class Replay:
     damage: tuple[str, ...]
 
 
-def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | None = None) -> Path:
-    """Write the replay of a recording to the file `out` and return `out`; see `make_replay`."""
-    return make_replay(recording, out, result).page
-
-
 def make_replay(
     recording: Recording,
     out: Path,

@@ -85,11 +85,6 @@ def load_profile(
     return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
 
 
-def profile_names(folder: Path) -> tuple[str, ...]:
-    """Return the sorted names of the profiles in a folder, including `none`."""
-    return tuple(sorted({NO_COOPERATION, *(path.stem for path in _profiles(folder))}))
-
-
 def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel | None = None) -> Channel | None:
     """Return the channel of a profile; None without a profile.
 

@@ -81,11 +81,6 @@ class GilbertElliottLoss(Settings):
         to_bad, to_good = self.steps
         return to_bad / (to_bad + to_good)
 
-    @property
-    def share_lost(self) -> float:
-        """Stationary loss probability."""
-        return self.share_bad * self.bad_loss + (1.0 - self.share_bad) * self.good_loss
-
 
 class DistanceLoss(Settings):
     """Loss by distance between the antennas, from a table with linear interpolation, constant beyond its ends.

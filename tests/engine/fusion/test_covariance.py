@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.fusion.covariance import TRACE_TOLERANCE, intersect
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.fusion import covariance as ci
+from eidrive_scenario.fusion.covariance import TRACE_TOLERANCE
 from eidrive_scenario.randomness import generator
+
+
+def intersect(a: Array, cov_a: Array, b: Array, cov_b: Array) -> tuple[Array, Array, Array]:
+    """Return mean, covariance and weight of a, fused from means (..., 2) with covariances (..., 2, 2)."""
+    fused, weight = ci.intersect(ci.estimates(a, cov_a), ci.estimates(b, cov_b))
+    return ci.means(fused), ci.covariances(fused), weight
 
 
 def random_covariances(count: int, *key: int) -> np.ndarray:

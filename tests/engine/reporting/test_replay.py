@@ -16,7 +16,7 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.replay import replay_data, write_replay
+from eidrive_scenario.reporting.replay import make_replay, replay_data
 from eidrive_scenario.reporting.run_report.settings_text import short_number
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 
@@ -78,7 +78,7 @@ def test_replay_data_lists_storyboard_transitions(street: Play) -> None:
 
 
 def test_replay_page_contains_run_without_external_resources(street: Play, tmp_path: Path) -> None:
-    out = write_replay(read_recording(recorded(street(1), tmp_path)), tmp_path / "pages" / "run.html")
+    out = make_replay(read_recording(recorded(street(1), tmp_path)), tmp_path / "pages" / "run.html").page
     text = out.read_text(encoding="utf-8")
     assert not re.search(r"(?:src|href)\s*=\s*[\"']?(?!#|data:)", text)
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
@@ -91,7 +91,7 @@ def test_replay_page_contains_run_without_external_resources(street: Play, tmp_p
 
 def test_replay_of_empty_recording_raises_input_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="contains no readable frame"):
-        write_replay(read_recording(recorded([], tmp_path)), tmp_path / "run.html")
+        make_replay(read_recording(recorded([], tmp_path)), tmp_path / "run.html")
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_replay_page_without_stations_hides_station_panels(street: Play, tmp_pat
     hidden = ".stations { display: none; }"
     alone = [Frame(frame.view) for frame in street(1)]
     for frames, expected in ((street(1), False), (alone, True)):
-        page = write_replay(read_recording(recorded(frames, tmp_path)), tmp_path / "page.html")
+        page = make_replay(read_recording(recorded(frames, tmp_path)), tmp_path / "page.html").page
         assert (hidden in page.read_text(encoding="utf-8")) is expected
 
 
@@ -145,7 +145,7 @@ def test_replay_report_timeout_of_station_ends_received_boxes(
     for frame in street(1, frozenset(range(30, 100))):
         recorder.observe(frame)
     recorder.close()
-    page = write_replay(read_recording(tmp_path / "run.mcap"), tmp_path / "replay.html").read_text(encoding="utf-8")
+    page = make_replay(read_recording(tmp_path / "run.mcap"), tmp_path / "replay.html").page.read_text(encoding="utf-8")
     data = json.loads(html.fromstring(page).findtext(".//script[@id='data']") or "")
     heard = [tick for tick, ego in enumerate(data["stations"]["Ego"]) if ego["heard"]]
     assert heard[-1] == last

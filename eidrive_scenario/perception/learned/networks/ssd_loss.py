@@ -11,7 +11,7 @@ from eidrive_scenario.perception.learned.networks.ssd import encode
 from eidrive_scenario.perception.learned.networks.targets import Targets
 
 LEAST_OVERLAP = 0.5
-"""Minimum overlap of a default box with its object."""
+"""Minimum overlap of a default box with its object (Liu et al. 2016, section 2.2)."""
 NEUTRAL_OVERLAP = 0.4
 """Overlap from which, up to LEAST_OVERLAP, a default box is neither assigned nor background."""
 NEGATIVES_PER_POSITIVE = 3

@@ -11,6 +11,7 @@ from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.perception.learned.networks.suppression import covered, overlap
 
 LEAST_OVERLAP = 0.5
+"""Minimum overlap of a detection with its object (intersection over union), as in PASCAL VOC."""
 
 
 @dataclass(frozen=True)

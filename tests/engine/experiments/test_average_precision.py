@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.perception.learned.average_precision import (
+from eidrive_scenario.experiments.average_precision import (
     Matches,
     average_precision,
     best_confidence,
