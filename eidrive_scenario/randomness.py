@@ -12,10 +12,14 @@ import numpy as np
 
 
 def generator(seed: int, *key: str | int) -> np.random.Generator:
-    """Return the counter-based generator (Philox 4x64-10) of this seed and key, the same in every process.
+    """Return the counter-based generator (Philox 4x64-10) of this seed and key, the same in every process."""
+    return np.random.Generator(np.random.Philox(key=integer_key(seed, *key, size=16)))
+
+
+def integer_key(seed: int, *key: str | int, size: int) -> int:
+    """Return an integer of `size` bytes for this seed and key.
 
     The key is hashed with BLAKE2b, as the `hash` of Python differs between processes.
     """
     text = "\x1f".join([str(seed), *(f"{type(part).__name__}:{part}" for part in key)])
-    digest = hashlib.blake2b(text.encode(), digest_size=16).digest()
-    return np.random.Generator(np.random.Philox(key=int.from_bytes(digest, "little")))
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=size).digest(), "little")

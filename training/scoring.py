@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, match, recall_at
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, light_state
 
 Array = NDArray[np.float64]

@@ -16,11 +16,11 @@ from scipy.special import ndtr
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.radio_line_of_sight import line_of_sight_states
+from eidrive_scenario.experiments.average_precision import average_precision, match_by_share
 from eidrive_scenario.fusion.average import AverageFusion
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.geometry import iou_bev
-from eidrive_scenario.experiments.average_precision import average_precision, match_by_share
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.propagation.gains import blockage_moments, highway_los

@@ -186,9 +186,7 @@ def few_visibilities(
             for row in rows:
                 aims = _few_points(boxes[row])
                 starts += (
-                    [origin] * len(aims)
-                    if _above(origin, body, boxes[row])
-                    else few_ray_starts(origin, aims, body)
+                    [origin] * len(aims) if _above(origin, body, boxes[row]) else few_ray_starts(origin, aims, body)
                 )
                 points += aims
     met = scene.first_hit(starts, points)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
-from eidrive_scenario.v2x.statistics.links import LinkStatistics
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 OutgoingMessage = tuple[Message, Sequence[str]]
 """A message and its receivers."""

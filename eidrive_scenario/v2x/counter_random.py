@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.randomness import integer_key
 
 Keys = NDArray[np.uint64]
 
@@ -18,8 +17,7 @@ _64_BITS = (1 << 64) - 1
 
 def key(seed: int, *parts: str | int) -> int:
     """Return a 64-bit key of this seed, purpose and link, equal in every process."""
-    text = "\x1f".join([str(seed), *(f"{type(part).__name__}:{part}" for part in parts)])
-    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")
+    return integer_key(seed, *parts, size=8)
 
 
 def uniforms(keys: Keys, counts: Integers | int) -> Array:

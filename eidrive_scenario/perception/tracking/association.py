@@ -13,6 +13,7 @@ UNKNOWN_DEVIATION = 0.5
 LEAST_DEVIATION = 0.05
 """Standard deviation that is added to positions with a smaller one, such as 0 [m]."""
 
+
 def associate(
     tracks: Estimates, confirmed: Bools, boxes: Array, noise: Array, gate: float
 ) -> tuple[list[int], list[int]]:

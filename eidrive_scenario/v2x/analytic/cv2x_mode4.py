@@ -14,34 +14,29 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.analytic.levels import (
     RATIOS,
+    REACH,
+    SHADOWING,
     STEP,
     autocorrelation,
     errors_over,
     interference,
+    interferer_positions,
+    loss_by_interferer,
     sensed_share,
     signal,
 )
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.propagation.gains import winner_b1
+from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, CANDIDATE_SHARE, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
 
 FREQUENCY = 5.91
 """Carrier frequency [GHz]."""
-ANTENNA = 1.5
-"""Height of all antennas [m]."""
 ENVIRONMENT = 0.0
 """Height of the environment, which the path loss subtracts from the antenna heights [m]."""
-SHADOWING = 3.0
-"""Standard deviation of the shadowing [dB]."""
-SENSING, NOISE = -90.5, -95.0
-"""Sensing threshold, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
-BLOCKS = 50
-"""Number of resource blocks in 10 MHz."""
+SENSING = SENSING_DBM["cv2x_mode4"]
+"""Sensing threshold [dBm]."""
 NO_INTERFERENCE = -180.0
 """Power of an absent interferer [dBm]."""
-REACH, FARTHEST_INTERFERER = 1500, 1000
-"""Maximum distances at which vehicles contribute to the load and interfere [m]."""
-CANDIDATES = 0.2
-"""Minimum share of candidate resources after the exclusion by sensing (3GPP TS 36.213, 14.1.1.6)."""
 
 _TAIL = (20.0, 20.0 + 1e-6)
 CODINGS = {
@@ -74,27 +69,22 @@ def cv2x_mode4_errors(
 
     density  vehicles per meter;  rate  packets per second and vehicle;  power  [dBm];  subchannels  4 or 2
     """
-    height = ANTENNA - environment_height
+    height = ANTENNA_HEIGHT - environment_height
 
     def received_power(meters: Array) -> Array:
         return power - winner_b1(meters, FREQUENCY, height, height)
 
     blocks, ratios, block_errors = CODINGS[subchannels]
-    noise = NOISE - 10.0 * np.log10(BLOCKS / blocks)
+    noise = NOISE_DBM - 10.0 * np.log10(RESOURCE_BLOCKS / blocks)
     curve = np.interp(RATIOS, ratios, block_errors)
     errors = errors_over(signal(received_power(distance), SHADOWING, SENSING), curve)
     propagation = errors @ interference(np.array([NO_INTERFERENCE]), SHADOWING, noise)[0]  # (13)
     not_sensed = 1.0 - sensed_share(received_power(distance), SENSING, SHADOWING)  # (10)
 
-    count = round(FARTHEST_INTERFERER * density)
-    to_receiver = np.arange(-count, count + 1) / density
-    to_receiver = to_receiver[to_receiver != 0.0]
+    to_receiver = interferer_positions(density)
     to_sender = np.abs(to_receiver + distance[:, None])
     with_interferer = errors @ interference(received_power(to_receiver), SHADOWING, noise).T  # (17)
-    certain = propagation[:, None] >= 1.0
-    destroys = np.where(
-        certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
-    )  # (18)
+    destroys = loss_by_interferer(with_interferer, propagation)  # (18)
 
     resources = subchannels * 1000.0 / rate  # (28)
     power_by_distance = received_power(np.arange(-REACH, REACH + 1.0))
@@ -109,7 +99,7 @@ def cv2x_mode4_errors(
         """
         apart = excluded**2 / resources
         common = overlap / overlap[0] * (density * excluded * overlap[0] / in_reach - apart) + apart
-        candidates = CANDIDATES * resources
+        candidates = CANDIDATE_SHARE * resources
         both = (resources - 2.0 * excluded + common) * (candidates / (resources - excluded)) ** 2
         unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received_power(to_sender), threshold, SHADOWING)
         chosen = unaware * both[np.floor(to_sender + 0.5).astype(np.int64)] / candidates**2
@@ -145,6 +135,6 @@ def _raise_threshold(power: Array, density: float, resources: float) -> tuple[fl
     while True:
         in_reach = 2.0 * density * float(sensed_share(power, threshold, SHADOWING).sum())
         excluded = _count_excluded(in_reach, resources)
-        if resources - excluded >= CANDIDATES * resources:
+        if resources - excluded >= CANDIDATE_SHARE * resources:
             return threshold, excluded
         threshold += STEP

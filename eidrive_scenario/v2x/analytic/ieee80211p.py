@@ -12,32 +12,31 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.analytic.levels import (
     RATIOS,
+    REACH,
+    SHADOWING,
     autocorrelation,
     errors_over,
     interference,
+    interferer_positions,
+    loss_by_interferer,
     noise_alone,
     sensed_share,
     signal,
 )
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.propagation.gains import winner_b1
+from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, PREAMBLE, SENSING_DBM, SLOT
 
 FREQUENCY = 5.89
 """Carrier frequency [GHz]."""
-ANTENNA = 1.5
-"""Height of all antennas [m]."""
 ENVIRONMENT = 0.5
 """Height of the environment, which the path loss subtracts from the antenna heights [m]."""
-SHADOWING = 3.0
-"""Standard deviation of the shadowing [dB]."""
-SENSING, NOISE = -85.0, -95.0
-"""Sensing threshold, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
-SLOT, PREAMBLE, HEADERS = 13e-6, 40e-6, 30
-"""Duration of aSlotTime and of the preamble with signal field [s]; size of the lower-layer headers [bytes]."""
+SENSING = SENSING_DBM["80211p"]
+"""Sensing threshold [dBm]."""
+HEADERS = 30
+"""Size of the lower-layer headers [bytes]."""
 BANDWIDTH = 10e6
 """Channel bandwidth [Hz]."""
-REACH, FARTHEST_INTERFERER = 1500, 1000
-"""Maximum distances at which vehicles contribute to the load and interfere [m]."""
 
 FRAME_ERRORS = ((5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0), (1.0, 0.4, 0.015, 0.004, 0.003, 0.002, 0.001))
 """Frame error rate by Eb/N0 [dB]: O. Goubet et al., IEEE Transactions on Vehicular Technology 64(9), 2015, fig. 14."""
@@ -66,7 +65,7 @@ def ieee80211p_errors(
 
     density  vehicles per meter;  rate  packets per second and vehicle;  size  [bytes];  power  [dBm]
     """
-    height = ANTENNA - environment_height
+    height = ANTENNA_HEIGHT - environment_height
 
     def received_power(meters: Array) -> Array:
         return power - winner_b1(meters, FREQUENCY, height, height)
@@ -82,16 +81,13 @@ def ieee80211p_errors(
     curve = np.interp(RATIOS + 10.0 * np.log10(BANDWIDTH / bit_rate), *FRAME_ERRORS)
     not_sensed = 1.0 - sensed_share(received_power(distance), SENSING, SHADOWING)  # (12)
     errors = errors_over(signal(received_power(distance), SHADOWING, SENSING), curve)
-    propagation = errors @ noise_alone(NOISE)[0]  # (24)
+    propagation = errors @ noise_alone(NOISE_DBM)[0]  # (24)
 
-    to_receiver = _interferers(density)
+    to_receiver = interferer_positions(density)
     to_sender = np.abs(to_receiver + distance[:, None])
     closer = np.abs(to_receiver) < np.abs(distance)[:, None]
-    with_interferer = errors @ interference(received_power(to_receiver), SHADOWING, NOISE).T  # (30)
-    certain = propagation[:, None] >= 1.0
-    destroys = np.where(
-        certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
-    )  # (31)
+    with_interferer = errors @ interference(received_power(to_receiver), SHADOWING, NOISE_DBM).T  # (30)
+    destroys = loss_by_interferer(with_interferer, propagation)  # (31)
     at_receiver = sensed_share(received_power(to_receiver), SENSING, SHADOWING)
     senses = sensed_share(received_power(to_sender), SENSING, SHADOWING)
     share = rate / (1.0 - channel_busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
@@ -109,14 +105,6 @@ def offered_load(density: float, rate: float, size: int, power: float, bit_rate:
     """Return the channel busy ratio without overlap of transmissions (34); `height` is the antenna height [m]."""
     received = power - winner_b1(np.arange(-REACH, REACH + 1.0), FREQUENCY, height, height)
     return density * rate * airtime(size, bit_rate) * float(sensed_share(received, SENSING, SHADOWING).sum())
-
-
-def _interferers(density: float) -> Array:
-    """Return the positions of the interferers relative to the receiver [m], spaced by 1/density on both sides."""
-    count = round(FARTHEST_INTERFERER * density)
-    places = np.arange(-count, count + 1) / density
-    others: Array = places[places != 0.0]
-    return others
 
 
 def _any(probability: Array) -> Array:

@@ -20,6 +20,10 @@ LEVELS: Array = np.round(np.arange(-2000, 2001) * STEP, 1)
 """Power levels (L,) [dBm]."""
 RATIOS: Array = np.round(np.arange(-4000, 4001) * STEP, 1)
 """Ratios (2 L - 1,) of two power levels [dB]."""
+SHADOWING = 3.0
+"""Standard deviation of the shadowing in both models [dB]."""
+REACH, FARTHEST_INTERFERER = 1500, 1000
+"""Maximum distances at which vehicles contribute to the load and interfere [m]."""
 
 
 def sensed_share(power: Array, threshold: float, spread: float) -> Array:
@@ -61,6 +65,24 @@ def errors_over(packets: Array, curve: Array) -> Array:
     full = fftconvolve(packets, curve[None, ::-1], axes=1)
     errors: Array = np.clip(full[:, middle : middle + len(LEVELS)], 0.0, 1.0)
     return errors
+
+
+def interferer_positions(density: float) -> Array:
+    """Return the positions of interferers relative to the receiver [m], spaced by 1/density on both sides."""
+    count = round(FARTHEST_INTERFERER * density)
+    positions = np.arange(-count, count + 1) / density
+    others: Array = positions[positions != 0.0]
+    return others
+
+
+def loss_by_interferer(with_interferer: Array, alone: Array) -> Array:
+    """Return the probability (D, I) that an interferer destroys a packet that is received without it.
+
+    with_interferer  (D, I) packet error rates with each interferer;  alone  (D,) without one
+    """
+    certain = alone[:, None] >= 1.0
+    added = (with_interferer - alone[:, None]) / np.where(certain, 1.0, 1.0 - alone[:, None])
+    return np.where(certain, 0.0, added)
 
 
 def autocorrelation(values: Array) -> Array:

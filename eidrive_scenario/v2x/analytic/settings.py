@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.analytic.cv2x_mode4 import CANDIDATES, cv2x_mode4_errors
-from eidrive_scenario.v2x.analytic.ieee80211p import ANTENNA, FULL, ieee80211p_errors, offered_load
+from eidrive_scenario.v2x.analytic.cv2x_mode4 import cv2x_mode4_errors
+from eidrive_scenario.v2x.analytic.ieee80211p import FULL, ieee80211p_errors, offered_load
 from eidrive_scenario.v2x.analytic.table import ErrorTable
+from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, CANDIDATE_SHARE
 
 FARTHEST, STEP = 1000.0, 10.0
 """Maximum distance and step of the tables [m]; neither model delivers packets beyond."""
@@ -35,11 +36,11 @@ class Ieee80211pLoss(Settings):
     size: PositiveInt = 300
     power_dbm: Power = 23.0
     data_rate_mbps: PositiveFloat = 6.0
-    environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.5
+    environment_height: Annotated[float, Field(ge=0.0, lt=ANTENNA_HEIGHT)] = 0.5
 
     @model_validator(mode="after")
     def _check_load(self) -> Ieee80211pLoss:
-        height = ANTENNA - self.environment_height
+        height = ANTENNA_HEIGHT - self.environment_height
         bit_rate = self.data_rate_mbps * 1e6
         load = offered_load(self.density, self.rate, self.size, self.power_dbm, bit_rate, height)
         if load > FULL:
@@ -69,15 +70,15 @@ class Cv2xMode4Loss(Settings):
     rate: Annotated[float, Field(ge=1.0, le=1000.0)] = 10.0
     power_dbm: Power = 20.0
     subchannels: Literal[2, 4] = 4
-    environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.0
+    environment_height: Annotated[float, Field(ge=0.0, lt=ANTENNA_HEIGHT)] = 0.0
 
     @model_validator(mode="after")
     def _check_load(self) -> Cv2xMode4Loss:
         busy = self.table().channel_busy_ratio
-        if busy > 1.0 - CANDIDATES:
+        if busy > 1.0 - CANDIDATE_SHARE:
             raise ValueError(
                 f"density and rate: the reserved share of the resources exceeds the range of the model "
-                f"(got {busy:.3g}; expected at most {1.0 - CANDIDATES:g})"
+                f"(got {busy:.3g}; expected at most {1.0 - CANDIDATE_SHARE:g})"
             )
         return self
 

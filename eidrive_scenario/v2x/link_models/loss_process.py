@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.link_models.loss import AnyLoss, BernoulliLoss, DistanceLoss, GilbertElliottLoss, NoLoss
 from eidrive_scenario.v2x.link_random import LinkRandom
 from eidrive_scenario.v2x.messages.message import Message
@@ -47,9 +46,7 @@ class LossProcess:
         draw = self._draws.uniform("loss", message.sender, receiver, message.number)
         if isinstance(loss, DistanceLoss):
             return "distance" if draw < loss.probability_at(distance) else None
-        if isinstance(loss, Ieee80211pLoss | Cv2xMode4Loss):
-            return loss.table().cause(distance, draw)
-        raise TypeError(f"loss is not a loss model (got {loss!r})")
+        return loss.table().cause(distance, draw)
 
     def _bernoulli(self, loss: BernoulliLoss, message: Message, receiver: str, now: float) -> float:
         if loss.scope == "link":

@@ -21,6 +21,7 @@ from eidrive_scenario.v2x.propagation.gains import (
     winner_b1,
 )
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV
+from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT
 
 
 class LinkGeometry:
@@ -158,11 +159,11 @@ class WinnerB1(_LossPerVehicle):
     """
 
     kind: Literal["winner_b1"]
-    environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 1.0
+    environment_height: Annotated[float, Field(ge=0.0, lt=ANTENNA_HEIGHT)] = 1.0
 
     def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
-        """Return the path loss with LOS [dB] at distances [m], for antennas at 1.5 m."""
-        height = 1.5 - self.environment_height
+        """Return the path loss with LOS [dB] at distances [m], for antennas at ANTENNA_HEIGHT."""
+        height = ANTENNA_HEIGHT - self.environment_height
         return winner_b1(distance, frequency_ghz, height, height)
 
 

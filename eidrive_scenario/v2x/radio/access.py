@@ -15,12 +15,10 @@ from pydantic import Field
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message
 from eidrive_scenario.v2x.propagation.fading import FadingDraws
 from eidrive_scenario.v2x.radio.congestion import DccGate
-
-TOLERANCE = 1e-9
-"""Tolerance of time comparisons [s]."""
 
 
 class QueueSettings(Settings):
@@ -206,7 +204,7 @@ class MediumAccess(ABC):
         period = self.gate.control.period
         if self._period is None:
             self._period = math.floor(now / period + 1e-6)
-        while now >= (self._period + 1) * period - TOLERANCE:
+        while now >= (self._period + 1) * period - TIME_TOLERANCE:
             self._busy_time += self._period_busy
             self.gate.update(self._period_ratio(period))
             self._period_busy = np.zeros(len(self.names))

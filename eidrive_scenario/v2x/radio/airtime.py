@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-PREAMBLE = 40e-6
-"""Duration of preamble and signal field in 10 MHz [s] (IEEE 802.11-2012, 18.3)."""
+from eidrive_scenario.v2x.standards import PREAMBLE
+
 SYMBOL = 8e-6
 """Duration of one OFDM symbol in 10 MHz [s]."""
 EXTRA_BITS = 22

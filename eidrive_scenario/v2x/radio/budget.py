@@ -14,6 +14,7 @@ from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
 from eidrive_scenario.v2x.propagation.gains import probability_of_los
 from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, PathLoss
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
+from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT
 
 OUT_OF_REACH = 170.0
 """LOS path loss from which the line of sight is not determined, because no message is received [dB]."""
@@ -168,7 +169,8 @@ class LinkBudget:
         near, far = 1.0, 1e9
         for _ in range(100):
             middle = math.sqrt(near * far)
-            there = self._path_loss.loss_of(Link(middle, LOS, 1.5, 1.5, -math.inf, 0), self._frequency, 0.5)
+            link = Link(middle, LOS, ANTENNA_HEIGHT, ANTENNA_HEIGHT, -math.inf, 0)
+            there = self._path_loss.loss_of(link, self._frequency, 0.5)
             near, far = (near, middle) if there >= loss else (middle, far)
         return far
 

@@ -9,10 +9,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.channel import OutgoingMessage
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
-from eidrive_scenario.v2x.link_channel import LinkChannel
 from eidrive_scenario.v2x.link_models.composed import delay_of
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
 from eidrive_scenario.v2x.link_models.loss import NoLoss
@@ -22,6 +21,7 @@ from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMe
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.v2x.propagation.fading import FadingDraws, Nakagami
 from eidrive_scenario.v2x.propagation.path_loss import Tr37885
+from eidrive_scenario.v2x.queued_channel import QueuedChannel
 from eidrive_scenario.v2x.radio.access import MediumAccess, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
@@ -33,16 +33,14 @@ from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
-from eidrive_scenario.v2x.statistics.links import LinkStatistics
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import Entry
-
-Rows = NDArray[np.int64]
 
 ABSENT = "absent"
 """Reason for the loss of a message whose sender or receiver has left the world."""
 
 
-class RadioChannel(LinkChannel):
+class RadioChannel(QueuedChannel):
     """Channel that models the medium as a whole. The outcome of a transmission is known when it has ended.
 
     Outcomes are therefore returned in a later tick. The first delivery at `now` simulates the medium up to `now`, with
@@ -78,7 +76,7 @@ class RadioChannel(LinkChannel):
         self._losses = LossProcess(profile.loss, seed)
         self._draws = LinkRandom(seed)
         self._rows: dict[str, int] = {}
-        self._receivers: dict[str, tuple[list[str], Rows]] = {}
+        self._receivers: dict[str, tuple[list[str], Integers]] = {}
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
         self._access = self._new_access(())
         self._access.fading = self._fading
@@ -100,10 +98,6 @@ class RadioChannel(LinkChannel):
         if profile.technology == "80211p":
             return Csma(names, profile.queue, gate, profile.sensing, self._seed)
         return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink, profile.noise_dbm)
-
-    def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
-        """Raise TypeError, because outcomes of links are not independent."""
-        raise TypeError("transmission_outcome is not defined for a radio channel (expected a call of transmit)")
 
     def update_environment(self, surroundings: RadioEnvironment) -> None:
         super().update_environment(surroundings)
@@ -159,7 +153,7 @@ class RadioChannel(LinkChannel):
         self._outcomes, self._dropped = [], []
         return events
 
-    def _rows_of(self, sender: str, receivers: Sequence[str]) -> Rows:
+    def _rows_of(self, sender: str, receivers: Sequence[str]) -> Integers:
         """Return the rows of present receivers. They are cached, because the receivers of a sender rarely change."""
         cached = self._receivers.get(sender)
         if cached is None or cached[0] != list(receivers):
@@ -273,7 +267,7 @@ class RadioChannel(LinkChannel):
                 self._links.enqueue(_queue_entry(entry, arrives), name)
         block.arrives[delivered] = arrivals
 
-    def _apply_loss(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:
+    def _apply_loss(self, entry: Transmission, rows: Integers, causes: NDArray[np.int8], budget: Budget) -> Integers:
         """Apply the additional loss model; return the rows of receivers without an additional loss."""
         remaining = []
         sender = self._rows[entry.message.sender]
@@ -288,7 +282,7 @@ class RadioChannel(LinkChannel):
                 self._record_loss(entry, budget.names[row], reason, distance)
         return np.array(remaining, dtype=np.int64)
 
-    def _record_absent(self, entry: Transmission, present: Rows) -> None:
+    def _record_absent(self, entry: Transmission, present: Integers) -> None:
         if len(present) < len(entry.receivers):
             for name in entry.receivers:
                 if name not in self._rows:

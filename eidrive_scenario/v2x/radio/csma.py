@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
-from eidrive_scenario.v2x.radio.access import TOLERANCE, MediumAccess, QueueSettings, Transmission, reorder_rows
+from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate
+from eidrive_scenario.v2x.standards import SLOT
 
-SLOT = 13e-6
-"""aSlotTime in 10 MHz [s]."""
 AIFS = 32e-6 + 6 * SLOT
 """SIFS and 6 slots: access category AC_BE in the OCB mode (IEEE 802.11-2012, table 8-106) [s]."""
 MAX_SCALAR = 6
@@ -54,10 +54,10 @@ class Csma(MediumAccess):
             starts = self.starts() if self.contending else no_starts
             row = int(np.argmin(starts)) if self.contending else 0
             start = float(starts[row])
-            if self._arrivals and self._arrivals[0].ready <= min(start, until - TOLERANCE):
+            if self._arrivals and self._arrivals[0].ready <= min(start, until - TIME_TOLERANCE):
                 dropped += self._arrive(self._arrivals.popleft())
                 continue
-            if not start < until - TOLERANCE:
+            if not start < until - TIME_TOLERANCE:
                 break
             self._measure(start)
             transmission = self._head[row]

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE, Receptions
 from eidrive_scenario.v2x.radio_environment import STATES
 from eidrive_scenario.v2x.statistics.link_events import OutcomeBlock, OutcomeColumns
-
-Rows = NDArray[np.int64]
 
 OUTCOMES = tuple(("delivered", "") if code == DELIVERED else ("lost", cause) for code, cause in enumerate(CAUSES))
 """Outcome and reason, by code of the cause."""
@@ -30,7 +27,7 @@ class ReceptionBlock(OutcomeBlock):
     """
 
     def __init__(
-        self, ended: Sequence[Transmission], receptions: Receptions, budget: Budget, receivers: Sequence[Rows]
+        self, ended: Sequence[Transmission], receptions: Receptions, budget: Budget, receivers: Sequence[Integers]
     ) -> None:
         self.ended = ended
         self.receptions = receptions
@@ -95,7 +92,7 @@ class ReceptionBlock(OutcomeBlock):
 class DroppedBlock(OutcomeBlock):
     """Outcomes of a message that was dropped from its queue; `sender` and `receivers` are rows of `names`."""
 
-    def __init__(self, entry: Transmission, names: tuple[str, ...], sender: int, receivers: Rows) -> None:
+    def __init__(self, entry: Transmission, names: tuple[str, ...], sender: int, receivers: Integers) -> None:
         self._entry = entry
         self._names = names
         self._sender = sender
@@ -127,7 +124,7 @@ class DroppedBlock(OutcomeBlock):
         )
 
 
-def _of_messages(entries: Sequence[Transmission]) -> tuple[Rows, Array, Rows]:
+def _of_messages(entries: Sequence[Transmission]) -> tuple[Integers, Array, Integers]:
     """Return numbers, times of sending [s] and sizes [bytes], (T,) each."""
     return (
         np.array([entry.message.number for entry in entries], dtype=np.int64),

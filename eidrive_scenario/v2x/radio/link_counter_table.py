@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE
 from eidrive_scenario.v2x.statistics.link_statistics import DISTANCE_BIN
 from eidrive_scenario.v2x.statistics.links import Links
-
-Rows = NDArray[np.int64]
 
 _CLASSES = 41
 """Number of distance classes; the last class contains all distances beyond 1 km."""
@@ -27,16 +24,16 @@ class LinkCounterTable:
         self._causes = np.zeros((count, count, len(CAUSES)), dtype=np.int64)
         self._outcomes = np.zeros((count, count, _CLASSES, 2), dtype=np.int64)
 
-    def send(self, row: int, receivers: Rows, size: int) -> None:
+    def send(self, row: int, receivers: Integers, size: int) -> None:
         """Count a sent message of `size` bytes."""
         self._sent[row, receivers] += 1
         self._bytes[row, receivers] += size
 
-    def drop(self, row: int, receivers: Rows) -> None:
+    def drop(self, row: int, receivers: Integers) -> None:
         """Count a message that was dropped before transmission."""
         self._causes[row, receivers, QUEUE] += 1
 
-    def decide(self, senders: Rows, receivers: Rows, causes: Rows, distance: Array) -> None:
+    def decide(self, senders: Integers, receivers: Integers, causes: Integers, distance: Array) -> None:
         """Count outcomes of transmissions, one entry per message and receiver."""
         link = senders * len(self.names) + receivers  # flat indices: np.add.at is ten times as fast
         np.add.at(self._causes.reshape(-1), link * len(CAUSES) + causes, 1)

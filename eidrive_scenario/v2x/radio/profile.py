@@ -10,7 +10,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.analytic.settings import FARTHEST, STEP, Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.link_models.composed import ComposedProfile
 from eidrive_scenario.v2x.propagation.fading import Fading, NoFading
@@ -19,15 +19,15 @@ from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
-from eidrive_scenario.v2x.radio.sidelink.settings import BLOCKS, SidelinkSettings
+from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import LOS
+from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
 
 Technology = Literal["80211p", "cv2x_mode4"]
 Level = Annotated[float, Field(ge=-200.0, le=100.0)]
 """Received power [dBm]."""
 Background = Annotated[Ieee80211pLoss | Cv2xMode4Loss, Field(discriminator="kind")]
 
-_SENSING = {"80211p": -85.0, "cv2x_mode4": -90.5}
 _CURVES = {
     "80211p": ("80211p_highway_los", "80211p_highway_nlos", "80211p_crossing_nlos"),
     "cv2x_mode4": ("cv2x_r0.7",) * 3,
@@ -79,7 +79,7 @@ class RadioProfile(ComposedProfile):
     frequency_ghz: Annotated[float, Field(ge=0.5, le=100.0)] = 5.9
     tx_power_dbm: Annotated[float, Field(ge=-30.0, le=50.0)] = 23.0
     antenna_gain_dbi: Annotated[float, Field(ge=-100.0, le=100.0)] = 3.0
-    noise_dbm: Level = -95.0
+    noise_dbm: Level = NOISE_DBM
     sensing_dbm: Level | None = None
     path_loss: PathLoss = Tr37885()
     line_of_sight: Literal["rays", "random", "clear"] = "rays"
@@ -122,7 +122,7 @@ class RadioProfile(ComposedProfile):
     @property
     def sensing(self) -> float:
         """Minimum sensed power [dBm]."""
-        return _SENSING[self.technology] if self.sensing_dbm is None else self.sensing_dbm
+        return SENSING_DBM[self.technology] if self.sensing_dbm is None else self.sensing_dbm
 
     @property
     def noise(self) -> float:
@@ -133,7 +133,7 @@ class RadioProfile(ComposedProfile):
         """Return the noise in the band of a message in `width` subchannels [dBm]."""
         if self.technology == "80211p":
             return self.noise_dbm
-        return self.noise_dbm - 10.0 * float(np.log10(BLOCKS / self.sidelink.pssch_blocks(width)))
+        return self.noise_dbm - 10.0 * float(np.log10(RESOURCE_BLOCKS / self.sidelink.pssch_blocks(width)))
 
     @property
     def max_subchannels(self) -> int:
@@ -162,9 +162,11 @@ class RadioProfile(ComposedProfile):
         """Return the error table of the background traffic, and the LOS path loss at each of its distances [dB]."""
         if self.background is None:
             return None
-        distance = np.arange(0.0, FARTHEST + STEP / 2.0, STEP)
-        count = len(distance)
-        heights, no_vehicles = np.full(count, 1.5), np.zeros(count, dtype=np.int64)
-        between = LinkGeometry(distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), no_vehicles)
+        table = self.background.table()
+        count = len(table.distance)
+        heights, no_vehicles = np.full(count, ANTENNA_HEIGHT), np.zeros(count, dtype=np.int64)
+        between = LinkGeometry(
+            table.distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), no_vehicles
+        )
         los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(count, 0.5))
-        return self.background.table(), np.maximum.accumulate(los_loss)
+        return table, np.maximum.accumulate(los_loss)

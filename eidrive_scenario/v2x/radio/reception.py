@@ -10,16 +10,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.counter_random import Keys, uniform, uniforms
-from eidrive_scenario.v2x.radio.access import TOLERANCE, Transmission
+from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolate
 
 Codes = NDArray[np.int8]
-Rows = NDArray[np.int64]
-
 CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision", "queue")
 """Causes of loss in order of precedence; codes in arrays are indices. `queue`: dropped before transmission."""
 DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, COLLISION, QUEUE = range(len(CAUSES))
@@ -76,7 +75,9 @@ class Receiver:
         start, end = (np.array([getattr(entry, name) for entry in active]) for name in ("start", "end"))
         first = np.array([entry.first_band for entry in active])
         last = first + np.array([entry.bands for entry in active])
-        overlapping = (start[None, :] < end[own, None] - TOLERANCE) & (start[own, None] < end[None, :] - TOLERANCE)
+        overlapping = (start[None, :] < end[own, None] - TIME_TOLERANCE) & (
+            start[own, None] < end[None, :] - TIME_TOLERANCE
+        )
         overlapping[np.arange(len(own)), own] = False
         same_band = overlapping & (first[None, :] < last[own, None]) & (first[own, None] < last[None, :])
 
@@ -191,8 +192,8 @@ class Receiver:
         same_band: Bools,
         shares: Array | None,
         start: Array,
-        own: Rows,
-        rows: Rows,
+        own: Integers,
+        rows: Integers,
         received: Array,
     ) -> tuple[Array, Bools, Bools]:
         """Return interference [mW], whether the receiver is locked to an earlier message, and whether it transmits.
@@ -245,7 +246,7 @@ def _salted_causes(table: ErrorTable) -> list[tuple[int, str]]:
 
 
 def _overlap(first: Transmission, second: Transmission) -> bool:
-    return first.start < second.end - TOLERANCE and second.start < first.end - TOLERANCE
+    return first.start < second.end - TIME_TOLERANCE and second.start < first.end - TIME_TOLERANCE
 
 
 def _common_share(interferer: Transmission, entry: Transmission) -> float:

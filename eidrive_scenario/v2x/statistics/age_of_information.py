@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
-
-Codes = NDArray[np.int64]
+from eidrive_scenario.arrays import Array, Integers
 
 MAX_BREAKPOINTS = 1 << 20
 """Maximum number of exact breakpoints over all links, 24 bytes each: six hours of one link at 20 Hz."""
@@ -45,7 +43,7 @@ class AgeOfInformation:
         """Age at the last update of each link [s]; NaN before the first."""
         self._time, self._area, self._peaks = np.zeros(0), np.zeros(0), np.zeros(0)
         self._updates = np.zeros(0, dtype=np.int64)
-        self._breakpoints: list[tuple[Codes, Array, Codes]] = []
+        self._breakpoints: list[tuple[Integers, Array, Integers]] = []
         """Breakpoints: link, age, and change of the slope (1 at floors, -1 at peaks)."""
         self._number = 0
         self._limit = MAX_BREAKPOINTS
@@ -59,7 +57,7 @@ class AgeOfInformation:
         )
         self._updates = np.concatenate([self._updates, np.zeros(more, dtype=np.int64)])
 
-    def record_updates(self, links: Codes, floors: Array, peaks: Array) -> None:
+    def record_updates(self, links: Integers, floors: Array, peaks: Array) -> None:
         """Add updates (K,), sorted by link and then by time.
 
         floors, peaks  age immediately after and before each update [s]; the peak of the first update is infinity
@@ -81,7 +79,7 @@ class AgeOfInformation:
         if self._number > self._limit:
             self._compact()
 
-    def statistics(self, now: float, newest: Array, order: Codes) -> AgeStatistics:
+    def statistics(self, now: float, newest: Array, order: Integers) -> AgeStatistics:
         """Return the statistics at `now` of the links in `order`; `newest` (L,) are the newest generation times [s]."""
         low = self._floor
         high = np.maximum(now - newest, low)
@@ -91,7 +89,7 @@ class AgeOfInformation:
         peak = np.divide(self._peaks, self._updates, out=np.full(len(low), np.nan), where=self._updates > 0)
         return AgeStatistics(mean[order], self._percentile(0.95, low, high, defined, order), peak[order])
 
-    def _percentile(self, share: float, low: Array, high: Array, defined: NDArray[np.bool_], order: Codes) -> Array:
+    def _percentile(self, share: float, low: Array, high: Array, defined: NDArray[np.bool_], order: Integers) -> Array:
         """Return the age below which each link spent this share of the time (L,) [s]."""
         selected = order[defined[order]]
         place_of = np.full(len(low), -1)
@@ -118,7 +116,7 @@ class AgeOfInformation:
         percentile[defined[order]] = levels[before] + within * (levels[after] - levels[before])
         return percentile
 
-    def _all_breakpoints(self, *more: tuple[Codes, Array, Codes]) -> tuple[Codes, Array, Codes]:
+    def _all_breakpoints(self, *more: tuple[Integers, Array, Integers]) -> tuple[Integers, Array, Integers]:
         links, levels, weights = zip(*self._breakpoints, *more, strict=True)
         return np.concatenate(links), np.concatenate(levels), np.concatenate(weights)
 
@@ -137,7 +135,7 @@ class AgeOfInformation:
         self._limit = max(MAX_BREAKPOINTS, 2 * self._number)
 
 
-def _breakpoints(links: Codes, low: Array, high: Array) -> tuple[Codes, Array, Codes]:
+def _breakpoints(links: Integers, low: Array, high: Array) -> tuple[Integers, Array, Integers]:
     weights = np.ones(2 * len(links), dtype=np.int64)
     weights[len(links) :] = -1
     return np.concatenate([links, links]), np.concatenate([low, high]), weights

@@ -6,13 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, overload
 
-import numpy as np
-from numpy.typing import NDArray
-
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import LinkEvent
-
-Places = NDArray[np.int64]
 
 
 class OutcomeColumns(NamedTuple):
@@ -24,14 +19,14 @@ class OutcomeColumns(NamedTuple):
     """
 
     names: tuple[str, ...]
-    senders: Places
-    receivers: Places
+    senders: Integers
+    receivers: Integers
     outcomes: tuple[tuple[str, str], ...]
-    outcome: Places
-    number: Places
+    outcome: Integers
+    number: Integers
     sent: Array
     arrives: Array
-    size: Places
+    size: Integers
 
 
 class OutcomeBlock(ABC):

@@ -10,8 +10,6 @@ from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMe
 from eidrive_scenario.v2x.statistics.link_statistics import LinkCounters, LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog
 
-__all__ = ["TIME_TOLERANCE", "LinkStatistics", "Links"]
-
 
 class Links:
     """Queues of messages in flight. This class alone enforces causality.

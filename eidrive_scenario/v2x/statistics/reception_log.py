@@ -7,13 +7,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import ReceivedMessage
 from eidrive_scenario.v2x.statistics.age_of_information import AgeOfInformation
-
-Codes = NDArray[np.int64]
 
 Entry = tuple[float, str, int, float, ReceivedMessage]
 """Time of arrival [s], sender, number, time of sending [s], and received message; receivers may share an entry."""
@@ -46,7 +43,7 @@ class ReceptionLog:
         self._count = 0
         self._pending: list[tuple[str, Sequence[Entry]]] = []
         self._number = 0
-        self._received: Codes = np.zeros(0, dtype=np.int64)
+        self._received: Integers = np.zeros(0, dtype=np.int64)
         self._delay_sum, self._delay_max, self._newest = np.zeros(0), np.zeros(0), np.zeros(0)
         self._ages = AgeOfInformation()
 
@@ -99,7 +96,7 @@ class ReceptionLog:
         self._newest = np.concatenate([self._newest, np.full(more, -np.inf)])
         self._ages.resize(self._count)
 
-    def _record_ages(self, codes: Codes, generated: Array, arrived: Array) -> None:
+    def _record_ages(self, codes: Integers, generated: Array, arrived: Array) -> None:
         """Update the age of information with messages that are newer than all earlier ones of their link."""
         order = np.argsort(codes, kind="stable")
         codes, generated, arrived = codes[order], generated[order], arrived[order]
@@ -113,7 +110,7 @@ def _none_for_nan(ages: Array) -> list[float | None]:
     return [None if math.isnan(age) else age for age in ages.tolist()]
 
 
-def _largest_before(groups: Codes, values: Array) -> Array:
+def _largest_before(groups: Integers, values: Array) -> Array:
     """Return the largest earlier value of the same group (K,); minus infinity for the first. Groups are ascending."""
     levels, rank = np.unique(values, return_inverse=True)
     base = groups * len(levels)

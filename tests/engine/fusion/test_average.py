@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.detections import Detections
 from eidrive_scenario.assignment import associate
+from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.average import AverageFusion, fuse_average, fuse_average_small
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.registry import registry

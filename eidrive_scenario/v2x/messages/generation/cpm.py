@@ -83,9 +83,7 @@ class CpmGenerationRules:
         chosen.sort(key=lambda row: (-self._utility(numbers[row], present[row], scores[row]), numbers[row]))
         for row in chosen:
             self._reported[numbers[row]] = present[row]
-        self._reported = {
-            number: report for number, report in self._reported.items() if now - report.time <= RETENTION
-        }
+        self._reported = {number: report for number, report in self._reported.items() if now - report.time <= RETENTION}
         self._sent = now
         self._sensors = now if sensors else self._sensors
         return CpmContents(tuple(chosen), sensors)

@@ -13,15 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
-from eidrive_scenario.v2x.radio.access import TOLERANCE, MediumAccess, QueueSettings, Transmission, reorder_rows
+from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
 from eidrive_scenario.v2x.radio.sidelink.pscch import ControlChannel, Pdu
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
 from eidrive_scenario.v2x.radio.sidelink.sensing import SensingHistory
-from eidrive_scenario.v2x.radio.sidelink.settings import BLOCKS, SidelinkSettings
+from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
+from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS
 
 SUBCARRIERS = 12
 """Number of subcarriers of one resource block."""
@@ -81,7 +83,7 @@ class Sidelink(MediumAccess):
         self._settings = settings
         self._seed = seed
         noise = 10.0 ** (noise_dbm / 10.0)
-        self._control = ControlChannel(noise / BLOCKS, settings.control_curve)
+        self._control = ControlChannel(noise / RESOURCE_BLOCKS, settings.control_curve)
         self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.subchannels
         self._history = SensingHistory(len(names), settings.subchannels, settings.interval_subframes)
         self._grants: list[Grant | None] = [None] * len(names)
@@ -109,10 +111,10 @@ class Sidelink(MediumAccess):
         while True:
             row = int(np.argmin(self._next_event))
             event = float(self._next_event[row])
-            if self._arrivals and self._arrivals[0].ready <= min(event, until - TOLERANCE):
+            if self._arrivals and self._arrivals[0].ready <= min(event, until - TIME_TOLERANCE):
                 dropped += self._arrive(self._arrivals.popleft())
                 continue
-            if not event < until - TOLERANCE:
+            if not event < until - TIME_TOLERANCE:
                 break
             self._measure(event)
             if not self._scheduled[row]:
@@ -185,7 +187,7 @@ class Sidelink(MediumAccess):
             processed = max(ready, head.ready + settings.processing)
             earliest = max(free, math.ceil(processed / SUBFRAME - 1e-6))
             occasion = earliest + (grant.subframe - earliest) % settings.interval_subframes
-            in_time = occasion * SUBFRAME <= ready + settings.latency + TOLERANCE
+            in_time = occasion * SUBFRAME <= ready + settings.latency + TIME_TOLERANCE
             if in_time and not self._is_released(grant, now, occasion):
                 return occasion
         earliest = max(free, math.ceil((ready + settings.processing) / SUBFRAME - 1e-6))
@@ -233,7 +235,7 @@ class Sidelink(MediumAccess):
 
     def _sense(self, until: float) -> None:
         """Evaluate sensing of the subframes that end by `until` [s]."""
-        ended = math.inf if math.isinf(until) else math.floor((until + TOLERANCE) / SUBFRAME + 1e-9)
+        ended = math.inf if math.isinf(until) else math.floor((until + TIME_TOLERANCE) / SUBFRAME + 1e-9)
         while self._sending:
             first = min(sending.subframe for sending in self._sending)
             if first >= ended:
@@ -279,7 +281,7 @@ class Sidelink(MediumAccess):
 
     def _measure(self, now: float) -> None:
         period = self.gate.control.period
-        while self._period is not None and now >= (self._period + 1) * period - TOLERANCE:
+        while self._period is not None and now >= (self._period + 1) * period - TIME_TOLERANCE:
             end = (self._period + 1) * period
             self._sense(end)
             super()._measure(end)
@@ -287,7 +289,9 @@ class Sidelink(MediumAccess):
 
     def _period_ratio(self, period: float) -> Array:
         measured = period - self._period_unmeasured
-        ratio: Array = np.where(measured > TOLERANCE, self._period_busy / np.maximum(measured, TOLERANCE), 1.0)
+        ratio: Array = np.where(
+            measured > TIME_TOLERANCE, self._period_busy / np.maximum(measured, TIME_TOLERANCE), 1.0
+        )
         self._unmeasured_time += self._period_unmeasured
         self._period_unmeasured = np.zeros(len(self.names))
         return ratio

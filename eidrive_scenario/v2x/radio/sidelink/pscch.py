@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.counter_random import Keys, uniforms
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
 from eidrive_scenario.v2x.radio.reception import COLLISION, DELIVERED, PROPAGATION, Codes
-
-Rows = NDArray[np.int64]
 
 BOOST = 2.0
 """Power ratio of resource elements of the control channel and of the data: 3 dB (3GPP TS 36.213, 14.2)."""

@@ -9,12 +9,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.arrays import Array, Bools, Integers
 
-Rows = NDArray[np.int64]
-
-SHARE = 0.2
-"""Minimum share of candidate resources after exclusion, and share that is reported (steps 7 and 9)."""
 STEP_DB = 3.0
 """Increment of the threshold while fewer candidates remain (step 7) [dB]."""
 PSTEP = 100
@@ -61,14 +57,14 @@ class Sensed:
 
     rssi: NDArray[np.float32]
     monitored: Bools
-    own: Rows
-    reserved: Rows
-    bands: Rows
-    widths: Rows
+    own: Integers
+    reserved: Integers
+    bands: Integers
+    widths: Integers
     rsrp: NDArray[np.float32]
 
 
-def candidates(request: Request, sensed: Sensed, order: Array) -> Rows:
+def candidates(request: Request, sensed: Sensed, order: Array) -> Integers:
     """Return the resources that are reported to higher layers, as indices of (start subframe, first subchannel).
 
     order  (starts · (S - width + 1),) random numbers that order candidates with the same average S-RSSI
@@ -82,14 +78,19 @@ def candidates(request: Request, sensed: Sensed, order: Array) -> Rows:
     highest = _over(np.maximum(level, blind), request).max(axis=(2, 3)).ravel()
     average = _over(_average_rssi(request, sensed, subframes), request).mean(axis=(2, 3)).ravel()
 
-    least = math.ceil(SHARE * len(highest) - 1e-9)
+    least = math.ceil(CANDIDATE_SHARE * len(highest) - 1e-9)
     places = np.flatnonzero(highest <= _raise_threshold(highest, request.threshold, least))
     best = np.lexsort((order[places], average[places]))[:least]
     return np.sort(places[best])
 
 
 def _mark(
-    level: Array, request: Request, reserved_in: Rows, bands: Rows, widths: Rows, power: NDArray[np.float32] | float
+    level: Array,
+    request: Request,
+    reserved_in: Integers,
+    bands: Integers,
+    widths: Integers,
+    power: NDArray[np.float32] | float,
 ) -> None:
     """Store the maximum `power` of reservations in each subframe and subchannel of the window (steps 5 and 6).
 

@@ -9,12 +9,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Codes
 from eidrive_scenario.v2x.radio.sidelink.pscch import Pdu
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Sensed
 
-Rows = NDArray[np.int64]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 NOT_DECODED = -np.inf
@@ -32,16 +31,16 @@ class Reservations:
 
     stations: int
     span: int
-    subframes: Rows = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
-    bands: Rows = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
-    widths: Rows = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
+    subframes: Integers = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
+    bands: Integers = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
+    widths: Integers = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
     begin: int = 0
     end: int = 0
 
     def __post_init__(self) -> None:
         self.rsrp = np.full((CAPACITY, self.stations), NOT_DECODED, dtype=np.float32)
 
-    def add(self, subframes: Rows, bands: Rows, widths: Rows, rsrp: Array) -> None:
+    def add(self, subframes: Integers, bands: Integers, widths: Integers, rsrp: Array) -> None:
         """Append entries, in the order of their subframes."""
         count = len(subframes)
         if self.end + count > len(self.subframes):
@@ -51,7 +50,7 @@ class Reservations:
         self.rsrp[rows] = rsrp
         self.end += count
 
-    def of(self, row: int, now: int) -> tuple[Rows, Rows, Rows, NDArray[np.float32]]:
+    def of(self, row: int, now: int) -> tuple[Integers, Integers, Integers, NDArray[np.float32]]:
         """Return subframes, bands, widths and PSSCH-RSRP decoded by a station in the span before subframe `now`."""
         self.begin += int(np.searchsorted(self.subframes[self.begin : self.end], now - self.span))
         rsrp = self.rsrp[self.begin : self.end, row]
@@ -105,7 +104,7 @@ class SensingHistory:
                 self.monitored[rows] = True
             self._until = until
 
-    def receive(self, pdus: Sequence[Pdu], per_subchannel: Array) -> Rows:
+    def receive(self, pdus: Sequence[Pdu], per_subchannel: Array) -> Integers:
         """Add transmissions in appended subframes; return these subframes.
 
         per_subchannel  (T, N) received power of each PDU in each of its subchannels [mW]
@@ -119,7 +118,7 @@ class SensingHistory:
         self.monitored[subframes % WINDOW, own] = False
         return np.array(sorted({pdu.subframe for pdu in pdus}), dtype=np.int64)
 
-    def busy(self, subframes: Rows, threshold: float) -> tuple[Array, Rows]:
+    def busy(self, subframes: Integers, threshold: float) -> tuple[Array, Integers]:
         """Return the busy time and the unmeasured time of each station over these subframes (N,) [subframes].
 
         The busy time sums the shares of subchannels whose S-RSSI exceeds the threshold [mW]. A station does not
@@ -140,7 +139,7 @@ class SensingHistory:
         decoded = (codes == DELIVERED) & self.monitored[subframes % WINDOW]
         self.reservations.add(subframes, bands, widths, np.where(decoded, rsrp, NOT_DECODED))
 
-    def of(self, row: int, now: int, own: Rows) -> Sensed:
+    def of(self, row: int, now: int, own: Integers) -> Sensed:
         """Return the sensing results of a station before subframe `now`; it transmitted in the subframes `own`."""
         self.proceed(now)
         return Sensed(self.rssi[:, :, row], self.monitored[:, row], own, *self.reservations.of(row, now))

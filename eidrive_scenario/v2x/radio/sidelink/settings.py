@@ -11,11 +11,10 @@ from eidrive_scenario.errors import suggestion
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
+from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS
 
 INTERVALS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Resource reservation intervals [s]."""
-BLOCKS = 50
-"""Number of resource blocks in 10 MHz."""
 PSCCH_BLOCKS = 2
 """Number of resource blocks of the control channel in the first subchannel (3GPP TS 36.213, 14.2)."""
 MAX_SELECTION_WINDOW = 0.1
@@ -99,7 +98,7 @@ class SidelinkSettings(Settings):
 
         3GPP TS 36.213, 14.1.1.4C: largest product of powers of 2, 3 and 5 without the blocks of the control channel.
         """
-        blocks = max(1, BLOCKS // self.subchannels * width - PSCCH_BLOCKS)
+        blocks = max(1, RESOURCE_BLOCKS // self.subchannels * width - PSCCH_BLOCKS)
         while not _is_regular(blocks):
             blocks -= 1
         return blocks
