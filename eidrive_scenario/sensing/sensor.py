@@ -32,7 +32,7 @@ class Sensor(ABC):
         self.name = name
         self.seed = seed
 
-    @classmethod
+    @classmethod  # noqa: B027 - an optional hook
     def check_settings(cls, settings: SensorSettings) -> None:
         """Raise SettingError, before the run, if valid settings of this type still permit no sensor."""
 

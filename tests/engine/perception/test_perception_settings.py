@@ -75,7 +75,8 @@ def test_invalid_property_is_error_with_line(write: Write, name: str, value: str
         ("{camera: {mount: [1, 2]}}", "three to five numbers"),
         ("{camera: {distortion: [-2]}}", "folds the image"),
         (
-            "{truth: {}, camera: {width: 64, height: 48, fov: 139.363, distortion: [0, 0.977637, 0, 0.271634, -0.110679]}}",
+            "{truth: {}, "
+            "camera: {width: 64, height: 48, fov: 139.363, distortion: [0, 0.977637, 0, 0.271634, -0.110679]}}",
             "distortion: the coefficients cannot be inverted",
         ),
         ("{truth: {}, a: {kind: imu}, b: {kind: imu}}", "at most one sensor of kind 'imu' (got a, b)"),

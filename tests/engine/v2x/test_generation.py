@@ -176,11 +176,13 @@ def test_object_ids_without_tracker_are_constant() -> None:
 
 
 def test_object_ids_near_objects_keep_ids_beside_unmatched_ones() -> None:
-    """All pairs together are 6.4 m apart, the crossed pairs 6.2 m; but only the first pair is within the gate of 3 m."""
+    """The pairs are 6.4 m apart in total, the crossed pairs 6.2 m; only the first is within the gate of 3 m."""
+    before = objects(0.0, (0.0, 0.0, 0.0, "car"), (3.2, 0.0, 0.0, "car"))
+    after = objects(0.1, (0.1, 0.0, 0.0, "car"), (-3.1, 0.0, 0.0, "car"))
+    before.boxes[:, 1] = after.boxes[:, 1] = 0.0
     assigner = ObjectIdAssigner()
-    still = 0.0
-    assert assigner.assign_ids(objects(0.0, (0.0, still, 0.0, "car"), (3.2, still, 0.0, "car"))) == (0, 1)
-    assert assigner.assign_ids(objects(0.1, (0.1, still, 0.0, "car"), (-3.1, still, 0.0, "car"))) == (0, 2)
+    assert assigner.assign_ids(before) == (0, 1)
+    assert assigner.assign_ids(after) == (0, 2)
 
 
 def test_object_ids_of_a_tracker_are_kept() -> None:

@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.v2x.standards import CANDIDATE_SHARE
 
 STEP_DB = 3.0
 """Increment of the threshold while fewer candidates remain (step 7) [dB]."""
