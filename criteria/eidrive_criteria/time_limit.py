@@ -46,5 +46,5 @@ class TimeLimit(Criterion):
             unit="s",
             first_violation=self._violated,
             reason=f"the run {verb} {self._time:.2f} s",
-            fatal=self.fatal,
+            fatal=self.fatal and not passed,
         )

@@ -103,9 +103,8 @@ def build_agent(
     A vehicle without a planner in its settings follows a route. A station that does not drive receives messages only if
     its settings select senders. Raise SettingError if an actor without wheels has a planner.
     """
-    wheels = spec.wheelbase > 0.0
-    planner = settings.planner or (DEFAULT_PLANNER if wheels else NO_PLANNER)
-    if planner != NO_PLANNER and not wheels:
+    planner = settings.planner or (DEFAULT_PLANNER if spec.has_wheels else NO_PLANNER)
+    if planner != NO_PLANNER and not spec.has_wheels:
         raise SettingError(
             Diagnostic(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property 'planner'")
         )
@@ -131,7 +130,7 @@ def build_agent(
         planner=None
         if planner == NO_PLANNER
         else construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed),
-        controller=_vehicle_controller(settings, spec, dt) if wheels else None,
+        controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
         speaker=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
         receives_messages=listens,

@@ -74,7 +74,7 @@ def _drives(scenario: Scenario, name: str, settings: AgentSettings) -> bool:
 
 
 def _has_wheels(scenario: Scenario, name: str) -> bool:
-    return actor_spec(name, scenario.entities[name]).wheelbase > 0.0
+    return actor_spec(name, scenario.entities[name]).has_wheels
 
 
 def declared_detectors(

@@ -18,30 +18,12 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.recording import CameraImageWriter, CsvWriter, Explanation, Recorder, RunLog
-from eidrive_scenario.recording.run_files import (
-    IMAGES,
-    RECORDING,
-    RESULT,
-    read_results,
-    recording_in,
-    result_of,
-)
+from eidrive_scenario.recording.run_files import RECORDING
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
 from eidrive_scenario.simulation.run import checked_seed
 from eidrive_scenario.wall_limit import limit_wall_time
-
-__all__ = [
-    "IMAGES",
-    "RECORDING",
-    "RESULT",
-    "as_json_text",
-    "read_results",
-    "recording_in",
-    "result_of",
-    "run_and_save",
-]
 
 
 def run_and_save(

@@ -38,7 +38,7 @@ class Camera(Sensor):
         super().__init__(settings, spec, name, seed)
         self.mounting = mounting(settings, spec, "front")
         self._image_sensor = ImageSensor(settings)
-        self._ignored = (spec.name,) if spec.wheelbase <= 0.0 else ()
+        self._ignored = () if spec.has_wheels else (spec.name,)
         self._key = (seed, "camera", spec.name, name)
 
     @classmethod

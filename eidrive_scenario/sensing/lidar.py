@@ -38,7 +38,7 @@ class Lidar(Sensor):
         self.mounting = mounting(settings, spec, "roof")
         rings = settings.elevations or np.linspace(settings.upper_fov, settings.lower_fov, settings.channels)
         self._elevations = np.radians(rings)
-        self._on_mast = spec.wheelbase <= 0.0
+        self._on_mast = not spec.has_wheels
         self._columns_per_second = settings.points_per_second / settings.channels
         self._columns_per_turn = max(1, round(self._columns_per_second / settings.rotation))
         self._next: int | None = None

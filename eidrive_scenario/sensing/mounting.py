@@ -65,7 +65,7 @@ def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:
     center_x, center_y, center_z = spec.offset
     top = center_z + spec.size[2] / 2.0
     yaw = math.radians({"left": 100.0, "right": -100.0, "back": 180.0}.get(mount, 0.0))
-    if spec.wheelbase <= 0.0:
+    if not spec.has_wheels:
         return Mounting(center_x, center_y, top, yaw)
     x, y, z = {
         "front": (spec.size[0] / 2.0 + AHEAD_OF_BUMPER, 0.0, 1.0),

@@ -53,6 +53,11 @@ class ActorSpec:
     color: tuple[float, float, float] | None = None
     """Body paint, red green blue in [0, 1]; None for a color by the name."""
 
+    @property
+    def has_wheels(self) -> bool:
+        """Whether the body has axles; masts and pedestrians have none."""
+        return self.wheelbase > 0.0
+
 
 @fast_frozen
 @dataclass(frozen=True)

@@ -22,6 +22,14 @@ def test_time_limit_violation_starts_at_the_limit(frame: Any, car: Any) -> None:
     assert (verdict.value, verdict.first_violation) == (25.0, 21.0)
 
 
+@pytest.mark.parametrize(("end", "fatal", "ends_run"), [(2.0, True, True), (2.0, False, False), (0.5, True, False)])
+def test_time_limit_verdict_is_fatal_only_after_a_violation(
+    frame: Any, car: Any, end: float, fatal: bool, ends_run: bool
+) -> None:
+    criterion = TimeLimit(TimeLimitSettings(within=1, fatal=fatal))
+    (verdict,) = evaluate_criteria([frame(end, {"Ego": car(0)})], [criterion])
+    assert verdict.fatal is ends_run
+
+
 def test_time_limit_is_fatal_by_default() -> None:
-    assert TimeLimit(TimeLimitSettings(within=1)).verdict().fatal
-    assert not TimeLimit(TimeLimitSettings(within=1, fatal=False)).verdict().fatal
+    assert TimeLimitSettings(within=1).fatal

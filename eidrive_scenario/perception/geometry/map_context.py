@@ -15,6 +15,7 @@ from eidrive_scenario.world.physics.ground import is_level
 CELL = 0.5
 """Cell size of the mask of areas near roads [m]; larger for maps that would have more than MOST_CELLS."""
 MOST_CELLS = 16_000_000
+"""Maximum number of cells of the mask, one byte each."""
 BEYOND = 20.0
 """Margin of the mask around the center lines of the lanes [m]."""
 UNKNOWN, OFF, ON = -1, 0, 1

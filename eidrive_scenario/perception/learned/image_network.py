@@ -18,6 +18,7 @@ from eidrive_scenario.perception.learned.networks.suppression import suppress
 LARGEST_OVERLAP = 0.5
 """Overlap above which only the best of several boxes of one group is kept."""
 MOST_CANDIDATES = 1000
+"""Maximum number of boxes before suppression; those with the highest scores are used."""
 MARGIN_GRAY = 114
 """Gray value of the margins of letterboxed images, as in the networks of Ultralytics."""
 

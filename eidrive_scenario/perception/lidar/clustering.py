@@ -18,6 +18,7 @@ NEAREST = 0.5
 COLUMNS = 2.0
 """Maximum number of gaps between neighboring columns of rays within a cluster, at larger distances."""
 NEXT_COLUMN = 1.5
+"""Maximum angle between points of neighboring columns, in gaps between columns."""
 GRAZING = math.radians(10.0)
 """Minimum angle between the ray and the surface through two points of neighboring columns in one cluster."""
 DEEPEST = 4.5

@@ -11,6 +11,7 @@ from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.randomness import generator
 
 SECTORS = 24
+"""Number of sectors around the sensor."""
 BIN = 2.0
 """Bin size along the range [m]."""
 NEAR = 30.0

@@ -10,6 +10,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 
 HEADINGS = np.radians(np.arange(0.0, 90.0, 1.0))
+"""Tested headings of the first axis [rad]."""
 CLOSEST = 0.03
 """Minimum distance from an edge that counts [m]."""
 MOST_POINTS = 300
@@ -17,6 +18,7 @@ MOST_POINTS = 300
 AS_GOOD = 0.9
 """Share of the best closeness from which a heading is equivalent: with few points there are several."""
 MOST = 4
+"""Maximum number of returned rectangles."""
 
 
 class Rectangle(NamedTuple):

@@ -31,11 +31,15 @@ HIDDEN_SHARE = 0.8
 """Share of an edge in a nearer box above which the edge is that of the nearer object. Below it, the rest of the edge
 shows the end of this object."""
 ROUNDS = 10
+"""Number of iterations of the fit."""
 FARTHEST = 300.0
+"""Maximum distance of the initial position of an object [m]."""
 LEVEL = 0.1
 """Change in road height at an object that requires another iteration [m]."""
 LOOKS = 4
+"""Maximum number of fits with updated road heights."""
 LARGEST_VARIANCE = 2500.0
+"""Maximum variance of a position along any axis [m²]: a standard deviation of 50 m."""
 
 _OUTWARDS = np.array([-1.0, -1.0, 1.0, 1.0])
 

@@ -102,12 +102,13 @@ def _fit_points(
     boxes: Array, classes: Sequence[str], camera: CameraReading, scan: Scan, by_ground: ByGround
 ) -> list[Fit | None]:
     """Return the fits to the points in each box, None for boxes without an object in the points."""
-    places, _ = pixels(scan.world, camera)
+    world = scan.world
+    places, _ = pixels(world, camera)
     behind = np.isnan(places[:, 0])
-    aside = (scan.world[behind] - camera.pose[:3, 3]) @ camera.pose[:3, 0]
+    aside = (world[behind] - camera.pose[:3, 3]) @ camera.pose[:3, 0]
     places[behind, 0] = np.where(aside < 0.0, -math.inf, math.inf)
     places[behind, 1] = camera.rgb.shape[0] / 2.0
-    away = np.hypot(*(scan.world[:, :2] - camera.pose[:2, 3]).T)
+    away = np.hypot(*(world[:, :2] - camera.pose[:2, 3]).T)
     found: list[Fit | None] = []
     for row, (box, name) in enumerate(zip(boxes, classes, strict=True)):
         guess, spread = by_ground.boxes[row], by_ground.covariance[row]

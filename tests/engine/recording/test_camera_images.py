@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.experiments.single_run import IMAGES, run_and_save
+from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.recording.camera_images import draw_image_detections, draw_projected_boxes
+from eidrive_scenario.recording.run_files import IMAGES
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.simulation import RunSettings
 
