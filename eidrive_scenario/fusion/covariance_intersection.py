@@ -15,9 +15,9 @@ from eidrive_scenario.fusion.covariance import covariances, estimates, intersect
 from eidrive_scenario.fusion.grouping import group_tracks
 from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.fusion.pairs import AssociationGate
+from eidrive_scenario.fusion.pairs import AssociationGate, Table
 from eidrive_scenario.fusion.report_history import ReportHistory
-from eidrive_scenario.fusion.tracks import Table, predict_tracks
+from eidrive_scenario.fusion.tracks import predict_tracks
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 

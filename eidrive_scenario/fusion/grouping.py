@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from eidrive_scenario.fusion.pairs import AssociationGate, Pairs, assigned_pairs, gated_pairs
-from eidrive_scenario.fusion.tracks import Table
+from eidrive_scenario.fusion.pairs import AssociationGate, Pairs, Table, assigned_pairs, gated_pairs
 
 
 def group_tracks(tracks: Table, gate: AssociationGate) -> list[list[int]]:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import AssociationGate
-from eidrive_scenario.fusion.tracks import TRACK, Table, update_tracks
+from eidrive_scenario.fusion.pairs import AssociationGate, Table
+from eidrive_scenario.fusion.tracks import TRACK, update_tracks
 
 
 class _Entry(NamedTuple):
