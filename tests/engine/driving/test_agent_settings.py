@@ -130,7 +130,7 @@ WRONG = [
     ([("planner", "route"), ("planner_settings", "{gap: 1}")], "s.xosc:13: unknown setting 'gap'"),
     ([("planner_settings", "[1]")], "s.xosc:12: setting 'planner_settings' is [1]; a mapping is expected"),
     ([("vehicle_controller", "pdi")], "s.xosc:12: unknown vehicle controller 'pdi'; did you mean 'pid'?"),
-    ([("tracker", "cvt")], "s.xosc:12: setting 'tracker.kind' is 'cvt'; did you mean 'cv"),
+    ([("tracker", "cvt")], "s.xosc:12: setting 'tracker' is 'cvt'; did you mean 'cv"),
     (
         [("min_existence", "0.2"), ("planner_settings", "{min_existence: 0.4}")],
         "s.xosc:12: setting 'min_existence' of the planner is given twice; remove it from 'planner_settings'",

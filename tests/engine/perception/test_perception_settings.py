@@ -48,7 +48,7 @@ def line_of(path: Path, word: str) -> int:
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        ("tracker", "ukf", "'tracker.kind' is 'ukf'; known: ctrv, cv, none"),
+        ("tracker", "ukf", "setting 'tracker' is 'ukf'; known: ctrv, cv, none"),
         ("tracker", "{kind: cv, confirm: [3, 2]}", "n exceeds m (got [3, 2]"),
         ("tracker", "{kind: cv, coasting: 1}", "did you mean 'coast'?"),
         ("localization", "slam", "'oracle' or 'ekf'"),
