@@ -42,7 +42,7 @@ class StackContext:
     roads: RoadNetwork | None
     seed: int
     dt: float
-    channel: str | Path | None = None
+    channel: str | Path | Mapping[str, Any] | None = None
     detector: str | None = None
     cooperate: tuple[str, ...] | None = None
     load_weights: bool = True

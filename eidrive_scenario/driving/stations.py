@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
@@ -282,7 +283,9 @@ class Stations(DrivingStack):
         """Whether the channel carries the detections of a station back to itself."""
         return self._channel is not None and self._channel.own_perception
 
-    def _set_channel(self, source: str | Path, *, origin: str, line: int | None, scope: Scope | None) -> None:
+    def _set_channel(
+        self, source: str | Path | Mapping[str, Any], *, origin: str, line: int | None, scope: Scope | None
+    ) -> None:
         profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
         before = self._channel or self._retired_channel
         try:

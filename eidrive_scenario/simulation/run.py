@@ -28,7 +28,7 @@ DEFAULT_SEED = 1
 class RunSettings:
     """Optional settings of a run; None uses the value of the scenario file.
 
-    channel         profile name or file; 'none' disables cooperation
+    channel         profile: a name, a file, YAML text or a mapping; 'none' disables cooperation
     detector        for all stations
     cooperate       senders whose messages the receiving stations use; () disables reception
     parameters      values of scenario parameters; an Assignment contains the file and line of the value
@@ -41,7 +41,7 @@ class RunSettings:
     allow_torchscript   whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
     """
 
-    channel: str | Path | None = None
+    channel: str | Path | Mapping[str, Any] | None = None
     detector: str | None = None
     cooperate: tuple[str, ...] | None = None
     parameters: Mapping[str, str | Assignment] = field(default_factory=dict)

@@ -35,6 +35,15 @@ def test_output_paths_may_be_texts(tmp_path: Path) -> None:
     assert (tmp_path / "motion.csv").read_text().startswith("time,name,")
 
 
+def test_channel_as_a_mapping_equals_its_yaml_text(tmp_path: Path) -> None:
+    mapping = {"delay": {"kind": "constant", "seconds": 0.1}, "loss": {"kind": "bernoulli", "probability": 0.3}}
+    text = "{delay: {kind: constant, seconds: 0.1}, loss: {kind: bernoulli, probability: 0.3}}"
+    results = [run_file(ONE, settings=RunSettings(channel=channel, time_limit=1.0)) for channel in (mapping, text)]
+    assert results[0].trace_hash == results[1].trace_hash
+    assert results[0].settings == results[1].settings
+    assert results[0].links[("RSU", "Ego")].lost > 0
+
+
 @pytest.mark.parametrize("seed", ["1", 1.0, None])
 def test_noninteger_seed_raises(tmp_path: Path, seed: Any) -> None:
     for run in (Simulation, run_file, run_and_save):
