@@ -19,10 +19,11 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from numbers import Real
 from types import FrameType, TracebackType
 from typing import IO, Any
 
-from eidrive_scenario.errors import Diagnostic, SettingError, WallLimitError
+from eidrive_scenario.errors import Diagnostic, SettingError, WallLimitError, quoted
 
 REPEAT = 1.0
 """Time from one interruption to the next [s]."""
@@ -91,8 +92,8 @@ def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
     Raise WallLimitError when the limit is reached, and SettingError for a limit that is not positive. Outside of the
     main thread, a waiting system call is not interrupted before it returns.
     """
-    if seconds is not None and not 0.0 < seconds < math.inf:
-        raise SettingError(Diagnostic(f"wall_limit is {seconds}", "give a positive number of seconds"))
+    if seconds is not None and not _is_positive(seconds):
+        raise SettingError(Diagnostic(f"wall_limit is {quoted(seconds)}", "give a positive number of seconds"))
     if seconds is None or current_limit() is not None:
         yield current_limit()
         return
@@ -106,6 +107,11 @@ def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
         raise WallLimitError(seconds, where=running_line(error.__traceback__)) from error
     finally:
         _of_thread.limit = None
+
+
+def _is_positive(seconds: object) -> bool:
+    # bool is a subclass of int, but True is not a number of seconds
+    return isinstance(seconds, Real) and not isinstance(seconds, bool) and 0.0 < float(seconds) < math.inf
 
 
 def current_limit() -> Limit | None:

@@ -54,6 +54,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--eidrive-channel",
         metavar="A,B",
         action="append",
+        type=_listed_channels,
         help="run each scenario with each of these channel profiles (default: the file's own); none: no cooperation; "
         "repeatable",
     )
@@ -86,6 +87,13 @@ def _count(text: str) -> int:
 
 def _count_or_all(text: str) -> int | None:
     return None if text == "all" else _count(text)
+
+
+def _listed_channels(text: str) -> str:
+    """Return the text of an option with at least one channel."""
+    if not _channels(text):
+        raise ArgumentTypeError(f"no channel is listed (got {text!r})")
+    return text
 
 
 def _channels(text: str) -> list[str]:

@@ -97,8 +97,8 @@ def test_outer_limit_stays_within_an_inner_one(tmp_path: Path) -> None:
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
-def test_limit_that_is_not_positive_is_refused(package: Path, tmp_path: Path, seconds: float) -> None:
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf"), "60", True])
+def test_limit_that_is_not_a_positive_number_is_refused(package: Path, tmp_path: Path, seconds: float) -> None:
     with pytest.raises(InputError, match="give a positive number of seconds"):
         run_file(write_scenario(tmp_path / "s.xosc"), settings=RunSettings(), wall_limit=seconds)
 

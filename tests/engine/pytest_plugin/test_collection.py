@@ -80,6 +80,13 @@ def test_seeds_option_of_zero_is_usage_error(project: pytest.Pytester) -> None:
     result.stderr.fnmatch_lines(["*--eidrive-seeds: not a positive integer (got '0')"])
 
 
+@pytest.mark.parametrize("channels", ["", " ,"])
+def test_channel_option_without_channel_is_usage_error(project: pytest.Pytester, channels: str) -> None:
+    result = project.runpytest_inprocess("data", f"--eidrive-channel={channels}")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([f"*--eidrive-channel: no channel is listed (got {channels!r})"])
+
+
 def test_channel_option_accepts_inline_profile_and_drops_duplicates(project: pytest.Pytester) -> None:
     channels = "ideal, {delay: {kind: uniform, low: 0, high: 0.1}, loss: {kind: none}},ideal,none,"
     items = collected(project, "data/first.xosc", "--eidrive-channel", channels)
