@@ -60,7 +60,7 @@ def check(
         except (Exception, SystemExit) as error:
             if context.find_root().params.get("traceback"):
                 raise
-            print_error(error, path)
+            print_error(error, "check", path)
             aborted.append(error)
             continue
         for level, found in zip(printed, (report.errors, report.warnings, report.notes), strict=True):

@@ -10,7 +10,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from eidrive_scenario.errors import EidriveError, ExtensionError, InputError
+from eidrive_scenario.errors import EidriveError, ExtensionError, InputError, SimulationError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
@@ -43,15 +43,17 @@ class Guarded(TyperGroup):
             raise typer.Exit(ABORTED) from error
 
 
-def print_error(error: BaseException, file: object = None) -> None:
+def print_error(error: BaseException, what: str = "run", file: object = None) -> None:
     """Print an error on stderr: an aborted run or check, an error of the operating system, or an internal error.
 
+    what  run or check; omitted from the message of an error outside of both, such as an extension that does not load
     file  file whose check was aborted; None for a run
     """
     prefix = f"{file}: " if file is not None else ""
     error = _attribute(error)
     if isinstance(error, EidriveError):
-        typer.echo(f"{prefix}{'run' if file is None else 'check'} aborted: {error}", err=True)
+        subject = f"{what} " if isinstance(error, SimulationError) or file is not None else ""
+        typer.echo(f"{prefix}{subject}aborted: {error}", err=True)
         print_notes(error)
         return
     if isinstance(error, OSError) and error.strerror:

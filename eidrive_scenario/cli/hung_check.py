@@ -26,7 +26,7 @@ class HungCheck:
         from eidrive_scenario.simulation.attribution import wall_limit_error
 
         try:
-            print_error(wall_limit_error(frame, limit.seconds), self.file)
+            print_error(wall_limit_error(frame, limit.seconds), "check", self.file)
             sys.stdout.flush()
             sys.stderr.flush()
         finally:
@@ -39,4 +39,4 @@ class HungCheck:
         """
         from eidrive_scenario.simulation.hung_runs import describe_dump
 
-        print_error(describe_dump(limit, dump))
+        print_error(describe_dump(limit, dump), "check")

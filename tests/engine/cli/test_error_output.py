@@ -4,7 +4,7 @@ import pytest
 from command_fixtures import Eidrive
 
 from eidrive_scenario import library
-from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.errors import RegistryError, SimulationError
 
 
 def break_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
@@ -26,6 +26,12 @@ def test_simulation_error_is_printed_as_aborted_run(eidrive: Eidrive, monkeypatc
     break_with(monkeypatch, SimulationError("the physics exploded"))
     result = eidrive("list")
     assert (result.exit_code, result.stderr) == (3, "run aborted: the physics exploded\n")
+
+
+def test_registry_error_outside_of_a_run_names_no_run(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
+    break_with(monkeypatch, RegistryError("detector 'mine' (mine:Mine) does not load"))
+    result = eidrive("list")
+    assert (result.exit_code, result.stderr) == (3, "aborted: detector 'mine' (mine:Mine) does not load\n")
 
 
 def test_traceback_option_prints_traceback(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
