@@ -111,7 +111,7 @@ def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
 
 def _is_positive(seconds: object) -> bool:
     # bool is a subclass of int, but True is not a number of seconds
-    return isinstance(seconds, Real) and not isinstance(seconds, bool) and 0.0 < float(seconds) < math.inf
+    return not isinstance(seconds, bool) and isinstance(seconds, Real) and 0.0 < float(seconds) < math.inf
 
 
 def current_limit() -> Limit | None:
