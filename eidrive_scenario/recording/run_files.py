@@ -63,14 +63,6 @@ def result_of(recording: Path) -> dict[str, Any] | None:
     return read_result(beside) if recording.name == RECORDING and beside.exists() else None
 
 
-def read_results(locations: Sequence[Path]) -> list[dict[str, Any]]:
-    """Return the results in these files and folders, including subfolders, in path order, each file once.
-
-    Raise InputError for a file that is not a result.
-    """
-    return [read_result(path) for path in result_paths(locations)]
-
-
 def result_paths(locations: Sequence[Path]) -> Iterator[Path]:
     """Yield the result files in these files and folders, including subfolders, each file once."""
     taken = set()

@@ -9,7 +9,7 @@ from eidrive_scenario.evaluation import evaluate_criteria
 from eidrive_scenario.evaluation.criteria_parser import build_criteria, parse_criteria
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import TraceHash, read_recording
-from eidrive_scenario.recording.run_files import read_results
+from eidrive_scenario.recording.run_files import read_result, result_paths
 from eidrive_scenario.simulation import RunSettings
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
@@ -48,17 +48,19 @@ def test_recordings_of_equal_runs_are_equal_files(tmp_path: Path) -> None:
     assert first == second
 
 
-def test_read_results_finds_each_result_below_folders_once(tmp_path: Path) -> None:
+def test_result_paths_finds_each_result_below_folders_once(tmp_path: Path) -> None:
     for seed in (2, 1):
         run_and_save(PASSING_BY, seed=seed, out=tmp_path / f"seed-{seed}", record=False)
-    assert [result["seed"] for result in read_results([tmp_path])] == [1, 2]
+    files = [tmp_path / f"seed-{seed}" / "result.json" for seed in (1, 2)]
+    assert list(result_paths([tmp_path])) == files
+    assert [read_result(file)["seed"] for file in files] == [1, 2]
     twice = [tmp_path, tmp_path / "seed-1", tmp_path / "seed-2" / ".." / "seed-2" / "result.json"]
-    assert [result["seed"] for result in read_results(twice)] == [1, 2]
-    assert [result["seed"] for result in read_results([tmp_path / "seed-2" / "result.json"])] == [2]
+    assert list(result_paths(twice)) == files
+    assert list(result_paths(files[1:])) == files[1:]
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"seed": 1}'])
-def test_read_results_of_other_file_raises_input_error(tmp_path: Path, text: str) -> None:
+def test_read_result_of_other_file_raises_input_error(tmp_path: Path, text: str) -> None:
     (tmp_path / "result.json").write_text(text)
     with pytest.raises(InputError, match=r"result\.json: not "):
-        read_results([tmp_path])
+        read_result(tmp_path / "result.json")

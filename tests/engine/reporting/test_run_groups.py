@@ -11,7 +11,7 @@ from lxml import html
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
 from eidrive_scenario.files.bounded_json import load_json
-from eidrive_scenario.recording.run_files import read_results
+from eidrive_scenario.recording.run_files import read_result
 from eidrive_scenario.reporting.run_report.report import write_report
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
@@ -122,7 +122,7 @@ def test_report_of_unusual_values_is_written(tmp_path: Path) -> None:
     ],
     ids=["deep", "rather deep", "long number", "many values", "no UTF-8", "null"],
 )
-def test_read_results_of_hostile_file_raises_input_error(tmp_path: Path, text: str, message: str) -> None:
+def test_read_result_of_hostile_file_raises_input_error(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "result.json").write_text(text, encoding="latin-1")
     with pytest.raises(InputError, match=message):
-        read_results([tmp_path])
+        read_result(tmp_path / "result.json")
