@@ -116,7 +116,8 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     read = read_root(document, collector, assignments)
     if read is None or read.root.catalog is not None or read.root.parameter_value_distribution is not None:
         collector.raise_on_error()
-        raise ScenarioError(_other_kind(read.root if read else None, document.name))
+        assert read is not None  # an unknown version is an error
+        raise ScenarioError(_other_kind(read.root, document.name))
     root = read.root
     library = CatalogLibrary(root.catalog_locations, document.folder, read.parameters, collector)
     library.resolve(read.references)
@@ -176,14 +177,14 @@ def _controllers(one: ScenarioObject, entries: Mapping[CatalogReference, Element
     return tuple(controller for controller in found if isinstance(controller, Controller))
 
 
-def _other_kind(root: OpenScenario | None, name: str) -> Diagnostic:
-    if root is not None and root.catalog is not None:
+def _other_kind(root: OpenScenario, name: str) -> Diagnostic:
+    """Return the error for a catalog or a parameter value distribution."""
+    if root.catalog is not None:
         return Diagnostic(
             "the file is a catalog, not a scenario", "specify a scenario that refers to it", name, root.catalog.line
         )
-    distribution = root.parameter_value_distribution if root else None
-    if distribution is None:
-        return Diagnostic("the file is not a scenario", "", name)
+    distribution = root.parameter_value_distribution
+    assert distribution is not None
     return Diagnostic(
         "the file is a parameter value distribution, not a scenario",
         f"its scenario is {distribution.scenario_file.filepath!r}",

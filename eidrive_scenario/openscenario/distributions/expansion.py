@@ -111,7 +111,8 @@ def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansi
     distribution = read.root.parameter_value_distribution if read is not None else None
     if read is None or distribution is None or collector.errors:
         collector.raise_on_error()
-        raise ScenarioError(_other_kind(read.root if read else None, document.name))
+        assert read is not None  # an unknown version is an error
+        raise ScenarioError(_other_kind(read.root, document.name))
     varied = _varied(distribution, seed, collector)
     report = collector.error if document.path is not None else collector.warning
     scenario = _scenario_file(distribution.scenario_file, document.folder, report)
@@ -140,8 +141,7 @@ def _scenario_file(file: File, folder: Path, report: Callable[..., None]) -> Pat
     return path
 
 
-def _other_kind(root: OpenScenario | None, name: str) -> Diagnostic:
-    kind = "catalog" if root is not None and root.catalog is not None else "scenario"
-    return Diagnostic(
-        f"the file is a {kind}, not a parameter value distribution", "", name, root.line if root else None
-    )
+def _other_kind(root: OpenScenario, name: str) -> Diagnostic:
+    """Return the error for a catalog or a scenario."""
+    kind = "catalog" if root.catalog is not None else "scenario"
+    return Diagnostic(f"the file is a {kind}, not a parameter value distribution", "", name, root.line)
