@@ -17,9 +17,12 @@ InvalidResult is internal: a run reports it as ExtensionError of the extension t
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Self
+from typing import Any, ParamSpec, Self, TypeVar
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
 
 MAX_DIAGNOSTICS = 200
 """Maximum number of diagnostics of one kind that are collected for one file."""
@@ -191,6 +194,27 @@ class InvalidResult(Exception):
         super().__init__(f"{method} {description}")
         self.extension = extension
         self.method = method
+
+
+class ErrorSubject:
+    """Station, actor or element for which extensions are called; errors of an extension within `call` name it.
+
+    Extensions, and classes whose methods call them, have a property of the same name, such as `Agent.error_subject`.
+    """
+
+    def __init__(self, subject: str) -> None:
+        self._subject = subject
+
+    @property
+    def error_subject(self) -> str:
+        """Station, actor or element."""
+        return self._subject
+
+    def call(
+        self, function: Callable[Parameters, Result], *arguments: Parameters.args, **named: Parameters.kwargs
+    ) -> Result:
+        """Return the result of a function with these arguments."""
+        return function(*arguments, **named)
 
 
 class ErrorCollector:

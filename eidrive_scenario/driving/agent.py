@@ -83,6 +83,11 @@ class Agent:
         )
         """Time [s], center of the body and height of its reference point [m], heading [rad]."""
 
+    @property
+    def error_subject(self) -> str:
+        """Station that errors of its extensions name."""
+        return f"station {self.name!r}"
+
     def receives_from(self, sender: str, *, own_perception: bool) -> bool:
         """Return whether messages of `sender` are sent to this station: the only place that decides on reception.
 

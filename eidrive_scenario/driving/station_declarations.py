@@ -9,7 +9,7 @@ from typing import Any
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
 from eidrive_scenario.driving.planner_settings import NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
-from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
@@ -92,19 +92,20 @@ def declared_detectors(
     diagnostics: list[Diagnostic] = []
     found: dict[str, Detector] = {}
     for name, station in settings.items():
+        subject = ErrorSubject(f"station {name!r}")
         controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
         by_option = option is not None and not station.detector_settings
         source = "--detector" if by_option else controller.source
         line = None if by_option else _line(controller, "detector_settings", "detector")
         try:
-            found[name] = build_detector(station, source=source, line=line)
+            found[name] = subject.call(build_detector, station, source=source, line=line)
             if load_weights:
-                found[name].load_weights(allow_torchscript=allow_torchscript)
+                subject.call(found[name].load_weights, allow_torchscript=allow_torchscript)
             source, line = controller.source, _line(controller, "sensors")
             for sensor in station.rig_sensors(found[name].needs, found[name].default_sensors).values():
                 sensor_class(sensor.kind).check_settings(sensor)
             line = _line(controller, "fusion_settings", "fusion")
-            build_fusion(station, found[name], source=controller.source, line=line)
+            subject.call(build_fusion, station, found[name], source=controller.source, line=line)
             line = _line(controller, "vehicle_controller_settings", "vehicle_controller")
             vehicle_controller_settings(station, source=controller.source, line=line)
         except SettingError as error:

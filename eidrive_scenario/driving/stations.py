@@ -25,7 +25,7 @@ from eidrive_scenario.driving.station_declarations import (
 )
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.image_detections import ImageDetections
@@ -134,12 +134,13 @@ class Stations(DrivingStack):
         settings = self._settings.get(spec.name)
         if settings is None:
             return
-        context = self._context
-        self._rigs[spec.name] = build_rig(settings, spec, seed=context.seed)
-        detector = self._detectors.pop(spec.name, None) or build_detector(settings)
+        context, station = self._context, ErrorSubject(f"station {spec.name!r}")
+        self._rigs[spec.name] = station.call(build_rig, settings, spec, seed=context.seed)
+        detector = self._detectors.pop(spec.name, None) or station.call(build_detector, settings)
         if context.load_weights:
-            detector.load_weights(allow_torchscript=context.allow_torchscript)
-        agent = self._agents[spec.name] = build_agent(
+            station.call(detector.load_weights, allow_torchscript=context.allow_torchscript)
+        agent = self._agents[spec.name] = station.call(
+            build_agent,
             settings,
             spec,
             context.roads,

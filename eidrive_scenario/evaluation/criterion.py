@@ -61,6 +61,11 @@ class Criterion(ABC):
             self.name = settings.name
         self.fatal = settings.fatal
 
+    @property
+    def error_subject(self) -> str:
+        """Verdict that errors of the criterion name; "" if it has the name of the class."""
+        return "" if self.name == getattr(type(self), "name", None) else f"verdict {self.name!r}"
+
     @abstractmethod
     def observe(self, frame: Frame) -> None:
         """Process one frame."""

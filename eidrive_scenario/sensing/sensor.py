@@ -32,6 +32,11 @@ class Sensor(ABC):
         self.name = name
         self.seed = seed
 
+    @property
+    def error_subject(self) -> str:
+        """Station that errors of the sensor name."""
+        return f"station {self.spec.name!r}"
+
     @classmethod  # noqa: B027 - an optional hook
     def check_settings(cls, settings: SensorSettings) -> None:
         """Raise SettingError, before the run, if valid settings of this type still permit no sensor."""

@@ -1,8 +1,8 @@
 """Attribution of errors to extensions: the extension that raised an exception, its station or actor, and the line.
 
 The stack of the exception contains this information: the frame of a method of an extension has the extension as first
-argument, and the outer frames belong to the station, action or condition that called it. Runs without errors need no
-additional time.
+argument, and the outer frames belong to the station, action or condition that called it. An object on the stack states
+its station, actor or element by its property `error_subject`. Runs without errors need no additional time.
 """
 
 from __future__ import annotations
@@ -16,15 +16,9 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
-from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
-from eidrive_scenario.evaluation.criterion import Criterion
 from eidrive_scenario.registry import Registration, is_built_in, registration, third_party_files
-from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.context.condition import Condition
-from eidrive_scenario.storyboard.context.controller_model import ControllerModel
 from eidrive_scenario.wall_limit import LimitReached, current_limit
-from eidrive_scenario.world.actor import ActorSpec
 
 _ABSENT = object()
 _CONTROL_FLOW = ("_pytest", "asyncio")
@@ -39,7 +33,7 @@ class _Call(NamedTuple):
 
     @property
     def subject(self) -> Any:
-        """The first argument: the object or class of a method."""
+        """First argument: the object or class of a method."""
         code = self.frame.f_code
         return self.frame.f_locals.get(code.co_varnames[0], _ABSENT) if code.co_argcount else _ABSENT
 
@@ -119,7 +113,7 @@ def wall_limit_error(
 def extension_place(
     calls: Sequence[Any], time: float | None = None, observers: Collection[object] = ()
 ) -> ExtensionPlace | None:
-    """Return which extension runs in a stack, outermost call first: a third party's before one of this project."""
+    """Return the outermost extension of a stack, a third-party one if there is one; None without extensions."""
     found: list[tuple[int, Registration]] = []
     for row, call in enumerate(calls):
         subject = call.subject
@@ -134,8 +128,8 @@ def extension_place(
     at = _innermost_own(calls, row)
     if at is None:
         file, line = _definition(calls[row].subject)
-        return ExtensionPlace(kind, name, value, _for_whom(calls), time, file, line, calls[row].function)
-    return ExtensionPlace(kind, name, value, _for_whom(calls), time, at.file, at.line, at.function)
+        return ExtensionPlace(kind, name, value, _subject_of(calls), time, file, line, calls[row].function)
+    return ExtensionPlace(kind, name, value, _subject_of(calls), time, at.file, at.line, at.function)
 
 
 def _wall_limit_error(
@@ -173,7 +167,7 @@ def _is_ours(subject: Any) -> bool:
 
 
 def _by_file(calls: Sequence[_Call]) -> list[tuple[int, Registration]]:
-    """Frames of functions without an object, such as static methods, in the modules of third parties."""
+    """Return the calls in modules of third parties without an object, such as static methods, with their extensions."""
     files = third_party_files()
     found = []
     for row, call in enumerate(calls):
@@ -184,7 +178,7 @@ def _by_file(calls: Sequence[_Call]) -> list[tuple[int, Registration]]:
 
 
 def _innermost_own(calls: Sequence[_Call], row: int) -> _Call | None:
-    """The last call within the extension's own package, from its first frame on."""
+    """Return the last call within the package of an extension, from its first frame on."""
     subject = calls[row].subject
     if calls[row].file in third_party_files():
         own = _files_of(str(calls[row].frame.f_globals.get("__name__")))
@@ -194,7 +188,7 @@ def _innermost_own(calls: Sequence[_Call], row: int) -> _Call | None:
 
 
 def _definition(subject: Any) -> tuple[str, int | None]:
-    """File and line of the class of an extension, or of one of its methods."""
+    """Return file and line of the class of an extension, or of one of its methods."""
     definition = subject if isinstance(subject, type) or inspect.isroutine(subject) else type(subject)
     try:
         return inspect.getsourcefile(definition) or "", inspect.getsourcelines(definition)[1]
@@ -203,7 +197,7 @@ def _definition(subject: Any) -> tuple[str, int | None]:
 
 
 def _files_of(module: str) -> tuple[str, ...]:
-    """The file of a module, or the folder of its topmost package."""
+    """Return the file of a module, or the folders of its topmost package, which end with a slash."""
     top = sys.modules.get(module.partition(".")[0])
     paths = [*getattr(top, "__path__", ())]
     file = getattr(sys.modules.get(module), "__file__", None)
@@ -214,55 +208,33 @@ def _is_within(call: _Call, own: tuple[str, ...]) -> bool:
     return any(call.file == path or (path.endswith("/") and call.file.startswith(path)) for path in own)
 
 
-def _for_whom(calls: Sequence[_Call]) -> str:
-    """For whom the extension was called, as the frames of the stack tell: the innermost that does."""
-    for call in reversed(calls):
-        subject = call.subject
-        if isinstance(subject, Agent):
-            return f"station {subject.name!r}"
-        if isinstance(subject, ControllerModel) and hasattr(subject, "actor"):
-            return f"actor {subject.actor.name!r}"
-        if isinstance(subject, ActionBehaviour):
-            return _of_action(subject)
-        if isinstance(subject, Condition) and hasattr(subject, "element"):
-            return f"{subject.element.source}:{subject.element.line}"
-        if isinstance(subject, Criterion):
-            return _of_criterion(subject)
-        for value in call.frame.f_locals.values() if call.frame.f_code.co_name == "build_agent" else ():
-            if isinstance(value, ActorSpec):
-                return f"station {value.name!r}"
-    return ""
+def _subject_of(calls: Sequence[_Call]) -> str:
+    """Return the station, actor or element that the innermost call with an `error_subject` states; "" without one."""
+    return next((text for call in reversed(calls) if (text := _error_subject(call.subject))), "")
 
 
-def _of_action(action: ActionBehaviour) -> str:
-    element = getattr(action, "action", None)
-    where = f"{element.source}:{element.line}" if element is not None else ""
-    actor = getattr(action, "actor_name", None)
-    return f"actor {actor!r}, {where}" if actor is not None else where
-
-
-def _of_criterion(criterion: Criterion) -> str:
-    """The name that a criterion has in the run, if it is not that of its class."""
-    name = getattr(criterion, "name", None)
-    return f"verdict {name!r}" if isinstance(name, str) and name != getattr(type(criterion), "name", None) else ""
+def _error_subject(instance: Any) -> str:
+    """Return the property `error_subject` of an object; "" for other objects, and before its attributes are set."""
+    if not isinstance(getattr(type(instance), "error_subject", None), property):
+        return ""
+    try:
+        return str(instance.error_subject)
+    except AttributeError:
+        return ""
 
 
 def _place_of_method(error: InvalidResult, calls: Sequence[_Call], time: float | None) -> ExtensionPlace:
-    """The definition of the method that returned something invalid."""
+    """Return the definition of the method that returned an invalid result."""
     extension = error.extension
     kind, name, value = _registration(extension) or ("extension", type(extension).__name__, "")
-    whom = _for_whom(calls) if not isinstance(extension, ActionBehaviour) else _of_action(extension)
-    if not whom and isinstance(extension, Condition):
-        whom = f"{extension.element.source}:{extension.element.line}"
-    if not whom and isinstance(extension, Criterion):
-        whom = _of_criterion(extension)
+    subject = _error_subject(extension) or _subject_of(calls)
     method = getattr(extension, error.method, None)
     file, line = _definition(method if inspect.isroutine(method) else extension)
-    return ExtensionPlace(kind, name, value, whom, time, file, line, error.method)
+    return ExtensionPlace(kind, name, value, subject, time, file, line, error.method)
 
 
 def _diagnostic(error: BaseException, calls: Sequence[_Call], place: ExtensionPlace) -> str:
-    """The exception in a line, and where it was raised if that is not the extension's own code."""
+    """Return the exception in one line, and the location of the raise if it is not in the extension's own code."""
     text = "".join(traceback.format_exception_only(type(error), error)).strip()
     if isinstance(error, SystemExit):
         text = f"SystemExit: {error.code!r} (an extension cannot end the process)"

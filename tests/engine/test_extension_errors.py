@@ -43,6 +43,9 @@ def test_run_of_sound_extensions_passes(package: Path, tmp_path: Path) -> None:
          "np.linalg.inv", "numpy.linalg.LinAlgError: Singular matrix (raised at "),
         ({"detector": "wrong_shape"}, "detector 'wrong_shape' (faulty:WrongShape) of station 'Ego'", 0.0,
          "np.zeros((1, 6))", "ValueError: boxes have shape (1, 6), expected (N, 7) (raised at "),
+        ({"sensors": "{truth: {}, own: {kind: faulty_sensor, fault: read}}"},
+         "sensor 'faulty_sensor' (faulty:FaultySensor) of station 'Ego'", 0.5, 'raise TimeoutError("no answer',
+         "TimeoutError: no answer of the device"),
         ({"fusion": "fusion_hear_raises"}, "fusion method 'fusion_hear_raises' (faulty:FusionHearRaises) of station",
          0.0, 'raise ZeroDivisionError("division', "ZeroDivisionError: division by zero"),
         ({"planner": "planner_static_raises"}, "planner 'planner_static_raises' (faulty:PlannerStaticRaises) of stat",
@@ -77,16 +80,20 @@ def test_exception_of_action_or_condition_names_its_place_in_the_scenario(packag
 
 
 @pytest.mark.parametrize(
-    ("extensions", "line"),
+    ("extensions", "subject", "line"),
     [
-        ({"detector": "exits_when_built"}, "sys.exit(0)"),
-        ({"criterion": "faulty: {fault: built}"}, 'raise RuntimeError("not built")'),
+        ({"detector": "exits_when_built"}, "station 'Ego'", "sys.exit(0)"),
+        ({"sensors": "{truth: {}, own: {kind: faulty_sensor, fault: built}}"}, "station 'Ego'",
+         'raise OSError("no such device")'),
+        ({"planner": "planner_arguments"}, "station 'Ego'", "def __init__(self, settings):"),
+        ({"criterion": "faulty: {fault: built}"}, "", 'raise RuntimeError("not built")'),
     ],
-)
-def test_exception_of_constructor_names_the_extension_without_a_time(
-    package: Path, tmp_path: Path, extensions: dict[str, str], line: str
+)  # fmt: skip
+def test_exception_of_constructor_names_extension_and_station_without_a_time(
+    package: Path, tmp_path: Path, extensions: dict[str, str], subject: str, line: str
 ) -> None:
     error = error_of(tmp_path, **extensions)
+    assert error.place.subject == subject
     assert error.place.time is None or error.place.time == 0.0
     assert error.place.line is not None
     assert line in (package / "faulty.py").read_text().splitlines()[error.place.line - 1]

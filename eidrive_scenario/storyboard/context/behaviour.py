@@ -55,6 +55,12 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         """Parent element of the action, which has attributes of older or shared types (EntityAction)."""
 
     @property
+    def error_subject(self) -> str:
+        """Actor, and location of the element, which errors of the action name."""
+        where = f"{self.action.source}:{self.action.line}"
+        return where if self.actor_name is None else f"actor {self.actor_name!r}, {where}"
+
+    @property
     def controls(self) -> Domain:
         """Domains that this action controls as it is configured."""
         return self.domains

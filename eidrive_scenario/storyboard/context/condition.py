@@ -78,6 +78,11 @@ class Condition(ABC):
     def __init__(self, element: model.Element) -> None:
         self.element = element
 
+    @property
+    def error_subject(self) -> str:
+        """Location of the element, which errors of the condition name."""
+        return f"{self.element.source}:{self.element.line}"
+
     def bind(self, context: ConditionContext) -> None:  # noqa: B027 - most conditions have no references
         """Resolve references of the element, once before the first tick. Raise ScenarioError if one is unknown."""
 

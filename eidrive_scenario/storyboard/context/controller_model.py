@@ -31,6 +31,11 @@ class ControllerModel(ABC):
         self.actor = actor
         self._active = False
 
+    @property
+    def error_subject(self) -> str:
+        """Actor that errors of the model name."""
+        return f"actor {self.actor.name!r}"
+
     def step(self) -> None:
         """Set the speed of the actor in the current step, if the controller is active."""
         if not self.actor.longitudinal:

@@ -23,7 +23,7 @@ from eidrive_scenario.api.common import Diagnostic, SettingError
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Verdict
 from eidrive_scenario.api.driving import Control, Plan, RoutePlanner, VehicleController
 from eidrive_scenario.api.fusion import FusionMethod
-from eidrive_scenario.api.perception import Detections, Detector, TrackingMethod
+from eidrive_scenario.api.perception import Detections, Detector, Sensor, SensorSettings, TrackingMethod
 from eidrive_scenario.api.v2x import LinkChannel, ChannelProfile
 
 AFTER = 0.5  # [s]: the faults begin later than the run
@@ -60,6 +60,7 @@ POINTS = {
         "no_signals": "NoSignals",
     },
     "trackers": {"tracker_none": "TrackerNone"},
+    "sensors": {"faulty_sensor": "FaultySensor"},
     "fusion": {
         "fusion_nan": "FusionNaN",
         "fusion_none": "FusionNone",

@@ -19,6 +19,7 @@ SCENARIO = """<?xml version="1.0"?>
         <Property name="tracker" value="{tracker}"/>
         <Property name="vehicle_controller" value="{controller}"/>
         <Property name="obey_signals" value="{signals}"/>
+        <Property name="sensors" value="{sensors}"/>
       </Properties></Controller></ObjectController>
     </ScenarioObject>
     <ScenarioObject name="Other">{vehicle}
@@ -84,6 +85,7 @@ def write_scenario(
     action: str = "sound",
     condition: str = "sound",
     signals: bool = False,
+    sensors: str = "{truth: {}}",
     end: float = 1.0,
 ) -> Path:
     """Write a scenario of `end` seconds with the extensions of the ego, a criterion and an event after 0.5 s."""
@@ -100,6 +102,7 @@ def write_scenario(
         "action": action,
         "condition": condition,
         "signals": str(signals).lower(),
+        "sensors": sensors,
         "end": str(end),
     }
     text = SCENARIO

@@ -1,4 +1,4 @@
-"""Source text of faulty extensions of stations other than detectors: trackers, fusion methods, planners, a channel."""
+"""Source text of faulty extensions of stations except detectors: sensor, tracker, fusion, planners, a channel."""
 
 STATIONS = """
 class TrackerNone(TrackingMethod):
@@ -7,6 +7,24 @@ class TrackerNone(TrackingMethod):
 
     def predict(self, time):
         return None
+
+
+class FaultySensorSettings(SensorSettings):
+    kind: str = "faulty_sensor"
+    fault: str = "none"
+
+
+class FaultySensor(Sensor):
+    settings_type = FaultySensorSettings
+
+    def __init__(self, settings, spec, name, seed=0):
+        if settings.fault == "built":
+            raise OSError("no such device")
+        super().__init__(settings, spec, name, seed)
+
+    def read(self, scene, view, row):
+        if self.settings.fault == "read" and view.time >= AFTER:
+            raise TimeoutError("no answer of the device")
 
 
 class FusionNaN(FusionMethod):
