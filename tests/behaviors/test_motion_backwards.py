@@ -182,6 +182,29 @@ def test_longitudinal_distance_backwards_mirrors_forwards(scene: RunScene, lane:
     assert max(braking) == pytest.approx(6.0)
 
 
+@pytest.mark.element("SynchronizeAction")
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_synchronize_with_opposite_final_speed_arrives_at_standstill(run: Run, way: float) -> None:
+    """Other needs 100 m / 10 m/s = 10 s; from 10 m/s Ego covers its 50 m with 1 m/s² down to standstill."""
+    place = '<LanePosition roadId="1" laneId="-1" s="{}"/>'
+    start = 200.0
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster>{place.format(600)}</TargetPositionMaster>
+      <TargetPosition>{place.format(start + 50.0 * way)}</TargetPosition>
+      <FinalSpeed><AbsoluteSpeed value="{-3.0 * way}"/></FinalSpeed></SynchronizeAction></PrivateAction>"""
+    others = {"Other": (-1, 500.0, 10.0)}
+    played = run(11.0, ("Ego", action), driven=False, ego=(-1, start, 10.0 * way), others=others)
+    speeds, x = played.of("Ego", "speed"), played.x("Ego")
+    assert speeds[100] == pytest.approx(5.0 * way, abs=0.1)
+    assert x[100] == pytest.approx(start + 37.5 * way, abs=0.5)
+    assert speeds[195] == pytest.approx(0.25 * way, abs=0.15)
+    assert x[200] == pytest.approx(start + 50.0 * way, abs=0.1)
+    assert speeds[-1] == -3.0 * way
+    bound = "forwards; specify a final speed of at least 0" if way > 0.0 else "backwards; specify a final speed of at m"
+    warning = f"SynchronizeAction: the speed changes to {-3.0 * way:g} m/s at once at the target, which the actor "
+    assert [text for text in played.result.warnings if f"{warning}reaches {bound}" in text]
+
+
 @pytest.mark.element("EndOfRoadCondition")
 def test_end_of_road_ends_after_driving_backwards(run: Run) -> None:
     """At 20 m/s from 980 m, Ego is at the end, 1000 m, after 1 s; from 2 s it drives backwards."""

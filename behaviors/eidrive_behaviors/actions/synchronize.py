@@ -48,7 +48,8 @@ class SynchronizeAction(ActionBehaviour):
     Without a final speed the acceleration is constant. An actor that is too fast for it, and would have to reverse,
     uses the mean speed of that instant as its final speed. A steady state at the end shortens distance and time.
     Distances are measured along the trajectory that an entity follows, else along the roads. An entity with a negative
-    speed arrives backwards.
+    speed arrives backwards. A final speed opposite to the direction of motion cannot be reached on the way to the
+    target: the actor arrives at standstill and changes to the final speed at once, which is a warning.
     """
 
     domains = Domain.LONGITUDINAL
@@ -63,20 +64,22 @@ class SynchronizeAction(ActionBehaviour):
         """Trajectories along which the distances of both were measured last."""
         self._targets: dict[str, tuple[TrajectoryCurve, bool]] = {}
         """Per entity: its trajectory, and whether its target is a TrajectoryPosition on that trajectory."""
-        self._sense = 1.0
-        """-1 while the actor drives backwards, else +1."""
+        self._sense: float | None = None
+        """-1 if the actor drives backwards, else +1; None before the first step."""
         self._mean: float | None = None
         """Arrival speed if none is specified and a constant deceleration would reverse the actor [m/s]."""
 
     def update(self) -> Status:
         """Set the speed for the step."""
         motion, dt, final = self.actor.motion, self.context.dt, self._final_speed()
-        self._sense = -1.0 if motion.speed < 0.0 or (motion.speed == 0.0 and (final or 0.0) < 0.0) else 1.0
+        if motion.speed != 0.0 or self._sense is None:
+            self._sense = math.copysign(1.0, motion.speed or final or 1.0)
+        sense = self._sense
         try:
             master_speed = self.context.speed(self.action.master_entity_ref)
-            way = self._distance(self.actor.name, self.action.target_position, self._sense)
-            sense = math.copysign(1.0, master_speed)
-            master_way = self._distance(self.action.master_entity_ref, self.action.target_position_master, sense)
+            way = self._distance(self.actor.name, self.action.target_position, sense)
+            master_sense = math.copysign(1.0, master_speed)
+            master_way = self._distance(self.action.master_entity_ref, self.action.target_position_master, master_sense)
         except EntityAbsentError:
             return Status.RUNNING
         mine, theirs = self.action.target_tolerance or 0.0, self.action.target_tolerance_master or 0.0
@@ -92,20 +95,28 @@ class SynchronizeAction(ActionBehaviour):
             if changed:
                 return Status.RUNNING  # An action that starts in the same step may assign a trajectory.
             if final is not None:
+                self._check_direction(final, sense)
                 motion.set_speed(final)
             return Status.SUCCESS
-        way, present = max(way - mine, EPSILON), self._sense * motion.speed
+        way, present = max(way - mine, EPSILON), sense * motion.speed
         if final is None and self._mean is None and math.isfinite(time) and present > 2.0 * way / time:
             self._mean = way / time
-        final = self._mean if final is None else self._sense * final
+        final = self._mean if final is None else max(0.0, sense * final)
         if final is not None:
-            motion.set_speed(self._sense * self._next(way, time, final, dt))
+            motion.set_speed(sense * self._next(present, way, time, final, dt))
         elif math.isfinite(time):
-            motion.set_speed(self._sense * (present + 2.0 * (way / time - present) / time * dt))
+            motion.set_speed(sense * (present + 2.0 * (way / time - present) / time * dt))
         return Status.RUNNING
 
-    def _next(self, way: float, time: float, final: float, dt: float) -> float:
-        speed = self._sense * self.actor.motion.speed
+    def _check_direction(self, final: float, sense: float) -> None:
+        """Add a warning if the final speed is opposite to the direction of motion [m/s]."""
+        if final * sense < -EPSILON:
+            way, bound = ("forwards", "at least") if sense > 0.0 else ("backwards", "at most")
+            message = f"the speed changes to {final:g} m/s at once at the target, which the actor reaches {way}"
+            self.context.warn(*self.error(message, f"specify a final speed of {bound} 0 m/s").diagnostics)
+
+    def _next(self, speed: float, way: float, time: float, final: float, dt: float) -> float:
+        """Return the speed at the end of the step, as all speeds in the direction of motion [m/s]."""
         steady = self._steady_distance(final)
         if steady > 0.0 and final > EPSILON:
             if way - steady < EPSILON or time - steady / final < EPSILON:
