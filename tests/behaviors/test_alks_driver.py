@@ -72,8 +72,10 @@ def test_alks_on_a_free_road_returns_to_set_speed_comfortably(scene: RunScene) -
     assert played.at(4).speed == pytest.approx(30.0)
 
 
-def test_alks_with_unknown_model_is_rejected_with_a_suggestion(scene: RunScene) -> None:
+def test_alks_with_invalid_property_is_rejected(scene: RunScene) -> None:
     with pytest.raises(ScenarioError, match="did you mean 'ReferenceDriver'"):
         scene(1, cruise=properties_of(model="ReferenzDriver"), controller_model="alks")
     with pytest.raises(ScenarioError, match=r"invalid property aebTTC \(got 'soon'; expected"):
         scene(1, cruise=properties_of(aebTTC="soon"), controller_model="alks")
+    with pytest.raises(ScenarioError, match=r"invalid property fullStop \(got 'ja'; expected true or false\)"):
+        scene(1, cruise=properties_of(fullStop="ja"), controller_model="alks")

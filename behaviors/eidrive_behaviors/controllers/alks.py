@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from eidrive_behaviors.controllers.properties import number
+from eidrive_behaviors.controllers.adaptive_cruise import SPEED_CHANGE
+from eidrive_behaviors.controllers.properties import choice, flag, number
 from eidrive_behaviors.controllers.reference_driver import ReferenceDriver, ReferenceDriverSettings
 from eidrive_behaviors.controllers.road_ahead import LeadObject, RoadAhead
 from eidrive_behaviors.controllers.safety_models import EgoKinematics, Fsm, Regulation, Rss, SafetyModel
 from eidrive_scenario.api.actions import Actor, ControllerContext, ControllerModel, model
-from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 COMFORT = 2.0
 """Acceleration toward the set speed on a free road [m/s²]."""
@@ -17,9 +15,10 @@ FOLLOWING_LIMITS = (-4.0, 3.0)
 """Acceleration limits while following [m/s²]."""
 GAINS = (2.0, 1.0)
 """Gains while following: of the speed difference [1/s], of the gap [1/s²]."""
-SPEED_CHANGE = 1e-3
-"""Speed difference above which another action has set the speed [m/s]."""
-MODELS = ("Regulation", "ReferenceDriver", "RSS", "FSM")
+MEMORYLESS: dict[str, type[Regulation | Rss | Fsm]] = {"Regulation": Regulation, "RSS": Rss, "FSM": Fsm}
+"""Models other than the ReferenceDriver, by name."""
+PERCEIVED_MOTION = {"Dist": 0.72, "Time": None}
+"""Lateral motion of a cutting-in vehicle during risk evaluation [m] by `cutInPerceptionDelayMode`; None: by time."""
 
 
 class AlksDriver(ControllerModel):
@@ -38,7 +37,7 @@ class AlksDriver(ControllerModel):
         super().__init__(controller, context, actor)
         self._controller = controller
         self.model = self._build_model()
-        self._cruises = self._flag("cruise", True)
+        self._cruises = flag(controller, "cruise", True)
         tolerance = number(controller, "overlapTolerance", 0.1)
         later = context.step if self.properties.get("mode") == "override" else 0.0
         self._road = RoadAhead(context, actor, self.model.reach, tolerance=tolerance, later=later)
@@ -74,36 +73,19 @@ class AlksDriver(ControllerModel):
         return min(max(wanted, FOLLOWING_LIMITS[0]), FOLLOWING_LIMITS[1])
 
     def _build_model(self) -> SafetyModel:
-        full_stop = self._flag("fullStop", False)
-        name = self.properties.get("model", "ReferenceDriver")
-        if name == "ReferenceDriver":
-            return ReferenceDriver(self._driver_settings(full_stop))
-        memoryless: dict[str, type[Regulation | Rss | Fsm]] = {"Regulation": Regulation, "RSS": Rss, "FSM": Fsm}
-        if name not in memoryless:
-            raise self._error(f"unknown model {name!r}", suggestion(name, MODELS))
-        return memoryless[name](full_stop=full_stop)
+        name = choice(self._controller, "model", ("ReferenceDriver", *MEMORYLESS), "ReferenceDriver")
+        full_stop = flag(self._controller, "fullStop", False)
+        if name in MEMORYLESS:
+            return MEMORYLESS[name](full_stop=full_stop)
+        return ReferenceDriver(self._driver_settings(full_stop))
 
     def _driver_settings(self, full_stop: bool) -> ReferenceDriverSettings:
-        default = ReferenceDriverSettings()
-        mode = self.properties.get("cutInPerceptionDelayMode", "Dist")
-        if mode not in ("Dist", "Time"):
-            raise self._error(f"unknown cutInPerceptionDelayMode {mode!r}", suggestion(mode, ("Dist", "Time")))
+        controller, default = self._controller, ReferenceDriverSettings()
         return ReferenceDriverSettings(
-            pedestrians=number(self._controller, "pedestrianRiskEvaluationTime", default.pedestrians),
-            distance=0.72 if mode == "Dist" else None,
-            moved=number(self._controller, "lateralTrigDistance", None),
-            emergency=number(self._controller, "aebTTC", default.emergency),
+            pedestrians=number(controller, "pedestrianRiskEvaluationTime", default.pedestrians),
+            distance=PERCEIVED_MOTION[choice(controller, "cutInPerceptionDelayMode", PERCEIVED_MOTION, "Dist")],
+            moved=number(controller, "lateralTrigDistance", None),
+            emergency=number(controller, "aebTTC", default.emergency),
             full_stop=full_stop,
-            always=self._flag("alwaysTrigOnScenario", False),
+            always=flag(controller, "alwaysTrigOnScenario", False),
         )
-
-    def _flag(self, name: str, default: bool) -> bool:
-        text = self.properties.get(name)
-        return default if text is None else _TRUTH.get(text.strip().lower(), default)
-
-    def _error(self, message: str, hint: str) -> ScenarioError:
-        element = self._controller
-        return ScenarioError(Diagnostic(f"controller {element.name!r}: {message}", hint, element.source, element.line))
-
-
-_TRUTH: Mapping[str, bool] = {"true": True, "1": True, "false": False, "0": False}
