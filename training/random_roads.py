@@ -302,5 +302,6 @@ def _clear_of_roads(roads: RoadNetwork, x: float, y: float, heading: float, leng
     """Return whether a house overlaps no road."""
     along, across = np.meshgrid(np.linspace(-0.5, 0.5, 9) * length, np.linspace(-0.5, 0.5, 5) * depth)
     cos, sin = math.cos(heading), math.sin(heading)
-    lanes, _, _ = roads.touched((x + cos * along - sin * across).ravel(), (y + sin * along + cos * across).ravel())
+    corners_x, corners_y = x + cos * along - sin * across, y + sin * along + cos * across
+    lanes, _, _ = roads.overlapped_lanes(corners_x.ravel(), corners_y.ravel())
     return not len(lanes)

@@ -200,7 +200,7 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
     """Yield warnings of linked lanes of two roads whose ends do not meet. The reference lines need not meet."""
-    ends: dict[tuple[str, int], RoadEnd] = {}
+    ends: dict[tuple[str, int], EndCrossSection] = {}
     for one, other in links.between_roads():
         road, beyond = roads[one.lane.road], roads[other.lane.road]
         lane = road.sections[one.lane.section].lanes[one.lane.lane]
@@ -215,8 +215,10 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
             yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", message, "make their ends meet", lane.line)
 
 
-class RoadEnd(NamedTuple):
-    """End of a road: its point [m], the change of x and y per meter of t, and the lane offset [m]."""
+class EndCrossSection(NamedTuple):
+    """Cross section at an end of a road: point of the reference line [m], change of x and y per meter of t, and lane
+    offset [m].
+    """
 
     x: float
     y: float
@@ -225,8 +227,8 @@ class RoadEnd(NamedTuple):
     offset: float
 
 
-def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], RoadEnd]) -> tuple[float, float]:
-    """Return the end of the center line of a lane [m]. `known` caches values that all lanes of a road end share."""
+def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], EndCrossSection]) -> tuple[float, float]:
+    """Return the end of the center line of a lane [m]. `known` caches the cross sections by road and side."""
     found = known.get((road.id, end.side))
     if found is None:
         s = road.length if end.side > 0 else 0.0
@@ -234,7 +236,7 @@ def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], RoadEnd]) -
         ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
         sin, cos = math.sin(heading), math.cos(heading)
         dx, dy = ahead * cos - left * sin, ahead * sin + left * cos
-        found = known[road.id, end.side] = RoadEnd(x, y, dx, dy, road.lane_offset.value(s))
+        found = known[road.id, end.side] = EndCrossSection(x, y, dx, dy, road.lane_offset.value(s))
     section = road.sections[end.lane.section]
     lane = section.lanes[end.lane.lane]
     t = found.offset + lane.side * lane.center.value(section.length if end.side > 0 else 0.0)

@@ -19,9 +19,9 @@ APART = 0.24
 STRIPE = 0.5
 """Width of the stripes of a crosswalk and of the gaps between them [m]."""
 MOST_STRIPES = 500
+"""Maximum number of stripes of a crosswalk."""
 MOST_DASHES = 20_000
 """Maximum number of dashes of a line. A line with more dashes is drawn solid."""
-"""Maximum number of stripes of a crosswalk."""
 FINEST = 0.01
 """Minimum length of dash and gap together [m]. Shorter patterns are drawn solid."""
 PAINTED = ("solid", "broken", "solid solid", "solid broken", "broken solid", "broken broken", "botts dots")

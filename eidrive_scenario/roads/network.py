@@ -43,7 +43,7 @@ class RoadNetwork(RoadAttributes):
 
     def __init__(self, road_map: RoadMap) -> None:
         super().__init__(road_map)
-        self._flaws = road_map.map_warnings
+        self._reading_warnings = road_map.map_warnings
         self.links = LaneLinks(road_map)
         self.movement = Movement(self.roads, self.links)
         self._distances = RoadDistances(self.roads, self.links, self._usual_speed)
@@ -64,7 +64,8 @@ class RoadNetwork(RoadAttributes):
     @cached_property
     def map_warnings(self) -> tuple[Diagnostic, ...]:
         """Warnings of the file, which is readable nevertheless: one diagnostic per kind, with its rule."""
-        return group_map_warnings([*self._flaws, *check_road_map(self.roads, self.junctions, self.links)], self.source)
+        found = [*self._reading_warnings, *check_road_map(self.roads, self.junctions, self.links)]
+        return group_map_warnings(found, self.source)
 
     @cached_property
     def tables(self) -> RoadTables:
@@ -165,7 +166,7 @@ class RoadNetwork(RoadAttributes):
         pz = None if z is None else np.atleast_1d(np.asarray(z, dtype=np.float64))
         return self._locator.locate(px, py, pz, reach)
 
-    def touched(self, x: Array, y: Array, z: Array | None = None) -> tuple[Integers, Array, Integers]:
+    def overlapped_lanes(self, x: Array, y: Array, z: Array | None = None) -> tuple[Integers, Array, Integers]:
         """Return all lanes that overlap points (N,): lane rows of `tables`, s on their roads, and indices of the
         points.
 

@@ -195,7 +195,7 @@ def obstacles(
     y = (boxes[:, 1, None] + sin * corners[..., 0] + cos * corners[..., 1]).ravel()
     z = np.repeat(view.position[rows, 2], len(OUTLINE))
     velocity = np.repeat(view.velocity[rows, :2], len(OUTLINE), axis=0)
-    row, s, point = lanes.roads.touched(x, y, z)
+    row, s, point = lanes.roads.overlapped_lanes(x, y, z)
     progress = lanes.progress(row, s)
     heading = lanes.tables.curves.at(lanes.road[row], s)[2]
     along = velocity[point, 0] * np.cos(heading) + velocity[point, 1] * np.sin(heading)

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.roads import PlacedObject, RoadNetwork, Signal, outlines, placed_objects
-from eidrive_scenario.roads.model.location import Pose
+from eidrive_scenario.roads import LaneLocation, PlacedObject, Pose, RoadNetwork, Signal, outlines, placed_objects
 
 SIZES: Mapping[str, tuple[float, float, float]] = {
     "tree": (4.0, 4.0, 7.0),
@@ -47,6 +46,8 @@ _KINDS: Mapping[str, str] = {
 }
 """Kinds by type of OpenDRIVE objects."""
 _WITHOUT_TYPE = ("none", "-1", "")
+STOREY = 3.2
+"""Height of a storey [m]: the default height of a building, and the distance of its rows of windows."""
 LEAST = 0.1
 """Minimum height of an object; lower ones are paint [m]."""
 STEP = 0.2
@@ -63,7 +64,7 @@ class RoadObjectBody(NamedTuple):
     """Body of an object: kind (a key of SIZES, or `post` of a signal), pose of its base, length, width and height [m].
 
     radius  of a round body; 0 for a box
-    blocks  the line of sight and, if `solid`, vehicles
+    solid   whether it blocks vehicles and rays; crowns of trees and bushes block rays only
     """
 
     name: str
@@ -141,9 +142,8 @@ def _painted(signal: Signal) -> bool:
     return not signal.dynamic and signal.height < 0.3 and signal.z_offset < 1.0
 
 
-def _drivable(roads: RoadNetwork, here: tuple[str, int, float, float, float]) -> bool:
-    road, lane, s = here[:3]
-    found = roads.roads[road].section_at(s).lanes.get(lane)
+def _drivable(roads: RoadNetwork, here: LaneLocation) -> bool:
+    found = roads.roads[here.road].section_at(here.s).lanes.get(here.lane)
     return found is not None and found.drivable
 
 
@@ -157,7 +157,7 @@ def _object_body(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | N
     pose, length, width = placed.pose, placed.length, placed.width
     height = max([placed.height, *(corner.height for outline in entry.outlines for corner in outline)])
     if entry.outlines and not entry.repeats:
-        pose, length, width = _bounding_box(roads, placed)
+        pose, length, width = bounding_box(roads, placed)
     usual = SIZES[kind]
     length, width, height = length or usual[0], width or usual[1], height or usual[2]
     if height < LEAST:
@@ -172,7 +172,7 @@ def _object_body(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | N
     return RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
 
 
-def _bounding_box(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:
+def bounding_box(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:
     """Return the box around the outlines of an object: pose of the center of its base, length and width [m]."""
     pose = placed.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)

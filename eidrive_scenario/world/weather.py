@@ -35,6 +35,8 @@ SNOW_GRIP = 0.235
 """Grip on hard-packed snow by the same table, 0.2 / 0.85."""
 DARK = 1.0
 """Elevation of the sun below which vehicles switch on their lamps automatically [degrees]."""
+POOR_SIGHT = 1500.0
+"""Visual range below which vehicles switch on their lamps automatically [m]."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -119,7 +121,7 @@ class Weather(Settings):
         """Whether vehicles switch on their lamps automatically."""
         if self.headlights != "auto":
             return self.headlights == "on"
-        return self.sun_elevation < DARK or EXTINCTION_AT_RANGE / self.extinction < 1500.0
+        return self.sun_elevation < DARK or EXTINCTION_AT_RANGE / self.extinction < POOR_SIGHT
 
 
 def load_weather(source: str | Path, *, origin: str = "") -> Weather:

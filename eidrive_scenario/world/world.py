@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, suggestion
+from eidrive_scenario.errors import SimulationError, suggestion
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
@@ -23,7 +23,7 @@ from eidrive_scenario.world.physics.contacts import ContactTracker
 from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.ground import GroundUnder
-from eidrive_scenario.world.physics.rays import Point, RayHits, cast_rays, first_met
+from eidrive_scenario.world.physics.rays import Point, RayHits, cast_rays, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
 from eidrive_scenario.world.road_objects import signal_heads
@@ -68,7 +68,7 @@ class World:
         self._tracker = ContactTracker()
         self._contacts: tuple[Contact, ...] = ()
         self._view: WorldView | None = None
-        self._cast: ActorTable | None = None
+        self._table: ActorTable | None = None
         self._scenery = Scenery(self._client, roads, entities)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
         self._visuals: Visuals | None = None
@@ -132,12 +132,6 @@ class World:
         entered.acceleration, entered.yaw_rate, entered.velocity = acceleration, yaw_rate, velocity
         self._bodies = {key: self._bodies[key] for key in order}
         self._changed()
-
-    def set_friction(self, scale: float) -> None:
-        """Scale the grip of all tires: 1 on a dry road, less on a wet one."""
-        if not scale > 0.0:
-            raise SettingError(Diagnostic(f"the road's friction scale is {scale:g}", "give a number above 0"))
-        self._friction = scale
 
     @property
     def weather(self) -> Weather:
@@ -228,7 +222,7 @@ class World:
         if self._unseen:
             rows: list[int] = self.raycast(origins, targets).rows.tolist()
             return rows
-        return first_met(self._client, origins, targets, self._actors.row_in_list)
+        return first_hits(self._client, origins, targets, self._actors.row_in_list)
 
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
         """Return whether the line of sight from the origin (3,) to each target (M, 3) is free, except for `ignore`."""
@@ -287,13 +281,13 @@ class World:
         self._view = None
         self._physics.changed()
         self._physics.scenery_changed()
-        self._cast = None
+        self._table = None
 
     @property
     def _actors(self) -> ActorTable:
-        if self._cast is None:
-            self._cast = ActorTable.of(self._bodies, self._scenery.highest_handle)
-        return self._cast
+        if self._table is None:
+            self._table = ActorTable.of(self._bodies, self._scenery.highest_handle)
+        return self._table
 
     def _refresh(self) -> None:
         """Create the bodies for rays, and move those of actors to their current poses."""

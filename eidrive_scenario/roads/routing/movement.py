@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
+from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import LEAST_STRETCH, lane_at, lane_t
 from eidrive_scenario.roads.model.curves import Arc
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
@@ -151,7 +152,7 @@ class Movement:
             return [Branch(*found[0], 0.0)]
         road = self._roads[key.road]
         start = road.reference.at(road.length if direction > 0 else 0.0).h + (0.0 if direction > 0 else math.pi)
-        return [Branch(k, d, _wrap(self._exit_heading(k, d) - start)) for k, d in found]
+        return [Branch(k, d, wrap_angle(self._exit_heading(k, d) - start)) for k, d in found]
 
     def _exit_heading(self, key: LaneKey, direction: int) -> float:
         road = self._roads[key.road]
@@ -254,7 +255,3 @@ def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: flo
     across = speed * (1.0 - curvature * (t + offset))
     stretch = math.hypot(across, slope) if slope else across
     return stretch if stretch > LEAST_STRETCH else LEAST_STRETCH
-
-
-def _wrap(angle: float) -> float:
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import lane_pose_at, lane_t
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
@@ -131,7 +132,7 @@ class Route:
         if x[0] == x[1] and y[0] == y[1]:
             return pose
         heading = math.atan2(y[1] - y[0], x[1] - x[0])
-        return pose.turned(_wrap(heading - pose.h))
+        return pose.turned(wrap_angle(heading - pose.h))
 
     def s_along(self, location: LaneLocation) -> float | None:
         """Return the distance along the route to the road and s of a location, or None if the route misses it."""
@@ -295,7 +296,3 @@ def concatenate_routes(routes: Sequence[Route]) -> Route:
     for route in routes[1:]:
         lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)
     return Route(routes[0].tables, tuple(lanes), routes[0].start, routes[-1].end)
-
-
-def _wrap(angle: float) -> float:
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -96,7 +96,7 @@ def bar(entity: model.Element, reach: float) -> float:
     """Return the distance between coupler and equivalent single axle [m]: with one axle `reach`.
 
     The lateral forces of the fixed axles are proportional to their slip angles. They have no moment about the coupler,
-    as the trailer turns freely. Axles at distances d axle_offset the coupler are thus equivalent to one at Σd² / Σd.
+    as the trailer turns freely. Axles at distances d from the coupler are thus equivalent to one at Σd² / Σd.
     """
     if not isinstance(entity, model.Vehicle) or not entity.axles.additional_axle:
         return reach

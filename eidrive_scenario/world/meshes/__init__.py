@@ -14,7 +14,7 @@ from eidrive_scenario.world.meshes.cycles import bicycle, motorbike
 from eidrive_scenario.world.meshes.figures import crate, roadside_unit
 from eidrive_scenario.world.meshes.heavy import bus, firetruck, trailer, truck
 from eidrive_scenario.world.meshes.people import in_motion, pedestrian
-from eidrive_scenario.world.meshes.solids import Mesh, polygon
+from eidrive_scenario.world.meshes.solids import Mesh
 from eidrive_scenario.world.meshes.vans import ambulance, van
 
 BUILDERS: Mapping[str, Callable[[BodyDimensions], Mesh]] = {
@@ -47,22 +47,6 @@ def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
     if spec.wheelbase <= 0.0 and extra:
         shape, extra = ("trailer", extra) if shape == "truck" else (shape, ())
     return _mesh(shape, BodyDimensions(length, width, height, front, rear, radius, extra), motion)
-
-
-def shadow(spec: ActorSpec) -> Array:
-    """Return the dark area below an actor as triangles (K, 3, 3) in the same frame."""
-    half_length, half_width = spec.size[0] / 2 + 0.12, spec.size[1] / 2 + 0.12
-    corner = min(0.5, half_length / 2, half_width / 2)
-    outline = [
-        (half_length, -half_width + corner), (half_length, half_width - corner), (half_length - corner, half_width),
-        (-half_length + corner, half_width), (-half_length, half_width - corner), (-half_length, -half_width + corner),
-        (-half_length + corner, -half_width), (half_length - corner, -half_width),
-    ]  # fmt: skip
-    return polygon([(x, y, _ABOVE_GROUND) for x, y in outline])
-
-
-_ABOVE_GROUND = 0.035
-"""Height of the shadow, above the road markings [m]."""
 
 
 @lru_cache(maxsize=256)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.meshes.solids import Mesh, box, polygon
+from eidrive_scenario.world.road_objects import STOREY
 
-STOREY = 3.2
 WINDOW = (1.3, 1.5)
 """Width and height of a window [m]."""
 PITCH = 3.0

@@ -22,7 +22,6 @@ MATERIALS: dict[str, Color] = {
     "reversing_light": (0.88, 0.88, 0.86),
     "plate": (0.92, 0.92, 0.90),
     "blue_light": (0.05, 0.18, 0.95),
-    "red_light": (0.95, 0.06, 0.06),
     "white": (0.93, 0.93, 0.92),
     "red": (0.74, 0.05, 0.04),
     "yellow": (0.93, 0.76, 0.08),
@@ -37,10 +36,8 @@ MATERIALS: dict[str, Color] = {
     "orange": (0.92, 0.42, 0.06),
     "roof": (0.34, 0.32, 0.31),
     "grass": (0.36, 0.44, 0.26),
-    "shadow": (0.15, 0.15, 0.16),
     "asphalt": (0.27, 0.27, 0.28),
     "pavement": (0.58, 0.57, 0.55),
-    "marking": (0.93, 0.93, 0.90),
     "concrete": (0.62, 0.61, 0.58),
     "bark": (0.24, 0.18, 0.13),
     "leaves": (0.20, 0.33, 0.12),
@@ -50,7 +47,6 @@ MATERIALS: dict[str, Color] = {
     "sign_yellow": (0.93, 0.74, 0.06),
     "sign_blue": (0.03, 0.22, 0.55),
     "sign_black": (0.04, 0.04, 0.04),
-    "marking_yellow": (0.90, 0.70, 0.12),
 }
 
 PAINTS: tuple[Color, ...] = (

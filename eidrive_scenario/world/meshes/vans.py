@@ -14,7 +14,7 @@ def van(frame: BodyDimensions) -> Mesh:
     mesh = Mesh()
     _body(mesh, frame, roof_from=0.0)
     _cab_details(mesh, frame)
-    _rear_doors(mesh, frame, "paint")
+    _rear_doors(mesh, frame)
     x, z, side = frame.x, frame.z, frame.side
     for share in (0.36, 0.60):
         mesh.add_mirrored("trim", box((x(share), 0.962 * side, z(0.48)), (0.014, 0.008, z(0.62))))
@@ -48,7 +48,7 @@ def ambulance(frame: BodyDimensions) -> Mesh:
         ]
         bar = polygon([(x(0.24) + a, -flank - 0.02, z(0.70) + b) for a, b in reversed(corners)])
         mesh.add_mirrored("blue_light", bar)
-    _rear_doors(mesh, frame, "paint")
+    _rear_doors(mesh, frame)
     mesh.add("red", box((x(0.0) + 0.03, 0, z(0.46)), (0.03, 1.8 * side, z(0.10))))
     mesh.add("blue_light", bevelled_box((x(0.655), 0, z(0.965)), (0.30, 1.5 * side, z(0.07)), 0.03))
     mesh.add_mirrored("blue_light", box((x(0.02), 0.80 * side, z(0.92)), (0.09, 0.25, z(0.06))))
@@ -117,7 +117,7 @@ def _cab_details(mesh: Mesh, frame: BodyDimensions) -> None:
     mesh.add_mirrored("trim", box((x(0.90), 0.985 * side, z(0.60)), (0.12, 0.10, 0.26)))
 
 
-def _rear_doors(mesh: Mesh, frame: BodyDimensions, _: str) -> None:
+def _rear_doors(mesh: Mesh, frame: BodyDimensions) -> None:
     x, z, side = frame.x, frame.z, frame.side
     tail = x(0.0)
     mesh.add("trim", box((tail + 0.01, 0, z(0.53)), (0.03, 0.02, z(0.74))))

@@ -11,13 +11,10 @@ import numpy as np
 from eidrive_scenario.geometry import box_corners, box_distance, overlap, points_in_box
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bodies import Body
-from eidrive_scenario.world.view import Contact
+from eidrive_scenario.world.view import FEW, Contact
 
 PARTED = 0.05
 """Minimum gap after a contact before a new one is counted [m]. It prevents that a scrape counts as many contacts."""
-
-_FEW = 16
-"""Maximum number of bodies for which plain loops are faster than arrays."""
 
 
 class Touch(NamedTuple):
@@ -70,7 +67,7 @@ class ContactTracker:
 
 def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
     """Yield pairs with a moved body whose circles overlap, including the hysteresis, in the order of the bodies."""
-    if len(bodies) > _FEW:
+    if len(bodies) > FEW:
         yield from _near_pairs_of_many(bodies)
         return
     for index, first in enumerate(bodies):

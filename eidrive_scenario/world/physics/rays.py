@@ -66,7 +66,7 @@ def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Intege
     return RayHits(rows, fraction, position, normal)
 
 
-def first_met(client: int, origins: Sequence[Point], targets: Sequence[Point], row_of_handle: list[int]) -> list[int]:
+def first_hits(client: int, origins: Sequence[Point], targets: Sequence[Point], row_of_handle: list[int]) -> list[int]:
     """Return the rows of the first hits as `cast_rays` does, without arrays; for at most one batch of rays."""
     hits = bullet.rayTestBatch(origins, targets, numThreads=1, physicsClientId=client)
     return [row_of_handle[hit[0]] for hit in hits]

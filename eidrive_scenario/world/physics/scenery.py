@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.roads import PlacedObject, RoadNetwork, outlines, placed_objects, surface_meshes
+from eidrive_scenario.roads import PlacedObject, RoadNetwork, placed_objects, surface_meshes
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN, quaternion
 from eidrive_scenario.world.physics.bullet import bullet
@@ -17,11 +17,9 @@ from eidrive_scenario.world.physics.ground import is_level
 from eidrive_scenario.world.physics.obstacles import MAX_FACES, Obstacles
 from eidrive_scenario.world.physics.spatial_grid import SpatialGrid, grid_cells
 from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
-from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies
+from eidrive_scenario.world.road_objects import STOREY, RoadObjectBody, bounding_box, road_object_bodies
 
 GROUND = "ground"
-STOREY = 3.2
-"""Default height of a building whose height the map omits [m]."""
 
 
 @dataclass(frozen=True)
@@ -142,15 +140,9 @@ class Scenery:
 def _building(roads: RoadNetwork, placed: PlacedObject) -> Building:
     """Return the box around an object of the road network."""
     entry, pose = placed.object, placed.pose
-    cos, sin = math.cos(pose.h), math.sin(pose.h)
     length, width, height = placed.length or 1.0, placed.width or 1.0, placed.height or STOREY
-    x, y = pose.x, pose.y
     if entry.outlines and not entry.repeats:
-        offset = np.concatenate(outlines(roads, entry))[:, :2] - (x, y)
-        corners = np.stack([cos * offset[:, 0] + sin * offset[:, 1], cos * offset[:, 1] - sin * offset[:, 0]], axis=1)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        length, width = (high - low).tolist()
-        mx, my = ((low + high) / 2).tolist()
-        x, y = x + cos * mx - sin * my, y + sin * mx + cos * my
+        pose, length, width = bounding_box(roads, placed)
         height = max([height, *(corner.height for outline in entry.outlines for corner in outline)])
-    return Building(entry.name or f"building {entry.id}", (x, y, pose.z + height / 2), (length, width, height), pose.h)
+    center = (pose.x, pose.y, pose.z + height / 2)
+    return Building(entry.name or f"building {entry.id}", center, (length, width, height), pose.h)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Floats
+from eidrive_scenario.arrays import Array, Floats
 
-LUMA: Floats = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+LUMA: Array = np.array([0.2126, 0.7152, 0.0722])
 """Luminance weights of linear sRGB (IEC 61966-2-1)."""
 HEADROOM = 4.0
 """Luminance of white in units of the luminance that becomes middle light gray before the shoulder."""

@@ -21,7 +21,6 @@ _INDICATOR: Light = (11_000.0, 3_600.0, 30.0)
 _WHITE: Light = (7_000.0, 6_800.0, 6_200.0)
 _PLATE: Light = (28.0, 26.0, 22.0)
 _BEACON: Light = (150.0, 700.0, 11_000.0)
-_RED_BEACON: Light = (11_000.0, 20.0, 12.0)
 """Luminous intensities within the bounds of UN Regulations 7, 6, 38, 23, 87 and 65, divided by the areas of the lamps.
 """
 
@@ -38,7 +37,7 @@ _SHINES: Mapping[str, tuple[tuple[str, Light], ...]] = {
     "indicatorRight": (("indicator_right", _INDICATOR),),
     "reversingLights": (("reversing_light", _WHITE),),
     "licensePlateIllumination": (("plate", _PLATE),),
-    "specialPurposeLights": (("blue_light", _BEACON), ("red_light", _RED_BEACON)),
+    "specialPurposeLights": (("blue_light", _BEACON),),
 }
 """Light types of the standard, and the materials of the meshes that emit light."""
 _BEAMS = ("lowBeam", "highBeam", "fogLights", "fogLightsFront")

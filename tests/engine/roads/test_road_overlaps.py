@@ -38,7 +38,7 @@ def test_overlapped_lanes_of_points_on_a_crossing(library: Path, name: str) -> N
             pose = scalar.lane_pose_at(road, lane.id, s, float(rng.uniform(-0.9, 0.9)))
             points.append((pose.x, pose.y))
     x, y = np.array(points).T
-    row, s, point = network.touched(x, y)
+    row, s, point = network.overlapped_lanes(x, y)
     keys = dict(zip(range(len(network.tables.lane_id)), (key for key, _ in network.tables.lane_keys()), strict=True))
     several = 0
     for n in range(len(points)):
@@ -53,6 +53,6 @@ def test_overlapped_lanes_of_points_on_a_crossing(library: Path, name: str) -> N
 
 def test_overlapped_lanes_outside_a_junction_is_one_at_most(library: Path) -> None:
     network = RoadNetwork.load(library / "coop_2.xodr")
-    row, _, point = network.touched(np.array([-40.0, -40.0]), np.array([0.0, 300.0]))
+    row, _, point = network.overlapped_lanes(np.array([-40.0, -40.0]), np.array([0.0, 300.0]))
     assert point.tolist() == [0]
     assert network.tables.lane_id[row].tolist() == [-1]

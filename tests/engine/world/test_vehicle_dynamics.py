@@ -13,6 +13,7 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.physics.dynamics import GRAVITY, VehicleParameters
+from eidrive_scenario.world.weather import Weather
 
 LOSSLESS: Resistances = {"drag_area": 0, "rolling_resistance": 0}
 
@@ -23,7 +24,7 @@ def drive(
     """Return (time, x, y, yaw, speed, yaw rate) of a car after each tick of 0.05 s."""
     rows = []
     with World(dt=0.05) as world:
-        world.set_friction(friction)
+        world.set_weather(Weather(friction=friction))
         world.add(spec, Placement(0.0, 0.0, speed=speed), driven=True)
         for _ in range(round(seconds / 0.05)):
             world.step({}, {spec.name: control})

@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.world.render.tone_mapping import LUMA
 from eidrive_scenario.world.weather import EXTINCTION_AT_RANGE, Weather
 
-LUMA = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance weights of linear sRGB (IEC 61966-2-1)."""
 RAYLEIGH = 0.008735 * np.array([0.610, 0.550, 0.465]) ** -4.08
 """Optical depth of pure air for red, green, blue (Leckner 1978, with wavelengths in µm)."""
 HAZE = 0.05 * np.array([0.610, 0.550, 0.465]) ** -1.3

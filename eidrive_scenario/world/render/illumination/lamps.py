@@ -34,9 +34,7 @@ _WARM = (1.06, 1.0, 0.82)
 
 class Beam(NamedTuple):
     """Pair of headlamps as one beam: position (3,), axes (3, 3) as columns forward, left, up in the world, brightness
-    share.
-
-    own  whether the camera is on this vehicle, so that reflective sheeting returns the light to it
+    share, and whether it is a high beam.
     """
 
     position: Array

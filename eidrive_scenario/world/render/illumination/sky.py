@@ -10,7 +10,8 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.world.render.illumination.daylight import CLEAR_AIR, FOG_HEIGHT, LUMA, daylight
+from eidrive_scenario.world.render.illumination.daylight import CLEAR_AIR, FOG_HEIGHT, daylight
+from eidrive_scenario.world.render.tone_mapping import LUMA
 from eidrive_scenario.world.weather import Weather
 
 SIZE = 512
