@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,18 +14,9 @@ from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.geometry import points_in_polygon
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import PositionError
+from eidrive_scenario.roads.routing.links import RoadEnd
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites
-
-START, END = "start", "end"
-
-
-class RoadTerminal(NamedTuple):
-    """End of a road."""
-
-    road: str
-    end: str
-
 
 @dataclass(frozen=True)
 class Cursor:
@@ -85,12 +75,12 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
             continue
         chain = _chain(ends, one.road, two.road)
         leaving, *between, entering = chain
-        forward = leaving.end == END
+        forward = leaving.side > 0
         parts.append((Stretch(one.road, here if forward else 0.0, first if forward else here, one.lanes), forward))
         for entry in between[::2]:
             whole = roads.road(entry.road).length
-            parts.append((Stretch(entry.road, 0.0, whole), entry.end == START))
-        forward = entering.end == START
+            parts.append((Stretch(entry.road, 0.0, whole), entry.side < 0))
+        forward = entering.side < 0
         if two.s is None and number == len(cursors) - 2 and not forward:
             there = 0.0
         parts.append((Stretch(two.road, 0.0 if forward else there, there if forward else last, two.lanes), forward))
@@ -109,30 +99,30 @@ def _cut(parts: Sequence[tuple[Stretch, bool]], length: float | None) -> list[St
     return found
 
 
-def _links(roads: RoadNetwork) -> Mapping[RoadTerminal, list[RoadTerminal]]:
+def _links(roads: RoadNetwork) -> Mapping[RoadEnd, list[RoadEnd]]:
     """Return the connected ends of roads by the links of lanes."""
-    found: dict[RoadTerminal, list[RoadTerminal]] = {}
+    found: dict[RoadEnd, list[RoadEnd]] = {}
     for one, two, edge in roads.graph.edges(data=True):
         if edge["kind"] == "successor" and one.road != two.road:
-            leaving = RoadTerminal(one.road, END if roads.driving_direction(one.road, one.lane) > 0 else START)
-            entering = RoadTerminal(two.road, START if roads.driving_direction(two.road, two.lane) > 0 else END)
+            leaving = RoadEnd(one.road, roads.driving_direction(one.road, one.lane))
+            entering = RoadEnd(two.road, -roads.driving_direction(two.road, two.lane))
             for a, b in ((leaving, entering), (entering, leaving)):
                 if b not in found.setdefault(a, []):
                     found[a].append(b)
     return found
 
 
-def _chain(ends: Mapping[RoadTerminal, list[RoadTerminal]], start: str, goal: str) -> list[RoadTerminal]:
+def _chain(ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list[RoadEnd]:
     """Return the road ends from the exit of `start` to the entry of `goal`; roads between have two consecutive ends."""
-    queue = deque([[RoadTerminal(start, END)], [RoadTerminal(start, START)]])
-    seen = {RoadTerminal(start, END), RoadTerminal(start, START)}
+    queue = deque([[RoadEnd(start, 1)], [RoadEnd(start, -1)]])
+    seen = {RoadEnd(start, 1), RoadEnd(start, -1)}
     while queue:
         chain = queue.popleft()
         for entry in ends.get(chain[-1], ()):
             if entry.road == goal:
                 return [*chain, entry]
             if entry not in seen:
-                other = RoadTerminal(entry.road, START if entry.end == END else END)
+                other = RoadEnd(entry.road, -entry.side)
                 seen |= {entry, other}
                 queue.append([*chain, entry, other])
     raise PositionError(
