@@ -129,8 +129,10 @@ class Storyboard:
             if front.present and back.present:
                 back.motion.set_towed_state(pose_behind(front, back, straight=front.motion.teleported), front.motion)
                 commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.teleported)
-        invisible = [name for name, appearance in self.context.appearances.items() if not appearance.visibility.traffic]
-        self.context.traffic.step(view.without(invisible), self.dt, commands)
+        if self.context.traffic.started:
+            appearances = self.context.appearances.items()
+            invisible = [name for name, appearance in appearances if not appearance.visibility.traffic]
+            self.context.traffic.step(view.without(invisible), self.dt, commands)
         return self._completed_commands(commands)
 
     def _add_trailers(self) -> list[tuple[Actor, Actor]]:

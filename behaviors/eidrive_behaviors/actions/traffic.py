@@ -164,7 +164,7 @@ class TrafficSourceAction(TrafficInstanceAction):
     def build_generator(self) -> traffic.Source:
         """Return the source. Raise ScenarioError if no lane is near."""
         place: ResolvedPosition = resolve_position(self.action.position, self.context, None)
-        lanes, ground = self.background.fleet.lanes, self.background.ground
+        lanes, ground = self.background.fleet.lanes, self.background.population.ground
         x, y, radius = place.pose.x, place.pose.y, self.action.radius
         driving, walking = (
             traffic.sites_within_radius(lanes, sites, x, y, radius, place.location)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from eidrive_scenario.errors import Diagnostic, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError, SimulationError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.requests import Override
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
@@ -19,7 +19,8 @@ from eidrive_scenario.storyboard.state.element_states import ElementStateObserve
 from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
 from eidrive_scenario.storyboard.state.signals import Signals
 from eidrive_scenario.traffic.background import BackgroundTraffic
-from eidrive_scenario.traffic.spawning.generators import CentralObject, TrafficGenerator
+from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+from eidrive_scenario.traffic.spawning.population import CentralObject, Population
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
@@ -77,13 +78,7 @@ class RuntimeContext:
             name: Actor(name, entity, scenario.controllers.get(name, ()), roads)
             for name, entity in scenario.entities.items()
         }
-        self.traffic = BackgroundTrafficPort(
-            roads,
-            seed=seed,
-            center=self._center,
-            taken=frozenset(self.actors),
-            must_stop=self.signals.must_stop,
-        )
+        self.traffic = BackgroundTrafficPort(self._build_traffic)
         self.completes_this_step = False
         """Whether an action reaches its goal in the current step."""
         self.pending_actions: list[PendingAction] = []
@@ -138,6 +133,19 @@ class RuntimeContext:
         """Return the speed along the heading in this view [m/s]; of an actor outside of the view, its set speed."""
         row = self.view.rows.get(name)
         return self.view.states[row].speed if row is not None else self.actors[name].motion.speed
+
+    def _build_traffic(self) -> BackgroundTraffic:
+        """Build the background traffic. Raise SimulationError without a road network."""
+        if self.roads is None:
+            raise SimulationError("background traffic: the scenario has no road network")
+        population = Population(
+            self.roads,
+            seed=self.seed,
+            center=self._center,
+            taken=frozenset(self.actors),
+            must_stop=self.signals.must_stop,
+        )
+        return BackgroundTraffic(population)
 
     def _center(self, name: str) -> CentralObject | None:
         """Return pose and speed of an entity for the traffic around it; None while it is absent."""

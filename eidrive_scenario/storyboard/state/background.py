@@ -4,52 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 
-from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.traffic.background import BackgroundTraffic
-from eidrive_scenario.traffic.spawning.generators import CentralObject, TrafficGenerator
+from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 from eidrive_scenario.world.view import WorldView
 
 
 class BackgroundTrafficPort:
-    """Background traffic of one run. It is created with its first instance.
+    """Background traffic of one run. `build` builds it for its first instance."""
 
-    center     returns pose and speed of an entity, None while it is absent
-    taken      names that no vehicle may have
-    must_stop  returns whether the state of a traffic signal, by id, requires vehicles to stop
-    """
+    def __init__(self, build: Callable[[], BackgroundTraffic]) -> None:
+        self._build = build
+        self._traffic: BackgroundTraffic | None = None
 
-    def __init__(
-        self,
-        roads: RoadNetwork | None,
-        *,
-        seed: int,
-        center: Callable[[str], CentralObject | None],
-        taken: frozenset[str],
-        must_stop: Callable[[str], bool],
-    ) -> None:
-        self._roads = roads
-        self._seed = seed
-        self._center = center
-        self._taken = taken
-        self._must_stop = must_stop
-        self._started = False
-
-    @cached_property
+    @property
     def traffic(self) -> BackgroundTraffic:
         """Background traffic of the run; requires a road network."""
-        assert self._roads is not None
-        self._started = True
-        return BackgroundTraffic(
-            self._roads, seed=self._seed, center=self._center, taken=self._taken, must_stop=self._must_stop
-        )
+        if self._traffic is None:
+            self._traffic = self._build()
+        return self._traffic
+
+    @property
+    def started(self) -> bool:
+        """Whether the background traffic exists."""
+        return self._traffic is not None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all vehicles of background traffic."""
-        return self.traffic.names if self._started else ()
+        return () if self._traffic is None else self._traffic.names
 
     def start(self, instance: TrafficGenerator) -> None:
         """Start an instance. Its first vehicles enter in this tick; in the first tick if it starts in Init."""
@@ -57,13 +41,11 @@ class BackgroundTrafficPort:
 
     def stop(self, name: str | None) -> None:
         """Stop all instances of this name; all instances without a name."""
-        if self._started:
-            self.traffic.stop(name)
+        if self._traffic is not None:
+            self._traffic.stop(name)
 
     def step(self, view: WorldView, dt: float, commands: Commands) -> None:
         """Add spawns, removals and placements of the step that begins with this view to the commands."""
-        if not self._started:
-            return
         changes = self.traffic.step(view, dt)
         for name, (spec, placement) in changes.additions.items():
             commands.spawns[name] = placement

@@ -18,6 +18,7 @@ from eidrive_scenario.roads.routing.links import RoadEnd
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites
 
+
 @dataclass(frozen=True)
 class Cursor:
     """Cross section of a road at s [m]; s is None for the start or end of the road; lanes () for all lanes."""

@@ -1,4 +1,4 @@
-"""Generators of background traffic: swarms, sources, sinks and areas."""
+"""Generators of background traffic: swarms, sources and areas."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
@@ -14,103 +13,40 @@ from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
-from eidrive_scenario.traffic.spawning.sites import Covers, SpawnAreas, SpawnSites
-from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.traffic.spawning.population import CarGroup, CentralObject, Population
+from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites
 
 RETRY = 0.5
 """Delay of the next attempt if no site was free [s]."""
+ATTEMPTS = 5
+"""Maximum number of failed attempts to spawn a car in one step."""
 RIM = 0.8
 """Share of the axes of the ellipse from which on a swarm is replenished."""
 
 
-@dataclass(frozen=True)
-class CentralObject:
-    """Entity at the center of a swarm: position [m], heading [rad] and speed along it [m/s]."""
-
-    x: float
-    y: float
-    heading: float
-    speed: float
-
-
-class GeneratorContext(Protocol):
-    """The background traffic that a generator adds cars to and removes cars from.
-
-    seed, time, dt  seed of the run, current simulated time [s] and time step [s]
-    ground          lanes, sidewalks and crossings on which participants may start
-    """
-
-    seed: int
-    time: float
-    dt: float
-    ground: SpawnAreas
-    center: Callable[[str], CentralObject | None]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all cars of the background traffic."""
-        ...
-
-    def spec(self, name: str) -> ActorSpec:
-        """Return the specification of a car."""
-        ...
-
-    def positions(self, names: list[str]) -> tuple[Array, Array]:
-        """Return x and y of cars [m]."""
-        ...
-
-    def sites(self, names: list[str]) -> SpawnSites:
-        """Return the sites on lanes at which cars are."""
-        ...
-
-    def starting_speed(self, sites: SpawnSites, participant: Participant) -> Array:
-        """Return the usual speed at each site (K,) [m/s]."""
-        ...
-
-    def spawn(
-        self,
-        instance: TrafficGenerator,
-        participant: Participant,
-        sites: SpawnSites,
-        speed: Array,
-        rng: np.random.Generator,
-        given_speed: float | None,
-    ) -> bool:
-        """Add a participant at a free site. Return False if no site is free."""
-        ...
-
-    def despawn(self, name: str) -> None:
-        """Remove a car."""
-        ...
-
-
 @dataclass
-class TrafficGenerator(ABC):
+class TrafficGenerator(CarGroup, ABC):
     """Traffic of one name, from the start of its action until it is stopped.
 
-    name  trafficName or its substitute
-    key   distinguishes generators of the same name
+    key  distinguishes generators of the same name
     """
 
-    name: str
     key: int
     active: bool = field(default=True, init=False)
-    members: dict[str, None] = field(default_factory=dict, init=False)
-    """Cars of this generator that exist, in the order of creation."""
     _draws: int = field(default=0, init=False)
 
     @abstractmethod
-    def step(self, traffic: GeneratorContext) -> None:
+    def step(self, population: Population) -> None:
         """Spawn and despawn cars in this step."""
 
     @abstractmethod
-    def is_due(self, traffic: GeneratorContext) -> bool:
+    def is_due(self, population: Population) -> bool:
         """Return whether a car may be spawned now."""
 
-    def rng(self, traffic: GeneratorContext) -> np.random.Generator:
+    def rng(self, population: Population) -> np.random.Generator:
         """Return the random generator of the next attempt to spawn a car."""
         self._draws += 1
-        return generator(traffic.seed, "traffic", self.name, self.key, self._draws)
+        return generator(population.seed, "traffic", self.name, self.key, self._draws)
 
 
 @dataclass
@@ -138,27 +74,27 @@ class Swarm(TrafficGenerator):
     _filled: bool = field(default=False, init=False)
     _again: float = field(default=0.0, init=False)
 
-    def is_due(self, traffic: GeneratorContext) -> bool:
+    def is_due(self, population: Population) -> bool:
         """Return whether cars are missing."""
-        return len(self.members) < self.count and traffic.time >= self._again - TIME_TOLERANCE
+        return len(self.members) < self.count and population.time >= self._again - TIME_TOLERANCE
 
-    def step(self, traffic: GeneratorContext) -> None:
+    def step(self, population: Population) -> None:
         """Remove cars outside the ellipse and spawn missing ones."""
-        center = traffic.center(self.center)
+        center = population.center(self.center)
         if center is None:
             return
         if self.members:
             names = list(self.members)
-            x, y = traffic.positions(names)
+            x, y = population.fleet.positions(names)
             _, share = self._place(center, x, y)
             for name in [names[n] for n in np.flatnonzero(share > 1.0)]:
-                traffic.despawn(name)
+                population.despawn(name)
         failures = 0
-        while self.is_due(traffic) and failures < (1 if self._filled else 5):
-            if not self._bring_one(traffic, center):
+        while self.is_due(population) and failures < (1 if self._filled else ATTEMPTS):
+            if not self._spawn_one(population, center):
                 failures += 1
         if failures:
-            self._again = traffic.time + RETRY
+            self._again = population.time + RETRY
         self._filled = True
 
     def _place(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
@@ -168,14 +104,14 @@ class Swarm(TrafficGenerator):
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
         return np.hypot(ahead, left), np.hypot(ahead / max(self.major, 1e-9), left / max(self.minor, 1e-9))
 
-    def _bring_one(self, traffic: GeneratorContext, center: CentralObject) -> bool:
-        rng = self.rng(traffic)
+    def _spawn_one(self, population: Population, center: CentralObject) -> bool:
+        rng = self.rng(population)
         participant = self.mixture.draw(rng)
-        sites = traffic.ground.for_body(participant)
+        sites = population.ground.for_body(participant)
         distance, share = self._place(center, sites.x, sites.y)
         fit = (distance >= self.inner) & (share <= 1.0)
         fit &= self._direction(rng, center, sites) & self._sector(rng, center, sites)
-        speed = traffic.starting_speed(sites, participant)
+        speed = population.starting_speed(sites, participant)
         if self.speeds is not None:
             speed = np.full(len(sites), rng.uniform(*self.speeds))
         choices = [fit]
@@ -187,7 +123,7 @@ class Swarm(TrafficGenerator):
             choices = [rim & inwards, rim, fit]
         given = None if self.speeds is None else float(speed[0]) if len(speed) else None
         return any(
-            traffic.spawn(self, participant, sites.subset(choice), speed[choice], rng, given)
+            population.spawn(self, participant, sites.subset(choice), speed[choice], rng, given)
             for choice in choices
             if choice.any()
         )
@@ -226,20 +162,20 @@ class Source(TrafficGenerator):
     _made: int = field(default=0, init=False)
     _waiting: Participant | None = field(default=None, init=False)
 
-    def is_due(self, traffic: GeneratorContext) -> bool:
+    def is_due(self, population: Population) -> bool:
         """Return whether the next car is due."""
-        return self.rate > 0.0 and traffic.time - self.started >= self._made / self.rate - TIME_TOLERANCE
+        return self.rate > 0.0 and population.time - self.started >= self._made / self.rate - TIME_TOLERANCE
 
-    def step(self, traffic: GeneratorContext) -> None:
+    def step(self, population: Population) -> None:
         """Spawn cars that are due. A car without a free site is retried."""
-        while self.is_due(traffic):
-            rng = self.rng(traffic)
+        while self.is_due(population):
+            rng = self.rng(population)
             participant = self._waiting or self.mixture.draw(rng)
             sites = self.sites(participant)
-            speed = traffic.starting_speed(sites, participant)
+            speed = population.starting_speed(sites, participant)
             if self.speed is not None:
                 speed = np.full(len(sites), self.speed)
-            if not len(sites) or not traffic.spawn(self, participant, sites, speed, rng, self.speed):
+            if not len(sites) or not population.spawn(self, participant, sites, speed, rng, self.speed):
                 self._waiting = participant
                 return
             self._waiting = None
@@ -259,27 +195,27 @@ class Area(TrafficGenerator):
     covers: Covers
     _again: float = field(default=0.0, init=False)
 
-    def is_due(self, traffic: GeneratorContext) -> bool:
+    def is_due(self, population: Population) -> bool:
         """Return whether participants are missing."""
-        return len(self.members) < self.count and traffic.time >= self._again - TIME_TOLERANCE
+        return len(self.members) < self.count and population.time >= self._again - TIME_TOLERANCE
 
-    def step(self, traffic: GeneratorContext) -> None:
+    def step(self, population: Population) -> None:
         """Remove participants outside the area and spawn missing ones. Finish if the area is not continuous."""
         if self.members:
             names = list(self.members)
-            outside = ~self.covers(traffic.sites(names))
+            outside = ~self.covers(population.sites(names))
             for name in [names[n] for n in np.flatnonzero(outside)]:
-                traffic.despawn(name)
+                population.despawn(name)
         failures = 0
-        while self.is_due(traffic) and failures < 5:
-            rng = self.rng(traffic)
+        while self.is_due(population) and failures < ATTEMPTS:
+            rng = self.rng(population)
             participant = self.mixture.draw(rng)
-            sites = traffic.ground.for_body(participant)
+            sites = population.ground.for_body(participant)
             sites = sites.subset(self.covers(sites))
-            speed = traffic.starting_speed(sites, participant)
-            if not len(sites) or not traffic.spawn(self, participant, sites, speed, rng, None):
+            speed = population.starting_speed(sites, participant)
+            if not len(sites) or not population.spawn(self, participant, sites, speed, rng, None):
                 failures += 1
         if failures:
-            self._again = traffic.time + RETRY
+            self._again = population.time + RETRY
         if not self.continuous:
             self.active = False

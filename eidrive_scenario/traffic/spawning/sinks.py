@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from eidrive_scenario.tolerances import TIME_TOLERANCE
-from eidrive_scenario.traffic.spawning.generators import GeneratorContext, TrafficGenerator
+from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+from eidrive_scenario.traffic.spawning.population import Population
 
 
 @dataclass
@@ -24,25 +25,25 @@ class Sink(TrafficGenerator):
     categories: frozenset[str] | None
     _next: float = field(default=-math.inf, init=False)
 
-    def is_due(self, traffic: GeneratorContext) -> bool:
+    def is_due(self, population: Population) -> bool:
         """Return False, as a sink never spawns cars."""
         return False
 
-    def step(self, traffic: GeneratorContext) -> None:
+    def step(self, population: Population) -> None:
         """Remove the nearest cars within the radius as far as the rate permits."""
         if self.rate <= 0.0:
             return
-        names = [name for name in traffic.names if self._takes(traffic, name)]
+        names = [name for name in population.fleet.names if self._takes(population, name)]
         if not names:
             return
-        x, y = traffic.positions(names)
+        x, y = population.fleet.positions(names)
         distance = np.hypot(x - self.place[0], y - self.place[1])
         for n in np.argsort(distance, kind="stable").tolist():
-            if distance[n] > self.radius or self._next > traffic.time + TIME_TOLERANCE:
+            if distance[n] > self.radius or self._next > population.time + TIME_TOLERANCE:
                 return
-            traffic.despawn(names[n])
+            population.despawn(names[n])
             # Unused capacity is not accumulated.
-            self._next = max(self._next, traffic.time - traffic.dt) + 1.0 / self.rate
+            self._next = max(self._next, population.time - population.dt) + 1.0 / self.rate
 
-    def _takes(self, traffic: GeneratorContext, name: str) -> bool:
-        return self.categories is None or traffic.spec(name).category in self.categories
+    def _takes(self, population: Population, name: str) -> bool:
+        return self.categories is None or population.fleet.spec(name).category in self.categories

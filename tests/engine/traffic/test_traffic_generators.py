@@ -16,6 +16,7 @@ from eidrive_scenario.traffic import (
     BackgroundTraffic,
     Changes,
     Participant,
+    Population,
     Sink,
     Source,
     Swarm,
@@ -24,7 +25,8 @@ from eidrive_scenario.traffic import (
 )
 from eidrive_scenario.traffic.idm import IntelligentDriver
 from eidrive_scenario.traffic.spawning.bodies import TrafficMix
-from eidrive_scenario.traffic.spawning.generators import CentralObject, TrafficGenerator
+from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+from eidrive_scenario.traffic.spawning.population import CentralObject
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
@@ -56,7 +58,7 @@ class Scene:
         self._view_of = view_of
         self.spec = spec
         self.tick = 0
-        self.traffic = BackgroundTraffic(
+        population = Population(
             roads,
             seed=seed,
             center=lambda name: (
@@ -64,6 +66,7 @@ class Scene:
             ),
             taken=frozenset({"swarm.0003"}),
         )
+        self.traffic = BackgroundTraffic(population)
         self.placements: dict[str, Placement] = {}
 
     @property
@@ -204,7 +207,7 @@ def test_traffic_depends_on_the_seed_only(make_scene: Callable[..., Scene]) -> N
 def source(
     scene: Scene, *, rate: float, at: float = 1200.0, radius: float = 10.0, speed: float | None = 12.0
 ) -> Source:
-    lanes, ground = scene.traffic.fleet.lanes, scene.traffic.ground
+    lanes, ground = scene.traffic.fleet.lanes, scene.traffic.population.ground
     sites = sites_within_radius(lanes, ground.driving, at, -1.75, radius, None)
     instance = Source(
         "source",
