@@ -7,6 +7,7 @@ import math
 import numpy as np
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.routing import POINTS_APART
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
     ActionContext,
@@ -18,8 +19,6 @@ from eidrive_scenario.api.actions import (
 )
 from eidrive_scenario.api.common import Pose, Route
 
-POINTS_APART = 2.0
-"""Spacing of the points of a route that is handed to a controller [m]."""
 GEARS = {"n": 0.0, "p": 0.0, "r": -1.0, "d": 1.0}
 
 

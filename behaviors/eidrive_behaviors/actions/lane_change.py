@@ -22,12 +22,12 @@ from eidrive_scenario.api.actions import (
     facing,
     model,
 )
-from eidrive_scenario.api.common import EPSILON, LaneLocation
+from eidrive_scenario.api.common import EPSILON, LaneLocation, ScenarioError
 
 STANDING = 1e-6
-"""Minimum speed of a lane change [m/s]. A slower actor waits."""
+"""Minimum speed of a lateral motion [m/s]. A slower actor waits."""
 SHIFTED = 1e-3
-"""Offset change above which the offset refers to a neighboring lane after the target lane has ended [m]."""
+"""Offset change above which the offset refers to a neighboring lane after the lane has ended [m]."""
 NEAR = 0.2
 """Maximum distance to the target in the new lane at which a driven vehicle has arrived [m]."""
 LOOKOUT = 100.0
@@ -70,9 +70,7 @@ class LaneChangeAction(ActionBehaviour):
         """Find the target lane and express the actor's position as an offset from its center."""
         here = self.context.location(self.actor.name)
         if here is None:
-            raise self.error(
-                f"actor {self.actor.name!r} is off the road at the start", "place the actor on a lane first"
-            )
+            raise off_road_error(self)
         self._lane = self._target_lane(here)
         if self._lane not in self._roads.lane_ids(here.road, here.s):
             lanes = ", ".join(str(lane) for lane in self._roads.lane_ids(here.road, here.s))
@@ -203,3 +201,8 @@ class LaneChangeAction(ActionBehaviour):
         offset = self.action.target_lane_offset
         aside = f", {offset:g} m off its center" if offset else ""
         return f"change to {where}{aside}, {describe_dynamics(self._dynamics, 'm/s')}"
+
+
+def off_road_error(action: ActionBehaviour) -> ScenarioError:
+    """Return the error of a lateral action whose actor is off the road at its start."""
+    return action.error(f"actor {action.actor_name!r} is off the road at the start", "place the actor on a lane first")

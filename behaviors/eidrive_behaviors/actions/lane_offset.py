@@ -6,6 +6,7 @@ import math
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.lane_change import SHIFTED, STANDING, off_road_error
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
@@ -17,10 +18,6 @@ from eidrive_scenario.api.actions import (
     same_way,
 )
 from eidrive_scenario.api.common import LaneLocation
-
-STANDING = 1e-6
-SHIFTED = 1e-3
-"""Offset change above which the offset refers to a neighboring lane after the lane has ended [m]."""
 
 
 class LaneOffsetAction(ActionBehaviour):
@@ -41,9 +38,7 @@ class LaneOffsetAction(ActionBehaviour):
         if motion.location is None:
             motion.snap_to_lane()
         if motion.location is None:
-            raise self.error(
-                f"actor {self.actor.name!r} is off the road at the start", "place the actor on a lane first"
-            )
+            raise off_road_error(self)
         self._lane = motion.location.road, motion.location.lane
         self._start_transition(motion.location)
 

@@ -6,7 +6,8 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS
+from eidrive_behaviors.actions.lane_change import STANDING
+from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS, infinite_if_none
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
@@ -70,7 +71,7 @@ class LateralDistanceAction(ActionBehaviour):
                 sideways = math.copysign(most, sideways)
                 self._rate = sideways / dt
         offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways
-        motion.set_lateral_step(LateralStep(offset, None if abs(motion.speed) > 1e-6 else 0.0))
+        motion.set_lateral_step(LateralStep(offset, None if abs(motion.speed) > STANDING else 0.0))
         arrived = abs(error - sideways) < REACHED
         return Status.SUCCESS if arrived and not self.action.continuous else Status.RUNNING
 
@@ -80,8 +81,7 @@ class LateralDistanceAction(ActionBehaviour):
         if limits is None or dt == 0.0:
             return error if limits is None else 0.0
         way = self._rate * dt
-        top = math.inf if limits.max_speed is None else limits.max_speed
-        faster = math.inf if limits.max_acceleration is None else limits.max_acceleration
+        top, faster = infinite_if_none(limits.max_speed), infinite_if_none(limits.max_acceleration)
         slower = faster if limits.max_deceleration is None else limits.max_deceleration
         if math.isinf(faster):
             rate = (error - way) / dt

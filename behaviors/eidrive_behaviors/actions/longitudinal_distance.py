@@ -52,8 +52,8 @@ class LongitudinalDistanceAction(ActionBehaviour):
     def _move(self, error: float) -> float:
         """Set the speed. Return the remaining error at the end of the step [m]."""
         limits, motion = self.action.dynamic_constraints, self.actor.motion
-        faster = _infinite_if_none(limits.max_acceleration if limits is not None else None)
-        slower = _infinite_if_none(limits.max_deceleration if limits is not None else None)
+        faster = infinite_if_none(limits.max_acceleration if limits is not None else None)
+        slower = infinite_if_none(limits.max_deceleration if limits is not None else None)
         other = self._same_way() * self.context.speed(self.action.entity_ref)
         if math.isinf(faster) and math.isinf(slower):
             motion.move_along_lane(error + other * self.context.dt)
@@ -72,7 +72,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         elif wanted > max(self._acceleration, 0.0):
             wanted = min(wanted, self._acceleration + more)
         self._acceleration = wanted
-        top = min(_infinite_if_none(limits.max_speed), self.actor.limits()[0])
+        top = min(infinite_if_none(limits.max_speed), self.actor.limits()[0])
         motion.set_speed(min(max(motion.speed + wanted * dt, -top), top))
         return error + (other - motion.speed) * dt
 
@@ -114,5 +114,6 @@ def _max_change(rate: float | None, dt: float) -> float:
     return math.inf if rate is None else rate * dt
 
 
-def _infinite_if_none(value: float | None) -> float:
+def infinite_if_none(value: float | None) -> float:
+    """Return a limit; infinity if it is not specified."""
     return math.inf if value is None else value

@@ -12,6 +12,7 @@ from eidrive_scenario.api.actions import (
     ActionBehaviour,
     ActionContext,
     Goal,
+    ResolvedPosition,
     build_route,
     model,
     random_route,
@@ -20,6 +21,8 @@ from eidrive_scenario.api.actions import (
 )
 from eidrive_scenario.api.common import EidriveError, Route, RouteError, generator
 
+POINTS_APART = 2.0
+"""Maximum spacing of the points of a path that is handed to a controller [m]."""
 RANDOM_ROUTE_LENGTH = 5000.0
 """Length of a random route for a vehicle with an active controller [m]."""
 
@@ -40,15 +43,15 @@ class AssignRouteAction(ActionBehaviour):
         here = self.context.location(self.actor.name) if self.actor.present else None
         roads, seed = self.context.roads, self.context.seed
 
-        def place(position: model.Position) -> object:
+        def place(position: model.Position) -> ResolvedPosition:
             return resolve_position(position, self.context, self.actor.name)
 
         try:
-            path = build_route(route, roads, place, here, seed=seed, again=True)  # type: ignore[arg-type]
+            path = build_route(route, roads, place, here, seed=seed, again=True)
         except EidriveError:
             if here is None:
                 raise
-            path = build_route(route, roads, place, seed=seed, again=True)  # type: ignore[arg-type]
+            path = build_route(route, roads, place, seed=seed, again=True)
         assign_route(self, path)
         return Status.SUCCESS
 
@@ -120,7 +123,7 @@ class RandomRouteAction(ActionBehaviour):
         here = self.context.location(actor.name)
         if actor.driven and roads is not None and here is not None:
             way = random_route(roads, here, RANDOM_ROUTE_LENGTH, choose)
-            actor.set_goal(replace(actor.goal or Goal(), path=way.polyline(2.0), lap=None))
+            actor.set_goal(replace(actor.goal or Goal(), path=way.polyline(POINTS_APART), lap=None))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -133,5 +136,5 @@ def assign_route(behaviour: ActionBehaviour, route: Route) -> None:
     actor = behaviour.actor
     actor.motion.set_route(route)
     if actor.driven:
-        lap = None if route.onward is None else route.onward.polyline(2.0)
-        actor.set_goal(replace(actor.goal or Goal(), path=route.polyline(2.0), lap=lap))
+        lap = None if route.onward is None else route.onward.polyline(POINTS_APART)
+        actor.set_goal(replace(actor.goal or Goal(), path=route.polyline(POINTS_APART), lap=lap))

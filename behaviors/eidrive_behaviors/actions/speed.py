@@ -128,8 +128,7 @@ class SpeedAction(ActionBehaviour):
         else:
             assert self._relative is not None
             reference = self.context.speed(self._relative.entity_ref)
-            factor = self._relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
-            speed = reference * self._relative.value if factor else reference + self._relative.value
+            speed = relative_speed(reference, self._relative.value, self._relative.speed_target_value_type)
         return math.copysign(min(abs(speed), top), speed)
 
     def describe(self) -> str:
@@ -144,6 +143,11 @@ class SpeedAction(ActionBehaviour):
             target = f"{self._relative.value:g} {sign} the speed of {self._relative.entity_ref}"
             target += ", kept up" if self._continuous else ""
         return f"speed to {target}, {describe_dynamics(self._dynamics, 'm/s²')}"
+
+
+def relative_speed(reference: float, value: float, kind: model.SpeedTargetValueType) -> float:
+    """Return the speed that a value specifies relative to a reference speed, as a factor or a difference [m/s]."""
+    return reference * value if kind is model.SpeedTargetValueType.FACTOR else reference + value
 
 
 def slope_limit(start: float, target: float, faster: float, slower: float) -> float:

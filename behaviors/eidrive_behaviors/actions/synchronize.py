@@ -7,6 +7,7 @@ from enum import Enum
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.speed import relative_speed
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
     Domain,
@@ -207,8 +208,7 @@ class SynchronizeAction(ActionBehaviour):
             return final.absolute_speed.value
         assert final.relative_speed_to_master is not None
         relative, master = final.relative_speed_to_master, self.context.speed(self.action.master_entity_ref)
-        factor = relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
-        return master * relative.value if factor else master + relative.value
+        return relative_speed(master, relative.value, relative.speed_target_value_type)
 
     def _steady_distance(self, final: float) -> float:
         """Return the length of the final segment at the final speed [m]."""

@@ -10,6 +10,7 @@ import numpy as np
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
+from eidrive_behaviors.actions.routing import POINTS_APART
 from eidrive_scenario.api.actions import (
     TIME_ATTRIBUTES,
     ActionBehaviour,
@@ -275,7 +276,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         return back._replace(h=wrap_angle(back.h))
 
     def _set_driver_goal(self) -> Status:
-        count = max(2, math.ceil(self._layout.length / 2.0) + 1)
+        count = max(2, math.ceil(self._layout.length / POINTS_APART) + 1)
         points = np.array([self._layout.at(s)[:3] for s in np.linspace(self._s, self._layout.length, count).tolist()])
         goal = self.actor.goal
         self.actor.set_goal(replace(goal or Goal(), path=points, lap=None))
