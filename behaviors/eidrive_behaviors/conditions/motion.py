@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
+from typing import ClassVar
 
 from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model
 from eidrive_scenario.api.common import WorldView as View
@@ -84,27 +86,53 @@ class AccelerationCondition(QuantityCondition):
         return component_of(vector, context.pose(entity).h, self.element.direction)
 
 
-class StandStillCondition(QuantityCondition):
-    """Standstill for longer than a duration [s]."""
+class DurationCondition(QuantityCondition):
+    """Base class of conditions on the time for which a state of the entity has lasted [s]."""
 
-    element: model.StandStillCondition
+    element: model.StandStillCondition | model.EndOfRoadCondition | model.OffroadCondition
     unit = "s"
+    state: ClassVar[str]
+    """Description of the state, as in `standing for 2.00 s`."""
+    otherwise: ClassVar[str]
+    """Description of an entity outside of the state."""
+    requirement: ClassVar[str]
+    """Description of the condition without its duration."""
+    rule_of_duration: ClassVar[model.Rule] = model.Rule.GREATER_THAN
+    """Rule by which the time is compared with the duration."""
+
+    @abstractmethod
+    def since(self, context: ConditionContext, entity: str) -> float | None:
+        """Return the start of the state [s]; None outside of it."""
 
     def explain_for(self, context: ConditionContext, entity: str) -> str:
-        """Describe the duration of the standstill."""
-        return f"{entity}: {describe_elapsed(context, context.actors[entity].standing_since, 'standing', 'moving')}"
+        """Describe the current duration."""
+        start = self.since(context, entity)
+        found = self.otherwise if start is None else f"{self.state} for {context.time - start:.2f} s"
+        return f"{entity}: {found}"
 
     def describe_for(self) -> str:
         """Describe the required duration."""
-        return f"stands still for {self.element.duration:g} s"
+        return f"{self.requirement} for {self.element.duration:g} s"
 
     def quantity(self, context: ConditionContext, entity: str) -> float:
-        """Return the duration of the standstill [s]."""
-        return elapsed_time(context, context.actors[entity].standing_since)
+        """Return the time since the start of the state [s]; NaN outside of it."""
+        start = self.since(context, entity)
+        return math.nan if start is None else context.time - start
 
     def threshold(self) -> tuple[model.Rule, float]:
-        """Return the rule: longer than the duration."""
-        return model.Rule.GREATER_THAN, self.element.duration
+        """Return the rule and the duration."""
+        return self.rule_of_duration, self.element.duration
+
+
+class StandStillCondition(DurationCondition):
+    """Standstill for longer than a duration [s]."""
+
+    element: model.StandStillCondition
+    state, otherwise, requirement = "standing", "moving", "stands still"
+
+    def since(self, context: ConditionContext, entity: str) -> float | None:
+        """Return the start of the standstill [s]."""
+        return context.actors[entity].standing_since
 
 
 class TraveledDistanceCondition(QuantityCondition):
@@ -124,13 +152,3 @@ class TraveledDistanceCondition(QuantityCondition):
     def threshold(self) -> tuple[model.Rule, float]:
         """Return the rule: at least the distance."""
         return model.Rule.GREATER_OR_EQUAL, self.element.value
-
-
-def elapsed_time(context: ConditionContext, start: float | None) -> float:
-    """Return the time since a state began [s]; NaN if it does not hold."""
-    return math.nan if start is None else context.time - start
-
-
-def describe_elapsed(context: ConditionContext, start: float | None, what: str, otherwise: str) -> str:
-    """Describe the time since a state began, or `otherwise`."""
-    return otherwise if start is None else f"{what} for {context.time - start:.2f} s"

@@ -2,58 +2,33 @@
 
 from __future__ import annotations
 
-from eidrive_behaviors.conditions.motion import describe_elapsed, elapsed_time
-from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model
+from eidrive_behaviors.conditions.motion import DurationCondition
+from eidrive_scenario.api.actions import ConditionContext, model
 
 
-class EndOfRoadCondition(QuantityCondition):
+class EndOfRoadCondition(DurationCondition):
     """End of the road reached for a duration [s]."""
 
     element: model.EndOfRoadCondition
-    unit = "s"
+    state, otherwise, requirement = "at the end of its road", "on its way", "at the end of its road"
+    rule_of_duration = model.Rule.GREATER_OR_EQUAL
 
-    def explain_for(self, context: ConditionContext, entity: str) -> str:
-        """Describe the current duration."""
-        start = context.actors[entity].end_of_road_since
-        return f"{entity}: {describe_elapsed(context, start, 'at the end of its road', 'on its way')}"
-
-    def describe_for(self) -> str:
-        """Describe the required duration."""
-        return f"at the end of its road for {self.element.duration:g} s"
-
-    def quantity(self, context: ConditionContext, entity: str) -> float:
-        """Return the time at the end of the road [s]."""
-        return elapsed_time(context, context.actors[entity].end_of_road_since)
-
-    def threshold(self) -> tuple[model.Rule, float]:
-        """Return the rule: at least the duration."""
-        return model.Rule.GREATER_OR_EQUAL, self.element.duration
+    def since(self, context: ConditionContext, entity: str) -> float | None:
+        """Return the time at which the end was reached [s]."""
+        return context.actors[entity].end_of_road_since
 
 
-class OffroadCondition(QuantityCondition):
+class OffroadCondition(DurationCondition):
     """Reference point off the road for longer than a duration [s]. Lanes of type `none` are not part of the road."""
 
     element: model.OffroadCondition
-    unit = "s"
+    state, otherwise, requirement = "off the road", "on the road", "off the road"
 
     def bind(self, context: ConditionContext) -> None:
         """Enable the off-road check of the entities, which runs without this condition do not need."""
         for name in self.entities:
             context.actors[name].track_off_road()
 
-    def explain_for(self, context: ConditionContext, entity: str) -> str:
-        """Describe the current duration."""
-        start = context.actors[entity].off_road_since
-        return f"{entity}: {describe_elapsed(context, start, 'off the road', 'on the road')}"
-
-    def describe_for(self) -> str:
-        """Describe the required duration."""
-        return f"off the road for {self.element.duration:g} s"
-
-    def quantity(self, context: ConditionContext, entity: str) -> float:
-        """Return the time off the road [s]."""
-        return elapsed_time(context, context.actors[entity].off_road_since)
-
-    def threshold(self) -> tuple[model.Rule, float]:
-        """Return the rule: longer than the duration."""
-        return model.Rule.GREATER_THAN, self.element.duration
+    def since(self, context: ConditionContext, entity: str) -> float | None:
+        """Return the time at which the entity left the road [s]."""
+        return context.actors[entity].off_road_since

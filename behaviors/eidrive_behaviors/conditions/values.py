@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
 
 from eidrive_scenario.api.actions import (
     Condition,
@@ -52,59 +53,71 @@ def _number(text: str) -> float | None:
     return float(plain) if NUMBER.fullmatch(plain) else BOOLEANS.get(plain.lower())
 
 
-class ParameterCondition(Condition):
+class TextCondition(Condition):
+    """Base class of conditions that compare the text of a named value with that of the element."""
+
+    element: model.ParameterCondition | model.VariableCondition | model.UserDefinedValueCondition
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """Kind and name of the value."""
+
+    @abstractmethod
+    def current(self, context: ConditionContext) -> str | None:
+        """Return the current text; None without one, by which no rule is fulfilled."""
+
+    def holds(self, context: ConditionContext) -> bool:
+        """Compare the value."""
+        return satisfies(self.current(context), self.element.rule, self.element.value)
+
+    def explain(self, context: ConditionContext) -> str:
+        """Describe the current value."""
+        sign = relation(self.element.rule, self.holds(context))
+        return f"{self.label} = {self.current(context)} {sign} {self.element.value}"
+
+    def describe(self) -> str:
+        """Describe rule and limit."""
+        return f"{self.label} {describe_rule(self.element.rule)} {self.element.value}"
+
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
+        """Return the value if it and the limit are numbers."""
+        return numeric_measures(self.current(context), self.element.rule, self.element.value)
+
+
+class ParameterCondition(TextCondition):
     """Value of a parameter, including changes by ParameterActions."""
 
     instant = True
     element: model.ParameterCondition
 
-    def holds(self, context: ConditionContext) -> bool:
-        """Compare the value."""
-        return satisfies(context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
+    @property
+    def label(self) -> str:
+        """Kind and name of the value."""
+        return f"parameter {self.element.parameter_ref}"
 
-    def explain(self, context: ConditionContext) -> str:
-        """Describe the current value."""
-        value = context.parameters.get(self.element.parameter_ref)
-        sign = relation(self.element.rule, self.holds(context))
-        return f"parameter {self.element.parameter_ref} = {value} {sign} {self.element.value}"
-
-    def describe(self) -> str:
-        """Describe rule and limit."""
-        return f"parameter {self.element.parameter_ref} {describe_rule(self.element.rule)} {self.element.value}"
-
-    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
-        """Return the value."""
-        return numeric_measures(
-            context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value
-        )
+    def current(self, context: ConditionContext) -> str | None:
+        """Return the current value."""
+        return context.parameters.get(self.element.parameter_ref)
 
 
-class VariableCondition(Condition):
+class VariableCondition(TextCondition):
     """Value of a variable."""
 
     instant = True
     element: model.VariableCondition
 
-    def holds(self, context: ConditionContext) -> bool:
-        """Compare the value."""
-        return satisfies(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+    @property
+    def label(self) -> str:
+        """Kind and name of the value."""
+        return f"variable {self.element.variable_ref}"
 
-    def explain(self, context: ConditionContext) -> str:
-        """Describe the current value."""
-        value = context.variables.get(self.element.variable_ref)
-        sign = relation(self.element.rule, self.holds(context))
-        return f"variable {self.element.variable_ref} = {value} {sign} {self.element.value}"
-
-    def describe(self) -> str:
-        """Describe rule and limit."""
-        return f"variable {self.element.variable_ref} {describe_rule(self.element.rule)} {self.element.value}"
-
-    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
-        """Return the value."""
-        return numeric_measures(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+    def current(self, context: ConditionContext) -> str | None:
+        """Return the current value."""
+        return context.variables.get(self.element.variable_ref)
 
 
-class UserDefinedValueCondition(Condition):
+class UserDefinedValueCondition(TextCondition):
     """Value that is set from outside the scenario. Without a value the condition is false."""
 
     element: model.UserDefinedValueCondition
@@ -113,20 +126,11 @@ class UserDefinedValueCondition(Condition):
         """Register the request for the value."""
         context.request_user_value(self.element)
 
-    def holds(self, context: ConditionContext) -> bool:
-        """Compare the value."""
-        return satisfies(context.user_values.get(self.element.name), self.element.rule, self.element.value)
+    @property
+    def label(self) -> str:
+        """Name of the value."""
+        return self.element.name
 
-    def explain(self, context: ConditionContext) -> str:
-        """Describe the current value."""
-        value = context.user_values.get(self.element.name)
-        sign = relation(self.element.rule, self.holds(context))
-        return f"{self.element.name} = {value} {sign} {self.element.value}"
-
-    def describe(self) -> str:
-        """Describe rule and limit."""
-        return f"{self.element.name} {describe_rule(self.element.rule)} {self.element.value}"
-
-    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
-        """Return the value."""
-        return numeric_measures(context.user_values.get(self.element.name), self.element.rule, self.element.value)
+    def current(self, context: ConditionContext) -> str | None:
+        """Return the value that is set; None without one."""
+        return context.user_values.get(self.element.name)
