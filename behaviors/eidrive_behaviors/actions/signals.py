@@ -5,7 +5,6 @@ from __future__ import annotations
 from py_trees.common import Status
 
 from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, model
-from eidrive_scenario.api.common import suggestion
 
 
 class TrafficSignalStateAction(ActionBehaviour):
@@ -58,13 +57,7 @@ class TrafficSignalControllerAction(ActionBehaviour):
         parent: model.Element | None = None,
     ) -> None:
         super().__init__(action, context, actor=actor, parent=parent)
-        cycle = context.signals.cycles.get(action.traffic_signal_controller_ref)
-        phases = [phase.name for phase in cycle.phases] if cycle is not None else [action.phase]
-        if action.phase not in phases:
-            raise self.error(
-                f"signal controller {action.traffic_signal_controller_ref!r} has no phase {action.phase!r}",
-                suggestion(action.phase, phases),
-            )
+        context.signals.check_phase(action.traffic_signal_controller_ref, action.phase, action)
 
     def update(self) -> Status:
         """Start the phase."""

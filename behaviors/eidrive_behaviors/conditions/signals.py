@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from eidrive_scenario.api.actions import Condition, ConditionContext, model
-from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 
 class TrafficSignalCondition(Condition):
@@ -39,20 +38,8 @@ class TrafficSignalControllerCondition(Condition):
     element: model.TrafficSignalControllerCondition
 
     def bind(self, context: ConditionContext) -> None:
-        """Look the phase up. Raise ScenarioError if the controller does not have it."""
-        element = self.element
-        cycle = context.signals.cycles.get(element.traffic_signal_controller_ref)
-        phases = [phase.name for phase in cycle.phases] if cycle is not None else [element.phase]
-        if element.phase not in phases:
-            what = f"signal controller {element.traffic_signal_controller_ref!r} has no phase {element.phase!r}"
-            raise ScenarioError(
-                Diagnostic(
-                    f"TrafficSignalControllerCondition: {what}",
-                    suggestion(element.phase, phases),
-                    element.source,
-                    element.line,
-                )
-            )
+        """Check the phase. Raise ScenarioError if the controller does not have it."""
+        context.signals.check_phase(self.element.traffic_signal_controller_ref, self.element.phase, self.element)
 
     def holds(self, context: ConditionContext) -> bool:
         """Return True if the controller is in the phase."""

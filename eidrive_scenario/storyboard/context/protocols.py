@@ -19,7 +19,6 @@ from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 from eidrive_scenario.storyboard.state.element_states import ElementStateObserver
 from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
-from eidrive_scenario.storyboard.state.signal_cycles import SignalCycle
 from eidrive_scenario.traffic.background import BackgroundTraffic
 from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 from eidrive_scenario.world.appearance import Appearance
@@ -48,10 +47,6 @@ class PositionCache:
 class SignalStates(Protocol):
     """States of the traffic signals and of their controllers."""
 
-    @property
-    def cycles(self) -> Mapping[str, SignalCycle]:
-        """Cycles of the signal controllers, by name."""
-
     def state(self, name: str) -> str | None:
         """Return the state of a signal; None without one."""
 
@@ -60,6 +55,9 @@ class SignalStates(Protocol):
 
     def unknown(self, name: str, element: model.Element) -> Diagnostic | None:
         """Return a warning if the road network has no signal of this name."""
+
+    def check_phase(self, controller: str, phase: str, element: model.Element) -> None:
+        """Raise ScenarioError if the phases of a signal controller are declared without this one."""
 
 
 class ConditionContext(Protocol):

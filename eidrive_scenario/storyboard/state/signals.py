@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from eidrive_scenario.errors import Diagnostic, suggestion
+from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.signal_states import DEFAULT_LAMPS, lamp_colors, must_stop
@@ -85,6 +85,14 @@ class Signals:
         hint = suggestion(name, self._colors) if self._colors else "the road network has no signals"
         message = f"{type(element).__name__}: the road network has no signal {name!r}; its state has no effect"
         return Diagnostic(message, hint, element.source, element.line)
+
+    def check_phase(self, controller: str, phase: str, element: model.Element) -> None:
+        """Raise ScenarioError if the phases of a signal controller are declared without this one."""
+        cycle = self.cycles.get(controller)
+        known = [phase] if cycle is None else [one.name for one in cycle.phases]
+        if phase not in known:
+            message = f"{type(element).__name__}: signal controller {controller!r} has no phase {phase!r}"
+            raise ScenarioError(Diagnostic(message, suggestion(phase, known), element.source, element.line))
 
     def _phase_states(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
         """Return the states of a phase by signal. A group state holds for each signal of the group.
