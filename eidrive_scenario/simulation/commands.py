@@ -12,7 +12,7 @@ from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.storyboard.state.commands import CustomCommand
-from eidrive_scenario.v2x.profile import load_profile
+from eidrive_scenario.v2x.profile import ChannelProfile, load_profile
 
 PREFIX = "eidrive."
 CHANNEL = "eidrive.channel"
@@ -26,6 +26,12 @@ DeclaredCriteria = Mapping[CommandKey, tuple[CriterionDeclaration, ...]]
 def command_key(command: CustomCommandAction | CustomCommand) -> CommandKey:
     """Return the identity of a command. The parameters in scope may differ for equal texts on one line."""
     return command.content, command.source, command.line, id(command.scope)
+
+
+def channel_profile(command: CustomCommandAction) -> ChannelProfile | None:
+    """Return the profile of a command `eidrive.channel`; None for no cooperation. Raise SettingError if it is invalid."""
+    folders = (library_path() / "channels",)
+    return load_profile(command.content, folders, origin=command.source, line=command.line, scope=command.scope)
 
 
 def check_commands(scenario: Scenario) -> DeclaredCriteria:
@@ -45,13 +51,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
         )
 
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
-        CHANNEL: lambda command: load_profile(
-            command.content,
-            (library_path() / "channels",),
-            origin=command.source,
-            line=command.line,
-            scope=command.scope,
-        ),
+        CHANNEL: channel_profile,
         CRITERION: read_criteria,
         VARIATION: lambda _: drawn_parameters(scenario, 0),
     }

@@ -38,7 +38,7 @@ class RunSettings:
     time_limit      maximum simulated time [s], above 0, for scenarios without an end
     weather         preset or file; it overrides weather and road condition of the scenario
     user_values     of UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
-    allow_torchscript   whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
+    allow_torchscript  whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
     """
 
     channel: str | Path | Mapping[str, Any] | None = None
@@ -208,8 +208,8 @@ class RunResult:
             "warnings": list(self.warnings),
             "metrics": dict(self.metrics),
             "links": [
-                {"sender": sender, "receiver": receiver, **book.as_json()}
-                for (sender, receiver), book in self.links.items()
+                {"sender": sender, "receiver": receiver, **statistics.as_json()}
+                for (sender, receiver), statistics in self.links.items()
             ],
             "trace_hash": self.trace_hash,
             "simulated_s": self.simulated_s,

@@ -9,7 +9,6 @@ from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
 from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
-from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.resolved_settings import ResolvedSettings
@@ -18,11 +17,13 @@ from eidrive_scenario.simulation.run import RunResult
 from eidrive_scenario.storyboard.state.external_inputs import user_value_warnings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 TIME_LIMIT = "time limit"
 """Reason for the end of a run that reaches the limit of simulated time."""
-_EARLY_ENDS = ("command: exitFailure",)
-"""Ends of a failed run before the rest of the storyboard."""
+EXIT_COMMAND = "command: "
+FATAL_CRITERION = "criterion: "
+"""Prefixes of the reasons for an end by an exit command, and by a fatal criterion; its name follows."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def build_result(
     metrics.update(false_tracks.metrics())
     metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
     return RunResult(
-        scenario=name_of(scenario.path) if scenario.path is not None else scenario.name,
+        scenario=settings.scenario,
         seed=settings.seed,
         channel=stack.channel_name,
         passed=exit_code == PASSED,
@@ -92,6 +93,23 @@ def exit_code_of(verdicts: Sequence[Verdict], end: str) -> int:
     return ABORTED if end == TIME_LIMIT else PASSED
 
 
+def end_reason(state: RunState, storyboard: Storyboard, time: float, time_limit: float) -> str | None:
+    """Return the reason for which a run ends at this time [s]; None if it continues."""
+    if state.exit is not None:
+        return f"{EXIT_COMMAND}{state.exit.name}"
+    for criterion in state.criteria:
+        if criterion.fatal and (verdict := checked_verdict(criterion)).fatal and not verdict.passed:
+            return f"{FATAL_CRITERION}{criterion.name}"
+    if storyboard.ended is not None:
+        return storyboard.ended
+    return TIME_LIMIT if time >= time_limit - TIME_TOLERANCE else None
+
+
+def _is_failed_early(reason: str) -> bool:
+    """Whether a run ended because it failed, before the rest of the storyboard."""
+    return reason == f"{EXIT_COMMAND}exitFailure" or reason.startswith(FATAL_CRITERION)
+
+
 def late_warnings(
     scenario: Scenario,
     storyboard: Storyboard,
@@ -107,5 +125,5 @@ def late_warnings(
     yield from map(str, storyboard.context.warnings)
     yield from user_value_warnings(storyboard.context.requested_user_values, *user_values)
     yield from map(str, motionless.warnings(scenario, time))
-    if end.reason not in _EARLY_ENDS and not end.reason.startswith("criterion: "):
+    if not _is_failed_early(end.reason):
         yield from map(str, unstarted(storyboard.root, scenario, time, end.reason))

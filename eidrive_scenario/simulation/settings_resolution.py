@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.bounded import is_regular_file, read_regular_file, reason_of
-from eidrive_scenario.library import library_path, name_of
+from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.registry import distributions
@@ -22,9 +22,8 @@ from eidrive_scenario.resolved_settings import (
     without_folders,
 )
 from eidrive_scenario.roads.reading.document import read_road_text
-from eidrive_scenario.simulation.commands import CHANNEL
+from eidrive_scenario.simulation.commands import CHANNEL, channel_profile
 from eidrive_scenario.simulation.run import RunSettings
-from eidrive_scenario.v2x.profile import ChannelProfile, load_profile
 from eidrive_scenario.world.weather import Weather
 
 _LARGEST = 1024 * 2**20
@@ -79,14 +78,7 @@ def _later_channels(scenario: Scenario) -> Iterator[dict[str, Any] | None]:
     at_start = {id(one.custom_command_action) for one in scenario.storyboard.init.actions.user_defined_action}
     for command in scenario.custom_commands:
         if command.type == CHANNEL and id(command) not in at_start:
-            profile: ChannelProfile | None = load_profile(
-                command.content,
-                (library_path() / "channels",),
-                origin=command.source,
-                line=command.line,
-                scope=command.scope,
-            )
-            yield _dump(profile)
+            yield _dump(channel_profile(command))
 
 
 def _scenario_files(scenario: Scenario) -> Iterator[tuple[str, str, str]]:

@@ -12,7 +12,6 @@ from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stack import StackFactory
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import SimulationError, WallLimitError
-from eidrive_scenario.evaluation.criterion import checked_verdict
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
@@ -30,11 +29,10 @@ from eidrive_scenario.simulation.run import (
     as_setting_text,
     checked_seed,
 )
-from eidrive_scenario.simulation.run_outcome import TIME_LIMIT, RunEnd, build_result, late_warnings
+from eidrive_scenario.simulation.run_outcome import RunEnd, build_result, end_reason, late_warnings
 from eidrive_scenario.simulation.run_setup import set_up_run
 from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
-from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
@@ -170,7 +168,7 @@ class Simulation:
         changes = self.storyboard.changes
         frame = Frame(view, steps, changes, self._links, signals, appearances, environment, monitors)
         self._observe(frame, commands.driven)
-        end = self._end_reason(frame)
+        end = end_reason(self._state, self.storyboard, view.time, self.settings.time_limit)
         if end is None:
             self._links = self.stack.send(steps, view.time)
             execute(commands, self._state)
@@ -188,16 +186,6 @@ class Simulation:
         self._observers.observe(frame)
         for criterion in self.criteria:
             criterion.observe(frame)
-
-    def _end_reason(self, frame: Frame) -> str | None:
-        if self._state.exit is not None:
-            return f"command: {self._state.exit.name}"
-        for criterion in self.criteria:
-            if criterion.fatal and (verdict := checked_verdict(criterion)).fatal and not verdict.passed:
-                return f"criterion: {criterion.name}"
-        if self.storyboard.ended is not None:
-            return self.storyboard.ended
-        return TIME_LIMIT if frame.view.time >= self.settings.time_limit - TIME_TOLERANCE else None
 
     @attributed
     def result(self) -> RunResult:
