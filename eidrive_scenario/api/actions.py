@@ -6,6 +6,7 @@ Stable: `ActionBehaviour`, `Condition` and its subclasses, `ControllerModel`, th
 
 from eidrive_scenario import traffic
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.trajectory_times import TIME_ATTRIBUTES, has_times
 from eidrive_scenario.requests import Goal, Override
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
@@ -25,7 +26,7 @@ from eidrive_scenario.storyboard.context.protocols import (
     ControllerContext,
     EntityAbsentError,
 )
-from eidrive_scenario.storyboard.kinematics.actor import Actor, is_agent_controller
+from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion import STEEPEST, LateralStep, Motion
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.random_routes import random_route, uniform_branch_selector
@@ -97,6 +98,7 @@ __all__ = [
     "is_agent_controller",
     "merge_environment",
     "model",
+    "property_entries",
     "random_route",
     "referenced_entities",
     "relation",

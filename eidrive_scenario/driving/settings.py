@@ -16,6 +16,7 @@ from eidrive_scenario.driving.planner_settings import (
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario.model.controllers import Controller
+from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.openscenario.values.references import resolve_references
 from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
 from eidrive_scenario.registry import registry
@@ -23,9 +24,6 @@ from eidrive_scenario.sensing.sensor import check_unique, default_sensor, parse_
 from eidrive_scenario.sensing.settings import MAX_RANGE, MountSetting, SensorSettings, TruthSettings
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.messages.clock import StationClock
-
-MODULE = "eidrive"
-"""Value of the property `module` of a controller of this project."""
 
 _TEXTS = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})
 """Properties whose values are names, not YAML."""
@@ -214,23 +212,16 @@ class AgentSettings(Settings):
         return sensors
 
 
-def is_agent_controller(controller: Controller) -> bool:
-    """Return True if this controller has `module=eidrive`."""
-    found = controller.properties.property if controller.properties is not None else ()
-    return any(entry.name == "module" and entry.value == MODULE for entry in found)
-
-
 def agent_settings(controller: Controller) -> AgentSettings:
     """Return the settings in the Properties of a controller. Values other than names are YAML.
 
     Raise SettingError with file and line of each unknown, duplicate or invalid property.
     """
-    entries = controller.properties.property if controller.properties is not None else ()
     source = controller.source
     data: dict[str, Any] = {}
     lines: dict[str, int] = {}
     diagnostics: list[Diagnostic] = []
-    for entry in entries:
+    for entry in property_entries(controller):
         if entry.name in data:
             message = f"property {entry.name!r} is given twice, first in line {lines[entry.name]}"
             diagnostics.append(Diagnostic(message, "keep one", source, entry.line))

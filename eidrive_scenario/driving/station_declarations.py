@@ -8,11 +8,12 @@ from typing import Any
 
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
 from eidrive_scenario.driving.planner_settings import NO_PLANNER
-from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
+from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
+from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
 from eidrive_scenario.registry import registry
@@ -119,8 +120,7 @@ def torchscript_warnings(scenario: Scenario) -> list[Diagnostic]:
     """Return a warning for each controller whose detector has TorchScript weights, which a run may reject."""
     warnings = []
     for controller in dict.fromkeys(one for assigned in scenario.controllers.values() for one in assigned):
-        entries = controller.properties.property if controller.properties is not None else ()
-        for entry in entries if is_agent_controller(controller) else ():
+        for entry in property_entries(controller) if is_agent_controller(controller) else ():
             if entry.name != "detector_settings":
                 continue
             given = load_yaml(entry.value, source=controller.source, line=entry.line)
@@ -148,8 +148,7 @@ def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings])
 
 def _line(controller: Controller, *properties: str) -> int:
     """Return the line of the first of these properties that a controller has; else that of the controller."""
-    entries = controller.properties.property if controller.properties is not None else ()
-    lines = {entry.name: entry.line for entry in entries}
+    lines = {entry.name: entry.line for entry in property_entries(controller)}
     return next((lines[name] for name in properties if name in lines), controller.line)
 
 

@@ -19,6 +19,7 @@ from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, 
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
+from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.openscenario.scenario_runner import CRITERION_PREFIX, criteria_of
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.values.references import resolve_references
@@ -219,8 +220,7 @@ def _value(condition: Condition) -> str:
 def _ego(scenario: Scenario, condition: Condition) -> str:
     """Return the vehicle with the property `type = ego_vehicle` of ScenarioRunner, else the one named as an ego."""
     for name, entity in scenario.entities.items():
-        properties = entity.properties if isinstance(entity, Vehicle) else None
-        for entry in properties.property if properties is not None else ():
+        for entry in property_entries(entity) if isinstance(entity, Vehicle) else ():
             if (entry.name, entry.value) == ("type", "ego_vehicle"):
                 return name
     for name in scenario.entities:

@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.text import Text
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.driving.settings import agent_settings, is_agent_controller
+from eidrive_scenario.driving.settings import agent_settings
 from eidrive_scenario.errors import EidriveError, InputError
 from eidrive_scenario.experiments.paper import (
     EGO,
@@ -38,6 +38,7 @@ from eidrive_scenario.experiments.tables import render
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.properties import is_agent_controller
 from eidrive_scenario.reporting.demo_page import DemoSite, PageImage, write_demo
 from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing

@@ -29,7 +29,7 @@ def command_key(command: CustomCommandAction | CustomCommand) -> CommandKey:
 
 
 def channel_profile(command: CustomCommandAction) -> ChannelProfile | None:
-    """Return the profile of a command `eidrive.channel`; None for no cooperation. Raise SettingError if it is invalid."""
+    """Return the profile of a command `eidrive.channel`, None for no cooperation. Raise SettingError."""
     folders = (library_path() / "channels",)
     return load_profile(command.content, folders, origin=command.source, line=command.line, scope=command.scope)
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
 from eidrive_scenario.openscenario.model import Axle, MiscObject, Pedestrian, Vehicle
+from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 
 SHAPES = (
@@ -72,7 +73,7 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
     is the Property `eidrive.color` (`#rrggbb`). Some catalogs omit the box by dimensions of 0; these are replaced by
     defaults of the shape. Raise ScenarioError with the line of an invalid Property or dimension.
     """
-    properties = {entry.name: entry.value for entry in entity.properties.property} if entity.properties else {}
+    properties = {entry.name: entry.value for entry in property_entries(entity)}
     shape = _shape(entity, properties)
     dimensions, center = entity.bounding_box.dimensions, entity.bounding_box.center
     given = (dimensions.length, dimensions.width, dimensions.height)
@@ -164,5 +165,5 @@ def _color(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
 
 
 def _place(entity: Vehicle | Pedestrian | MiscObject, name: str) -> tuple[int, str]:
-    entries = entity.properties.property if entity.properties else ()
-    return next(((entry.line, entry.source) for entry in entries if entry.name == name), (entity.line, entity.source))
+    entries = (entry for entry in property_entries(entity) if entry.name == name)
+    return next(((entry.line, entry.source) for entry in entries), (entity.line, entity.source))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from typing import TypeVar
 
-from eidrive_scenario.api.actions import model
+from eidrive_scenario.api.actions import model, property_entries
 from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 Default = TypeVar("Default", float, float | None)
@@ -62,8 +62,7 @@ def choice(controller: model.Controller, name: str, known: Collection[str], defa
 
 def _entry(controller: model.Controller, name: str) -> model.Property | None:
     """Return the last property of this name; None without one."""
-    properties = controller.properties.property if controller.properties is not None else ()
-    return next((entry for entry in reversed(properties) if entry.name == name), None)
+    return next((entry for entry in reversed(property_entries(controller)) if entry.name == name), None)
 
 
 def _invalid(controller: model.Controller, entry: model.Property, expected: str) -> ScenarioError:

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from eidrive_scenario.driving.planner_settings import Polygon
-from eidrive_scenario.driving.settings import AgentSettings, is_agent_controller
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.geometry import point_in_polygon
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.roads import RoadNetwork
 
 MARGIN = 2.0
@@ -60,7 +61,7 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
 def _place(scenario: Scenario, name: str, setting: str) -> tuple[str, int]:
     """Return file and line of the property with the areas of a station."""
     for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
-        for entry in controller.properties.property if controller.properties is not None else ():
+        for entry in property_entries(controller):
             if entry.name in (setting, "planner_settings"):
                 return controller.source, entry.line
         return controller.source, controller.line

@@ -9,9 +9,10 @@ from typing import ClassVar, SupportsFloat
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, suggestion
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.context.protocols import ControllerContext
-from eidrive_scenario.storyboard.kinematics.actor import Actor, is_agent_controller
+from eidrive_scenario.storyboard.kinematics.actor import Actor
 
 
 class ControllerModel(ABC):
@@ -25,8 +26,7 @@ class ControllerModel(ABC):
     """Whether it moves the actor to poses from outside (`Simulation.set_pose`)."""
 
     def __init__(self, controller: model.Controller, context: ControllerContext, actor: Actor) -> None:
-        properties = controller.properties.property if controller.properties is not None else ()
-        self.properties: Mapping[str, str] = {entry.name: entry.value for entry in properties}
+        self.properties: Mapping[str, str] = {entry.name: entry.value for entry in property_entries(controller)}
         self.context = context
         self.actor = actor
         self._active = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.properties import is_agent_controller
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.motion import Motion
@@ -15,12 +16,6 @@ STANDSTILL = 1e-3
 """Maximum speed of a standing actor [m/s]."""
 
 Entity = model.Vehicle | model.Pedestrian | model.MiscObject
-
-
-def is_agent_controller(controller: model.Controller) -> bool:
-    """True if the controller has the property `module=eidrive`."""
-    properties = controller.properties.property if controller.properties is not None else ()
-    return any(entry.name == "module" and entry.value == "eidrive" for entry in properties)
 
 
 class Actor:

@@ -14,6 +14,7 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.library import CATALOGS, library_path
 from eidrive_scenario.openscenario import Scenario, model, read_document
 from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
+from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.traffic.idm import IntelligentDriver
 from eidrive_scenario.world.actor import ActorSpec
@@ -153,12 +154,12 @@ class TrafficMix:
         controller: model.Element | None = holder.controller
         if holder.catalog_reference is not None:
             controller = self._scenario.resolved(holder.catalog_reference)
-        if not isinstance(controller, model.Controller) or controller.properties is None:
+        if not isinstance(controller, model.Controller):
             return DriverSettings()
-        properties = {entry.name: entry.value for entry in controller.properties.property}
+        properties = {entry.name: entry.value for entry in property_entries(controller)}
         if properties.get("module") != MODULE:
             return DriverSettings()
-        lines = {entry.name: entry.line for entry in controller.properties.property}
+        lines = {entry.name: entry.line for entry in property_entries(controller)}
         return parse_settings(DriverSettings, properties, source=controller.source, line=controller.line, lines=lines)
 
     def _weighted(self, things: Sequence[T], entries: Sequence[model.Element]) -> WeightedChoice[T]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from eidrive_scenario.driving.planning.conflict_area import ConflictAreaSettings
-from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
+from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.model.properties import Properties, Property
+from eidrive_scenario.openscenario.properties import is_agent_controller
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 
 
