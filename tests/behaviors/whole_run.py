@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 from street_scene import CAR, GROUP, NOTHING, OURS, STREET, TRIGGER, at
@@ -57,8 +56,15 @@ class RecordedRun:
         ]
 
 
-class Run(Protocol):
-    """A function that runs actions in the complete simulation; see the fixture `run`."""
+class Run:
+    """Run of actions in the complete simulation: `run(end, (actor, action[, condition]), …)`.
+
+    Ego is in lane -1 at 100 m, driven by default. With a condition `start` the act starts by that, and its triggering
+    entities act in all groups.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
 
     def __call__(
         self,
@@ -78,36 +84,8 @@ class Run(Protocol):
         init: str = "",
         edge: str = "none",
         delay: float = 0.0,
-    ) -> RecordedRun: ...
-
-
-@pytest.fixture
-def run(tmp_path: Path) -> Run:
-    """Return a function that runs `run(end, (actor, action[, condition]), …)` with Ego in lane -1 at 100 m, driven by
-    default.
-
-    With a condition `start` the act starts by that, and its triggering entities act in all groups.
-    """
-
-    def play(
-        end: float,
-        *steps: tuple[str, ...],
-        ego: tuple[int, float, float] = (-1, 100.0, 20.0),
-        driven: bool = True,
-        others: dict[str, tuple[int, float, float]] | None = None,
-        more: str = "",
-        globally: str = "",
-        signals: str = "",
-        street: str = STREET,
-        during: Callable[[Simulation, Frame], None] | None = None,
-        settings: RunSettings | None = None,
-        seed: int = 0,
-        start: str = "",
-        init: str = "",
-        edge: str = "none",
-        delay: float = 0.0,
     ) -> RecordedRun:
-        (tmp_path / "street.xodr").write_text(street)
+        (self._folder / "street.xodr").write_text(street)
         groups = "".join(
             GROUP.format(
                 number=number,
@@ -133,7 +111,7 @@ def run(tmp_path: Path) -> Run:
             end=end,
             signals=signals,
         )
-        path = tmp_path / "scene.xosc"
+        path = self._folder / "scene.xosc"
         path.write_text(text)
         record = RecordedRun()
         simulation = Simulation(load_scenario(path), seed=seed, settings=settings or RunSettings(), observers=[record])
@@ -141,7 +119,11 @@ def run(tmp_path: Path) -> Run:
         record.result = simulation.run()
         return record
 
-    return play
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    """Return a function that runs actions in the complete simulation."""
+    return Run(tmp_path)
 
 
 def slope(values: list[float], start: float, end: float, dt: float = 0.05) -> float:
