@@ -31,7 +31,8 @@ from eidrive_scenario.storyboard.kinematics.motion import STEEPEST, LateralStep,
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.random_routes import random_route, uniform_branch_selector
 from eidrive_scenario.storyboard.kinematics.route import build_route
-from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress, sample_trajectory
+from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress
+from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile
 from eidrive_scenario.storyboard.positions.distances import (
     closing_speed,

@@ -19,7 +19,8 @@ from eidrive_scenario.openscenario.model import (
 )
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.route import build_route
-from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, sample_trajectory
+from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve
+from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 
 MARGIN = 2.0
 """Maximum distance from the outermost lane that counts as on the road [m], for bays and verges."""

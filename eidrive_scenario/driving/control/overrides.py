@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from eidrive_scenario.requests import Override, Overrides
 from eidrive_scenario.world.actor import ActorSpec, Control
-from eidrive_scenario.world.physics.dynamics import VehicleParameters
+from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 
 
 class ControlOverrides:

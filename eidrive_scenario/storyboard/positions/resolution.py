@@ -12,7 +12,8 @@ from eidrive_scenario.roads.model.location import PositionError
 from eidrive_scenario.storyboard.context.protocols import ConditionContext, PositionCache
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route
-from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, sample_trajectory
+from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve
+from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 from eidrive_scenario.storyboard.positions.geographic import geo_position
 from eidrive_scenario.storyboard.positions.orientations import angles
 from eidrive_scenario.storyboard.positions.position_errors import position_error, road_origin, roads_of

@@ -11,9 +11,10 @@ from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.physics.bodies import DRIVEN, SCRIPTED, STATIC, STILL, Body, quaternion
 from eidrive_scenario.world.physics.bullet import bullet
-from eidrive_scenario.world.physics.dynamics import Demand, VehicleParameters
+from eidrive_scenario.world.physics.dynamics import Demand
 from eidrive_scenario.world.physics.ground import GroundUnder
 from eidrive_scenario.world.physics.multi_axle import track_of
+from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 
 
 class DrivenBody(Body):

@@ -11,7 +11,8 @@ import math
 from dataclasses import dataclass
 
 from eidrive_scenario.openscenario.model import Vehicle
-from eidrive_scenario.world.physics.dynamics import Demand, SingleTrack, VehicleParameters, fiala, remaining_side_force
+from eidrive_scenario.world.physics.dynamics import Demand, SingleTrack, fiala, remaining_side_force
+from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 from eidrive_scenario.world.specs import actor_spec
 
 

@@ -11,7 +11,8 @@ from sample_car import CAR
 
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
-from eidrive_scenario.world.physics.dynamics import SingleTrack, VehicleParameters
+from eidrive_scenario.world.physics.dynamics import SingleTrack
+from eidrive_scenario.world.physics.vehicle_parameters import VehicleParameters
 
 SUBSTEPS = 10
 

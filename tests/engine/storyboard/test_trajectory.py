@@ -10,7 +10,7 @@ import pytest
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.kinematics.trajectory import sample_trajectory
+from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 
 
 def at(x: Any, y: Any, h: Any = None) -> Any:

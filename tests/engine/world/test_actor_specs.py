@@ -12,7 +12,7 @@ from lxml import etree
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.world.physics.dynamics import PROPERTIES, VehicleParameters
+from eidrive_scenario.world.physics.vehicle_parameters import PROPERTIES, VehicleParameters
 from eidrive_scenario.world.specs import COLOR_PROPERTY, SHAPE_PROPERTY, SHAPES, actor_spec
 
 CATALOGS = Path(__file__).parents[3] / "xosc" / "catalogs"

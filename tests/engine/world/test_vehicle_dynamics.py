@@ -12,7 +12,7 @@ from sample_car import CarFactory, Resistances
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.physics.dynamics import GRAVITY, VehicleParameters
+from eidrive_scenario.world.physics.vehicle_parameters import GRAVITY, VehicleParameters
 from eidrive_scenario.world.weather import Weather
 
 LOSSLESS: Resistances = {"drag_area": 0, "rolling_resistance": 0}

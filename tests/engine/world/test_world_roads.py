@@ -11,7 +11,7 @@ from sample_car import CarFactory, Resistances
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Control, Placement
-from eidrive_scenario.world.physics.dynamics import GRAVITY
+from eidrive_scenario.world.physics.vehicle_parameters import GRAVITY
 
 ROAD = """<OpenDRIVE>
   <header revMajor="1" revMinor="6" name="" version="1.0"/>
