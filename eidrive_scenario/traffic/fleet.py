@@ -10,21 +10,14 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
-from eidrive_scenario.traffic.cars import PLANNED, Cars
+from eidrive_scenario.traffic.cars import Cars
 from eidrive_scenario.traffic.crossings import Crossings
 from eidrive_scenario.traffic.idm import Drivers, IntelligentDriver, ballistic
 from eidrive_scenario.traffic.lane_changes import DECIDE_EACH, LaneChanges
 from eidrive_scenario.traffic.lanes import FREE, TrafficLanes
-from eidrive_scenario.traffic.leaders import (
-    FIXED,
-    Leaders,
-    Occupants,
-    concatenate_occupants,
-    find_leaders,
-    no_occupants,
-    obstacles,
-)
+from eidrive_scenario.traffic.leaders import Leaders, Occupants
 from eidrive_scenario.traffic.mobil import LaneChanger
+from eidrive_scenario.traffic.occupancy import Occupancy
 from eidrive_scenario.traffic.plans import Plans
 from eidrive_scenario.traffic.right_of_way import RightOfWay
 from eidrive_scenario.traffic.stop_lines import MustStop, StopLines
@@ -66,8 +59,7 @@ class Fleet:
         self._made = self._ticks = self._decisions = 0
         self._until = 0.0
         self._poses: Array | None = None
-        self._foreign, self._moving = no_occupants(), set[int]()
-        self._ends = self._ends_of_lanes()
+        self._occupancy = Occupancy(self.lanes, self._changes)
 
     @property
     def decides(self) -> bool:
@@ -218,7 +210,7 @@ class Fleet:
     def observe(self, view: WorldView, *, everywhere: bool = True) -> None:
         """Observe the other actors; with `everywhere` False only those near the cars of the fleet."""
         near = None if everywhere else self.poses[:, :2]
-        self._foreign, self._moving = obstacles(self.lanes, view, frozenset(self._index), near)
+        self._occupancy.observe(view, frozenset(self._index), near)
 
     def step(self, view: WorldView | None, dt: float) -> dict[str, Placement]:
         """Move by dt and return the placements. Actors in `view` outside the fleet are obstacles.
@@ -251,10 +243,10 @@ class Fleet:
         row_lengths = np.where(cars.plan >= 0, self.lanes.length[cars.plan], 0.0)
         begins = np.cumsum(row_lengths, axis=1) - row_lengths - cars.progress[:, None]
         occupants = self.occupants()
-        leaders = self._leaders(occupants)
+        leaders = self._occupancy.leaders(cars, occupants)
         lights = Leaders.none(len(cars)) if self._lines is None else self._lines.ahead(cars)
         self._right_of_way.grant_right_of_way(
-            cars, leaders.or_nearer(lights), lights, begins, self._moving, self._ticks * dt
+            cars, leaders.or_nearer(lights), lights, begins, self._occupancy.moving, self._ticks * dt
         )
         desired = self._plans.desired_speeds(cars, begins)
         halted = leaders.or_nearer(lights).or_nearer(self._right_of_way.waits(cars, begins))
@@ -263,36 +255,7 @@ class Fleet:
 
     def occupants(self) -> Occupants:
         """Return all occupants: cars (also on lanes that they are leaving), other actors, lane ends."""
-        cars = self._cars
-        own = np.arange(len(cars))
-        still, lane = self._changes.still_left(cars)
-        indices, row = np.concatenate([own, still]), np.concatenate([cars.row, lane])
-        key = cars.progress[indices]
-        mine = Occupants(row, key, key + cars.rear[indices], key + cars.front[indices], cars.speed[indices], indices)
-        return concatenate_occupants(mine, self._foreign, self._ends)
-
-    def _ends_of_lanes(self) -> Occupants:
-        row = np.flatnonzero(np.isfinite(self.lanes.ends_at))
-        at = self.lanes.ends_at[row]
-        return Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
-
-    def _leaders(self, occupants: Occupants) -> Leaders:
-        """Return the leaders of all cars. During a lane change it is the nearer one of both lanes.
-
-        The end of a lane does not stop a car that is leaving this lane, as it leaves only while moving.
-        """
-        cars = self._cars
-        leaders = find_leaders(self.lanes, cars.plan, cars.progress, cars.front, occupants)
-        still, lane = self._changes.still_left(cars)
-        if still.size:
-            chain = self.lanes.chain(lane, PLANNED + 1)
-            standing = occupants.without(FIXED)
-            other = find_leaders(self.lanes, chain, cars.progress[still], cars.front[still], standing, own=still)
-            gap, speed = leaders.gap.copy(), leaders.speed.copy()
-            nearer = Leaders(gap[still], speed[still]).or_nearer(other)
-            gap[still], speed[still] = nearer.gap, nearer.speed
-            leaders = Leaders(gap, speed)
-        return Leaders(leaders.gap * self.lanes.stretch(cars.row, cars.progress), leaders.speed)
+        return self._occupancy.occupants(self._cars)
 
     def _change_lanes(
         self, interval: float, leaders: Leaders, desired: Array, occupants: Occupants, begins: Array
