@@ -23,6 +23,7 @@ from eidrive_scenario.openscenario.model import (
     ExternalObjectReference,
     MiscObject,
     MiscObjectCategory,
+    ObjectType,
     OpenScenario,
     ParameterDeclarations,
     Pedestrian,
@@ -39,6 +40,12 @@ from eidrive_scenario.openscenario.validation.scenario_objects import scenario_o
 from eidrive_scenario.openscenario.values.parameters import Assignment, Scope, as_assignments
 
 EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
+
+_OBJECT_TYPES: Mapping[type[EntityObject], ObjectType] = {
+    Vehicle: ObjectType.VEHICLE,
+    Pedestrian: ObjectType.PEDESTRIAN,
+    MiscObject: ObjectType.MISCELLANEOUS,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +98,15 @@ class Scenario:
     def custom_commands(self) -> tuple[CustomCommandAction, ...]:
         """Return all CustomCommandActions of the storyboard in the order of the file."""
         return tuple(one for one in self.storyboard.walk() if isinstance(one, CustomCommandAction))
+
+    @cached_property
+    def entities_by_type(self) -> Mapping[ObjectType, tuple[str, ...]]:
+        """Return the names of the entities of each type in the order of the file; external objects are a type."""
+        found: dict[ObjectType, tuple[str, ...]] = {}
+        for name, entity in self.entities.items():
+            kind = ObjectType.EXTERNAL if name in self.external else _OBJECT_TYPES[type(entity)]
+            found[kind] = (*found.get(kind, ()), name)
+        return found
 
     def resolved(self, reference: CatalogReference) -> Element:
         """Return the catalog entry with the parameters that the reference assigns."""

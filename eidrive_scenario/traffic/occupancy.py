@@ -36,7 +36,7 @@ class Occupancy:
         self._ends = Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
 
     def observe(self, view: WorldView, own: frozenset[str], near: Array | None) -> None:
-        """Observe the actors outside the fleet `own`; with positions `near` (K, 2) [m] only those near to one of them."""
+        """Observe the actors outside the fleet `own`; with positions `near` (K, 2) [m] only those near one of them."""
         self._foreign, self.moving = obstacles(self._lanes, view, own, near)
 
     def occupants(self, cars: Cars) -> Occupants:

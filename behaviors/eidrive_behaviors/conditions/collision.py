@@ -10,12 +10,6 @@ import numpy as np
 from eidrive_scenario.api.actions import ConditionContext, EntityCondition, entity_box, model
 from eidrive_scenario.api.common import overlap
 
-TYPES: dict[str, type[model.Element]] = {
-    "vehicle": model.Vehicle,
-    "pedestrian": model.Pedestrian,
-    "miscellaneous": model.MiscObject,
-}
-
 
 class CollisionCondition(EntityCondition):
     """Contact of the bounding box with that of a named entity, or of any entity of a type."""
@@ -70,10 +64,10 @@ class CollisionCondition(EntityCondition):
         ]
 
     def _candidates(self, context: ConditionContext) -> list[str]:
+        names: tuple[str, ...]
         if self.element.entity_ref is not None:
-            names = [self.element.entity_ref.entity_ref]
+            names = (self.element.entity_ref.entity_ref,)
         else:
             assert self.element.by_type is not None
-            kind = TYPES.get(self.element.by_type.type.value, model.Vehicle)
-            names = [name for name, actor in context.actors.items() if isinstance(actor.entity, kind)]
+            names = context.scenario.entities_by_type.get(self.element.by_type.type, ())
         return [name for name in names if name in context.view]

@@ -22,15 +22,12 @@ from eidrive_scenario.openscenario.model import (
     FollowTrajectoryAction,
     Maneuver,
     ManeuverGroup,
-    MiscObject,
-    Pedestrian,
     PrivateAction,
     StoryboardElementType,
     TeleportAction,
     Trailer,
     Trajectory,
     Trigger,
-    Vehicle,
 )
 from eidrive_scenario.openscenario.reading.document import VERSIONS
 from eidrive_scenario.openscenario.reading.parsing import open_document
@@ -40,7 +37,6 @@ from eidrive_scenario.openscenario.validation.storyboard_names import LEVELS, Re
 
 WORD = re.compile(r"\w+")
 """Pattern of words that may be names of parameters, variables or entities in the text of a command."""
-_OBJECT_TYPES = {"vehicle": Vehicle, "pedestrian": Pedestrian, "miscellaneous": MiscObject}
 
 
 @dataclass(eq=False)
@@ -131,8 +127,7 @@ class Outline:
                 if ref.entity_ref not in (name, *enclosing):
                     found += self.members(ref.entity_ref, (*enclosing, name))
             for by_type in selection.members.by_type:
-                kind = _OBJECT_TYPES.get(by_type.object_type.value)
-                found += [one for one, body in self.scenario.entities.items() if kind and isinstance(body, kind)]
+                found += self.scenario.entities_by_type.get(by_type.object_type, ())
         return tuple(dict.fromkeys(found)) or (name,)
 
     def actors(self, node: Node) -> tuple[str, ...]:

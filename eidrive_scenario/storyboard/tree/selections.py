@@ -20,20 +20,12 @@ REFERENCES = ("entity_ref", "master_entity_ref", "trailer_ref")
 EMPTY_MEMBER = ""
 """Entry of a list of entities for a selection without members, as an empty list refers to all entities."""
 
-TYPES: Mapping[type[model.Element], str] = {
-    model.Vehicle: "vehicle",
-    model.Pedestrian: "pedestrian",
-    model.MiscObject: "miscellaneous",
-}
-"""Object type of each class; external objects have the type `external`."""
-
 
 class Selections:
     """Entity selections of one scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._entities = scenario.entities
-        self._external = scenario.external
+        self._entities_by_type = scenario.entities_by_type
         entities = scenario.document.entities
         declarations = entities.entity_selection if entities is not None else ()
         self._groups = {one.name: one for one in declarations if one.name not in scenario.entities}
@@ -78,12 +70,7 @@ class Selections:
         for ref in group.members.entity_ref:
             yield from self._members(ref.entity_ref, (*parents, name))
         for entry in group.members.by_type:
-            yield from self._entities_of_type(entry.object_type.value)
-
-    def _entities_of_type(self, kind: str) -> Iterator[str]:
-        for name, entity in self._entities.items():
-            if ("external" if name in self._external else TYPES[type(entity)]) == kind:
-                yield name
+            yield from self._entities_by_type.get(entry.object_type, ())
 
     def _named_groups(self, element: model.Element) -> set[str]:
         if not self._groups:
