@@ -232,16 +232,12 @@ def test_selection_by_type_includes_external_objects(run: Run) -> None:
 
 @pytest.mark.parametrize(("kind", "collides"), [("external", True), ("vehicle", False), ("miscellaneous", False)])
 def test_collision_by_type_distinguishes_external_objects(run: Run, kind: str, collides: bool) -> None:
-    """Ego is beside the box of 0.5 m at x = 103, 3 m ahead of its reference point; its front is at 104."""
+    """The box of 0.5 m at x = 103 is within the body of Ego, which extends from 99 to 104."""
     external = '<ScenarioObject name="Thing"><ExternalObjectReference name="elsewhere"/></ScenarioObject>'
     add = everywhere(
         '<EntityAction entityRef="Thing"><AddEntityAction><Position><WorldPosition x="103" y="-2" h="0"/></Position>'
         "</AddEntityAction></EntityAction>"
     )
-    touched = (
-        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>'
-        f'</TriggeringEntities><EntityCondition><CollisionCondition><ByType type="{kind}"/></CollisionCondition>'
-        "</EntityCondition></ByEntityCondition>"
-    )
+    touched = by("Ego", f'<CollisionCondition><ByType type="{kind}"/></CollisionCondition>')
     played = run(0.2, ("Ego", NOTHING, touched), driven=False, ego=(-1, 100.0, 0.0), more=external, globally=add)
     assert bool(played.begun("action 0")) is collides
