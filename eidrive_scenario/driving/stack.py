@@ -194,7 +194,7 @@ class EmptyStack(DrivingStack):
 
 
 StackFactory = Callable[[StackContext], DrivingStack]
-"""Builds the stack of a run. Raises InputError if the scenario or a setting is invalid."""
+"""Builds the stack of a run. Raise InputError if the scenario or a setting is invalid."""
 
 
 def build_stack(factory: StackFactory, context: StackContext) -> DrivingStack:

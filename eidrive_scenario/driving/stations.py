@@ -49,7 +49,7 @@ from eidrive_scenario.world.view import WorldView
 class Stations(DrivingStack):
     """All actors whose controller has `module=eidrive`, their sensors, and the channel between them.
 
-    Raises SettingError if the properties of a controller, the channel or an option is invalid.
+    Raise SettingError if the properties of a controller, the channel or an option is invalid.
     """
 
     def __init__(self, context: StackContext) -> None:

@@ -52,7 +52,7 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
     time       simulated time [s]; None before the run
     observers  of the run: those that are no part of this project count as extensions
 
-    Raises WallLimitError instead if the wall limit of the run was reached. Errors of the input, interruptions by the
+    Raise WallLimitError instead if the wall limit of the run was reached. Errors of the input, interruptions by the
     user and errors that are attributed already are left as they are.
     """
     if isinstance(error, InputError | KeyboardInterrupt | ExtensionError | WallLimitError):

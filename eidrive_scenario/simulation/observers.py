@@ -12,7 +12,7 @@ from eidrive_scenario.simulation.run import Observer, checked_observer
 class Observers:
     """The observers of one run. Each is closed exactly once.
 
-    Raises SettingError for an object that lacks the methods of an observer.
+    Raise SettingError for an object that lacks the methods of an observer.
     """
 
     def __init__(self, observers: Iterable[Observer] = ()) -> None:

@@ -231,7 +231,7 @@ class Observer(Protocol):
 
 
 def checked_observer(observer: Observer) -> Observer:
-    """Raise SettingError for an object that lacks the methods of an observer."""
+    """Return an observer. Raise SettingError for an object that lacks the methods of an observer."""
     for method in ("observe", "close"):
         if not callable(getattr(observer, method, None)):
             name = type(observer).__name__

@@ -47,7 +47,7 @@ class Simulation:
     settings   its parameters override those with which the Scenario was loaded, and these override drawn ones
     stack      builds the driving stack: perception, communication and control of the stations
 
-    Raises InputError if the scenario, its roads or the settings are invalid.
+    Raise InputError if the scenario, its roads or the settings are invalid.
     """
 
     @attributed
@@ -101,7 +101,7 @@ class Simulation:
     def add_observer(self, observer: Observer) -> None:
         """Add an observer of all frames from now on; it is closed with the run.
 
-        Raises SimulationError if the simulation is closed.
+        Raise SimulationError if the simulation is closed.
         """
         if self._is_closed:
             raise SimulationError("the simulation is closed; an observer of it would see no frame")
@@ -118,7 +118,7 @@ class Simulation:
     def set_user_value(self, name: str, value: str) -> None:
         """Set the value of the UserDefinedValueConditions of this name from the next tick on.
 
-        Raises SettingError if the value is not a text, number or truth value.
+        Raise SettingError if the value is not a text, number or truth value.
         """
         self._user_values[name] = as_setting_text(f"the user-defined value {name!r}", value)
 
@@ -126,7 +126,7 @@ class Simulation:
         """Set the pose of an entity in the next view, and its speed [m/s].
 
         It applies to entities whose controller has the controller model `external`, while that controller is active.
-        Raises SettingError if no controller of the entity has that model.
+        Raise SettingError if no controller of the entity has that model.
         """
         self.storyboard.check_accepts_external_poses(name)
         self._external_poses[name] = ExternalPose(pose, speed)
@@ -135,7 +135,7 @@ class Simulation:
     def run(self, *, wall_limit: float | None = None) -> RunResult:
         """Run to the end, for at most `wall_limit` seconds of wall time.
 
-        Raises ExtensionError for a fault of an extension, WallLimitError if the limit is reached.
+        Raise ExtensionError for a fault of an extension, WallLimitError if the limit is reached.
         """
         self._started = time.perf_counter()
         with limit_wall_time(wall_limit), self:
@@ -146,7 +146,7 @@ class Simulation:
     def tick(self) -> tuple[Frame, str | None]:
         """Execute one time step; return its frame, and the reason if the run ends with it.
 
-        Raises ExtensionError if an extension raises an exception or returns an invalid result, SimulationError after
+        Raise ExtensionError if an extension raises an exception or returns an invalid result, SimulationError after
         the end.
         """
         if self._ended is not None or self._is_closed:
@@ -228,7 +228,7 @@ def run_file(
     wall_limit  of loading and run together [s]; see `limit_wall_time`
     stack       builds the driving stack
 
-    Raises InputError for an invalid file or setting, ExtensionError for a fault of an extension, WallLimitError if the
+    Raise InputError for an invalid file or setting, ExtensionError for a fault of an extension, WallLimitError if the
     limit is reached.
     """
     with limit_wall_time(wall_limit):
