@@ -274,7 +274,7 @@ def test_source_far_from_lanes_is_rejected(run: Run) -> None:
 def test_traffic_without_roads_is_rejected(run: Run, tmp_path: Path) -> None:
     run(0.1, globally=traffic(swarm(2)))
     text = (tmp_path / "scene.xosc").read_text().replace('<LogicFile filepath="street.xodr"/>', "")
-    with pytest.raises(InputError, match="the scenario has no lanes"):
+    with pytest.raises(InputError, match="the scenario has no road network"):
         Simulation(load_scenario(text.encode()))
 
 

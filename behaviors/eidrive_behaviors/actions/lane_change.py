@@ -60,9 +60,7 @@ class LaneChangeAction(ActionBehaviour):
         target = action.lane_change_target.absolute_target_lane
         if target is not None and not target.value.removeprefix("-").isdecimal():
             raise self.error(f"the target lane is not a number (got {target.value!r}; expected the id of a lane)")
-        if context.roads is None:
-            raise self.error("the scenario has no road network", "specify one in RoadNetwork/LogicFile")
-        self._roads = context.roads
+        self._roads = self.require_roads()
         self._lane = 0
         self._limited_offset: RateLimitedValue | None = None
 

@@ -108,8 +108,7 @@ class RandomRouteAction(ActionBehaviour):
     ) -> None:
         super().__init__(action, context, actor=actor, parent=parent)
         self._starts = 0
-        if context.roads is None:
-            raise self.error("the scenario has no road network", "specify one in RoadNetwork/LogicFile")
+        self._roads = self.require_roads()
 
     def initialise(self) -> None:
         """Count the start, so that each start draws a separate route."""
@@ -117,11 +116,11 @@ class RandomRouteAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Discard the route and select branches at random."""
-        actor, roads = self.actor, self.context.roads
+        actor, roads = self.actor, self._roads
         choose = uniform_branch_selector(generator(self.context.seed, "random route", actor.name, self._starts))
         actor.motion.set_route(None, choose)
         here = self.context.location(actor.name)
-        if actor.driven and roads is not None and here is not None:
+        if actor.driven and here is not None:
             way = random_route(roads, here, RANDOM_ROUTE_LENGTH, choose)
             actor.set_goal(replace(actor.goal or Goal(), path=way.polyline(POINTS_APART), lap=None))
         return Status.SUCCESS

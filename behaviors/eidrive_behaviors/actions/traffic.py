@@ -38,8 +38,7 @@ class TrafficInstanceAction(ActionBehaviour):
     ) -> None:
         super().__init__(action, context, actor=actor, parent=parent)
         self._generator: traffic.TrafficGenerator | None = None
-        if context.roads is None:
-            raise self.error("the scenario has no lanes", "specify an OpenDRIVE file in RoadNetwork/LogicFile")
+        self._roads = self.require_roads()
         self.check()
 
     @property
@@ -253,7 +252,6 @@ class TrafficAreaAction(TrafficInstanceAction):
         return status if self.action.continuous else Status.SUCCESS
 
     def _road_ranges(self) -> list[traffic.Stretch]:
-        assert self.context.roads is not None
         ranges = []
         for entry in self.action.traffic_area.road_range:
             cursors = [
@@ -261,7 +259,7 @@ class TrafficAreaAction(TrafficInstanceAction):
                 for cursor in entry.road_cursor
             ]
             try:
-                ranges += traffic.road_range(self.context.roads, cursors, entry.length)
+                ranges += traffic.road_range(self._roads, cursors, entry.length)
             except InputError as error:
                 diagnostics = [Diagnostic(d.message, d.hint, entry.source, entry.line) for d in error.diagnostics]
                 raise ScenarioError(diagnostics) from error

@@ -6,8 +6,7 @@ import math
 
 from eidrive_behaviors.conditions.distance import GapCondition, current_place
 from eidrive_scenario.api.actions import ConditionContext, ResolvedPosition, closing_speed, model
-
-STANDING = 1e-6
+from eidrive_scenario.api.common import EPSILON
 
 
 class TimeHeadwayCondition(GapCondition):
@@ -23,7 +22,7 @@ class TimeHeadwayCondition(GapCondition):
     def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the headway [s]."""
         speed, gap = abs(context.speed(entity)), abs(self.gap(context, entity, self.element.entity_ref))
-        return gap / speed if speed > STANDING else gap * math.inf if gap > 0.0 else gap
+        return gap / speed if speed > EPSILON else gap * math.inf if gap > 0.0 else gap
 
 
 class TimeToCollisionCondition(GapCondition):
@@ -47,7 +46,7 @@ class TimeToCollisionCondition(GapCondition):
             return math.nan
         gap, how = self.gap(context, entity, to), self.element.routing_algorithm
         closing = closing_speed(context, entity, to, frame=self.frame, kind=self.kind, algorithm=how)
-        return abs(gap) / closing if closing > STANDING else math.nan
+        return abs(gap) / closing if closing > EPSILON else math.nan
 
     def _target(self, context: ConditionContext, entity: str) -> str | ResolvedPosition | None:
         """Return the other entity or the place; None while it is absent."""

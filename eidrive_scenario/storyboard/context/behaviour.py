@@ -12,6 +12,7 @@ from py_trees.common import Status
 from eidrive_scenario.errors import Diagnostic, InvalidResult, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import is_built_in
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.protocols import ActionContext, EntityAbsentError
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.state.domains import Domain
@@ -129,6 +130,12 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
                 if not _is_finite(value):
                     text = f"left actor {actor.name!r} with {name} = {value!r} (expected finite numbers)"
                     raise InvalidResult(self, "update", text)
+
+    def require_roads(self) -> RoadNetwork:
+        """Return the road network. Raise ScenarioError if the scenario has none."""
+        if self.context.roads is None:
+            raise self.error("the scenario has no road network", "specify one in RoadNetwork/LogicFile")
+        return self.context.roads
 
     def error(self, message: str, hint: str = "") -> ScenarioError:
         """Return an error with file and line of this action."""

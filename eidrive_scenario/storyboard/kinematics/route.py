@@ -40,7 +40,8 @@ def build_route(
     and the closed route is its lap.
     """
     if roads is None:
-        raise ScenarioError(Diagnostic(f"route {route.name!r} needs a road network", "", route.source, route.line))
+        message = f"route {route.name!r}: the scenario has no road network"
+        raise ScenarioError(Diagnostic(message, "specify one in RoadNetwork/LogicFile", route.source, route.line))
     places = []
     for waypoint in route.waypoint:
         here = resolve(waypoint.position).location
