@@ -66,7 +66,7 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
         raise _wall_limit_error(calls, seconds, time, observers) from error
     if isinstance(error, InvalidResult):
         raise ExtensionError(_place_of_method(error, calls, time), str(error)) from error.__cause__
-    place = extension_place(calls, time=time, observers=observers)
+    place = _extension_place(calls, time, observers)
     if place is None or type(error).__module__.partition(".")[0] in _CONTROL_FLOW:
         return
     raise ExtensionError(place, _diagnostic(error, calls, place)) from error
@@ -110,8 +110,8 @@ def wall_limit_error(
     return _wall_limit_error(calls, limit, time, observers)
 
 
-def extension_place(
-    calls: Sequence[Any], time: float | None = None, observers: Collection[object] = ()
+def _extension_place(
+    calls: Sequence[_Call], time: float | None, observers: Collection[object]
 ) -> ExtensionPlace | None:
     """Return the outermost extension of a stack, a third-party one if there is one; None without extensions."""
     found: list[tuple[int, Registration]] = []
@@ -136,7 +136,7 @@ def _wall_limit_error(
     calls: Sequence[_Call], limit: float, time: float | None, observers: Collection[object]
 ) -> WallLimitError:
     calls = [call for call in calls if Path(call.file).name not in ("wall_limit.py", "threading.py")]
-    place = extension_place(calls, time, observers)
+    place = _extension_place(calls, time, observers)
     last = calls[-1] if calls else None
     where = "" if last is None else f"{last.file}:{last.line} in {last.function}"
     return WallLimitError(limit, place, time, where)
