@@ -106,6 +106,12 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
             self.stop(new)
         self.status = new
 
+    def tick_checked(self) -> None:
+        """Tick once. Raise InvalidResult for an invalid decision."""
+        self.tick_once()
+        if self.third_party or self.status is Status.INVALID:
+            self.check_decision()
+
     def describe(self) -> str:
         """Describe the action."""
         return type(self.action).__name__

@@ -209,9 +209,7 @@ class ActionElement(StoryElement):
         try:
             if behaviour.status is not Status.RUNNING and behaviour.is_actor_missing:
                 raise EntityAbsentError(behaviour.actor_name)
-            behaviour.tick_once()
-            if behaviour.third_party or behaviour.status is Status.INVALID:
-                behaviour.check_decision()
+            behaviour.tick_checked()
         except EntityAbsentError as absent:
             if self._tried_at == self.context.progress.tick:
                 behaviour.stop(Status.INVALID)

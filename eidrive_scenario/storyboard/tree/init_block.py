@@ -42,9 +42,7 @@ class InitBlock(Composite):
 
     def _start_behaviour(self, behaviour: ActionBehaviour) -> bool:
         try:
-            behaviour.tick_once()
-            if behaviour.third_party or behaviour.status is Status.INVALID:
-                behaviour.check_decision()
+            behaviour.tick_checked()
         except EntityAbsentError:
             behaviour.stop(Status.INVALID)
             return False
@@ -75,9 +73,7 @@ class InitBlock(Composite):
         """Update the running behaviours."""
         for behaviour in tuple(self.running):
             try:
-                behaviour.tick_once()
-                if behaviour.third_party or behaviour.status is Status.INVALID:
-                    behaviour.check_decision()
+                behaviour.tick_checked()
             except EntityAbsentError as absent:
                 behaviour.abort(absent)
             if behaviour.status is not Status.RUNNING:

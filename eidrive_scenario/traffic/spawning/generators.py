@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -50,7 +51,31 @@ class TrafficGenerator(CarGroup, ABC):
 
 
 @dataclass
-class Swarm(TrafficGenerator):
+class MaintainedTraffic(TrafficGenerator):
+    """Base class of traffic whose number of participants is maintained.
+
+    count  number of participants
+    """
+
+    count: int
+    mixture: TrafficMix
+    _again: float = field(default=0.0, init=False)
+
+    def is_due(self, population: Population) -> bool:
+        """Return whether participants are missing."""
+        return len(self.members) < self.count and population.time >= self._again - TIME_TOLERANCE
+
+    def fill(self, population: Population, spawn_one: Callable[[], bool], attempts: int = ATTEMPTS) -> None:
+        """Spawn missing participants by `spawn_one` until so many attempts have failed; then wait."""
+        failures = 0
+        while self.is_due(population) and failures < attempts:
+            failures += not spawn_one()
+        if failures:
+            self._again = population.time + RETRY
+
+
+@dataclass
+class Swarm(MaintainedTraffic):
     """Traffic around an entity, between a circle and an ellipse, both `offset` [m] ahead of it along its x axis.
 
     The whole ring is filled once. Cars outside the ellipse are removed and replaced near its edge, at sites from which
@@ -66,17 +91,10 @@ class Swarm(TrafficGenerator):
     major: float
     minor: float
     offset: float
-    count: int
-    mixture: TrafficMix
     speeds: tuple[float, float] | None = None
     directions: tuple[float, float] | None = None
     sectors: tuple[float, float, float, float] | None = None
     _filled: bool = field(default=False, init=False)
-    _again: float = field(default=0.0, init=False)
-
-    def is_due(self, population: Population) -> bool:
-        """Return whether cars are missing."""
-        return len(self.members) < self.count and population.time >= self._again - TIME_TOLERANCE
 
     def step(self, population: Population) -> None:
         """Remove cars outside the ellipse and spawn missing ones."""
@@ -89,12 +107,7 @@ class Swarm(TrafficGenerator):
             _, share = self._place(center, x, y)
             for name in [names[n] for n in np.flatnonzero(share > 1.0)]:
                 population.despawn(name)
-        failures = 0
-        while self.is_due(population) and failures < (1 if self._filled else ATTEMPTS):
-            if not self._spawn_one(population, center):
-                failures += 1
-        if failures:
-            self._again = population.time + RETRY
+        self.fill(population, partial(self._spawn_one, population, center), 1 if self._filled else ATTEMPTS)
         self._filled = True
 
     def _place(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
@@ -183,21 +196,14 @@ class Source(TrafficGenerator):
 
 
 @dataclass
-class Area(TrafficGenerator):
+class Area(MaintainedTraffic):
     """Number of participants in an area: spawned once, or maintained.
 
     covers  whether sites are inside the area
     """
 
-    count: int
     continuous: bool
-    mixture: TrafficMix
     covers: Covers
-    _again: float = field(default=0.0, init=False)
-
-    def is_due(self, population: Population) -> bool:
-        """Return whether participants are missing."""
-        return len(self.members) < self.count and population.time >= self._again - TIME_TOLERANCE
 
     def step(self, population: Population) -> None:
         """Remove participants outside the area and spawn missing ones. Finish if the area is not continuous."""
@@ -206,16 +212,14 @@ class Area(TrafficGenerator):
             outside = ~self.covers(population.sites(names))
             for name in [names[n] for n in np.flatnonzero(outside)]:
                 population.despawn(name)
-        failures = 0
-        while self.is_due(population) and failures < ATTEMPTS:
-            rng = self.rng(population)
-            participant = self.mixture.draw(rng)
-            sites = population.ground.for_body(participant)
-            sites = sites.subset(self.covers(sites))
-            speed = population.starting_speed(sites, participant)
-            if not len(sites) or not population.spawn(self, participant, sites, speed, rng, None):
-                failures += 1
-        if failures:
-            self._again = population.time + RETRY
+        self.fill(population, partial(self._spawn_one, population))
         if not self.continuous:
             self.active = False
+
+    def _spawn_one(self, population: Population) -> bool:
+        rng = self.rng(population)
+        participant = self.mixture.draw(rng)
+        sites = population.ground.for_body(participant)
+        sites = sites.subset(self.covers(sites))
+        speed = population.starting_speed(sites, participant)
+        return len(sites) > 0 and population.spawn(self, participant, sites, speed, rng, None)
