@@ -198,7 +198,7 @@ def test_synchronize_with_opposite_final_speed_arrives_at_standstill(run: Run, w
     assert speeds[100] == pytest.approx(5.0 * way, abs=0.1)
     assert x[100] == pytest.approx(start + 37.5 * way, abs=0.5)
     assert speeds[195] == pytest.approx(0.25 * way, abs=0.15)
-    assert x[200] == pytest.approx(start + 50.0 * way, abs=0.1)
+    assert x[199] == pytest.approx(start + 50.0 * way, abs=0.1)
     assert speeds[-1] == -3.0 * way
     bound = "forwards; specify a final speed of at least 0" if way > 0.0 else "backwards; specify a final speed of at m"
     warning = f"SynchronizeAction: the speed changes to {-3.0 * way:g} m/s at once at the target, which the actor "

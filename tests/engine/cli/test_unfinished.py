@@ -10,19 +10,18 @@ from command_fixtures import Eidrive
 
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.recording import read_recording
-from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.simulation.command_execution import RunState
+from eidrive_scenario.simulation.run_outcome import end_reason
+from eidrive_scenario.storyboard.storyboard import Storyboard
 
 
 def break_at(monkeypatch: pytest.MonkeyPatch, instant: float, error: BaseException) -> None:
-    usual = Simulation._end_reason
-
-    def end(simulation: Simulation, frame: Frame) -> str | None:
-        if frame.view.time >= instant - 1e-9:
+    def end(state: RunState, storyboard: Storyboard, time: float, time_limit: float) -> str | None:
+        if time >= instant - 1e-9:
             raise error
-        return usual(simulation, frame)
+        return end_reason(state, storyboard, time, time_limit)
 
-    monkeypatch.setattr(Simulation, "_end_reason", end)
+    monkeypatch.setattr("eidrive_scenario.simulation.simulation.end_reason", end)
 
 
 def names(folder: Path) -> list[str]:

@@ -11,10 +11,11 @@ from sample_car import CarFactory
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.camera import Pinhole
-from eidrive_scenario.world.render.illumination.daylight import LUMA, daylight
+from eidrive_scenario.world.render.illumination.daylight import daylight
 from eidrive_scenario.world.render.illumination.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
 from eidrive_scenario.world.render.illumination.sky import SIZE, dome, horizon
 from eidrive_scenario.world.render.rasterization import rasterize
+from eidrive_scenario.world.render.tone_mapping import LUMA
 from eidrive_scenario.world.weather import Weather, load_weather
 
 PINHOLE = Pinhole.of_fov(160, 120, math.radians(80))
