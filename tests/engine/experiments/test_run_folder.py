@@ -24,7 +24,7 @@ from eidrive_scenario.files.lock import FileLock
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording import TraceHash, read_recording
 from eidrive_scenario.resolved_settings import ResolvedSettings
-from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
+from eidrive_scenario.simulation import RunResult, RunSettings
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 SHORT: dict[str, Any] = {"time_limit": 0.3}
@@ -272,7 +272,7 @@ def test_error_of_run_has_notes_with_command_and_recording(tmp_path: Path, monke
     def fail(*_: object) -> None:
         raise ZeroDivisionError("physics")
 
-    monkeypatch.setattr(Simulation, "_end_reason", fail)
+    monkeypatch.setattr("eidrive_scenario.simulation.simulation.end_reason", fail)
     with pytest.raises(ZeroDivisionError) as raised:
         run(tmp_path)
     notes = raised.value.__notes__
