@@ -113,7 +113,10 @@ def test_stop_trigger_ends_the_run(build: Any) -> None:
 
 
 def test_criteria_in_the_stop_trigger_do_not_stop_the_run(build: Any) -> None:
-    stop = AFTER.format(kind="Stop", edge="none", value=-1).replace('"later"', '"criteria_CollisionTest"')
+    stop = """<StopTrigger><ConditionGroup>
+      <Condition name="criteria_CollisionTest" delay="0" conditionEdge="none"><ByValueCondition>
+        <ParameterCondition parameterRef="" value="" rule="lessThan"/></ByValueCondition></Condition>
+      </ConditionGroup></StopTrigger>"""
     storyboard = build(STARTS, stop=stop)
     play(storyboard, 2)
     assert storyboard.ended is None
