@@ -44,7 +44,7 @@ class QueuedChannel(Channel):
     def continue_from(self, previous: Channel) -> None:
         """Take the links of the previous channel. Raise SettingError if it is not a QueuedChannel."""
         if not isinstance(previous, QueuedChannel):
-            message = f"{type(self).__name__} cannot take over the messages of {type(previous).__name__}"
+            message = f"{type(self).__name__} cannot continue the messages of {type(previous).__name__}"
             raise SettingError(Diagnostic(message, "derive both channels from LinkChannel"))
         previous.finalize()
         self._links = previous._links

@@ -153,7 +153,7 @@ def test_channel_that_cannot_continue_another_is_error_with_line() -> None:
     with Simulation(load_for_seed(ONE, 1, {}), seed=1) as simulation:
         assert isinstance(simulation.stack, Stations)
         simulation.stack._channel = SharedMemory()
-        with pytest.raises(SettingError, match=r"a\.xosc:7: ComposedChannel cannot take over .* of SharedMemory"):
+        with pytest.raises(SettingError, match=r"a\.xosc:7: ComposedChannel cannot continue .* of SharedMemory"):
             simulation.stack.request_channel("ideal", source="a.xosc", line=7)
 
 
