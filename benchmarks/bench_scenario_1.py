@@ -2,9 +2,11 @@
 
 The bare loop is a pybullet program with the same bodies, steps and rays. In each tick it does the following:
 
-- place the scripted bodies that moved in the run at their positions; - make all physics steps: read pose and velocity
-of every driven body, set its velocity to that of the run, and query its contacts; - read pose and velocity of every
-body; - cast the rays of the run.
+- place the scripted bodies that moved in the run at their positions;
+- make all physics steps: read pose and velocity of every driven body, set its velocity to that of the run, and query
+  its contacts;
+- read pose and velocity of every body;
+- cast the rays of the run.
 
 It has no vehicle model, storyboard, stations, messages or criteria. Its bodies are created by the same calls as in the
 run.
