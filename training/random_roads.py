@@ -16,7 +16,8 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model import curves
 from eidrive_scenario.world import World
 from xosc.roads import make_roads
-from xosc.roads.make_roads import Crossing, LaneSpec, Street, add, add_lane, add_mark, add_road
+from xosc.roads.crossings import LANE, Crossing, LaneSpec, Street
+from xosc.roads.make_roads import add, add_lane, add_mark, add_road
 
 Element = etree._Element
 
@@ -97,7 +98,7 @@ def random_crossing(rng: np.random.Generator) -> Crossing:
 
 def random_street(rng: np.random.Generator) -> Street:
     """Return one to three lanes per direction, with optional center lane, parking, shoulder and sidewalk."""
-    inner, outer = (LaneSpec("driving", make_roads.LANE, (kind, "white")) for kind in ("broken", "solid"))
+    inner, outer = (LaneSpec("driving", LANE, (kind, "white")) for kind in ("broken", "solid"))
     count = int(rng.choice([1, 2, 3], p=[0.5, 0.35, 0.15]))
     side = [inner] * (count - 1) + [outer]
     if rng.random() < 0.45:
@@ -107,7 +108,7 @@ def random_street(rng: np.random.Generator) -> Street:
     side += [LaneSpec("shoulder", 0.63, ("curb", "standard")), LaneSpec("sidewalk", float(rng.uniform(1.5, 4.0)))]
     color = str(rng.choice(["white", "yellow"]))
     if rng.random() < 0.3:
-        middle = LaneSpec("bidirectional", make_roads.LANE, ("solid broken", color))
+        middle = LaneSpec("bidirectional", LANE, ("solid broken", color))
         return Street(left=(middle, *side), right=tuple(side), center=("broken solid", color))
     center = str(rng.choice(["solid", "solid solid", "broken"]))
     return Street(left=tuple(side), right=tuple(side), center=(center, color))

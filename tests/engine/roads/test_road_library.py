@@ -1,12 +1,13 @@
 """Tests of the library roads: lanes at the sites of the paper, and consistency of the files."""
 
 import math
-import runpy
 from pathlib import Path
 
 import pytest
 
 from eidrive_scenario.roads import RoadNetwork
+from xosc.roads.crossings import CROSSINGS
+from xosc.roads.make_roads import write
 
 NAMES = ("coop_1", "coop_2")
 
@@ -30,9 +31,8 @@ def test_lane_successors_continue_position_and_width(library: Path, name: str) -
 
 @pytest.mark.parametrize("name", NAMES)
 def test_road_file_equals_output_of_its_script(library: Path, tmp_path: Path, name: str) -> None:
-    script = runpy.run_path(str(library / "make_roads.py"))
-    crossing = next(crossing for crossing in script["CROSSINGS"] if crossing.name == name)
-    script["write"](crossing, tmp_path / "again.xodr")
+    crossing = next(crossing for crossing in CROSSINGS if crossing.name == name)
+    write(crossing, tmp_path / "again.xodr")
     assert (tmp_path / "again.xodr").read_bytes() == (library / f"{name}.xodr").read_bytes()
 
 
