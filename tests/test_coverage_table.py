@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from coverage_table import PAGE, SECTIONS, WITHOUT_EFFECT, marked_tests, page, unread
 
 from eidrive_scenario.registry import registry
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from coverage_table import PAGE, SECTIONS, WITHOUT_EFFECT, marked_tests, page, unread
 
 
 def test_page_equals_generated_page() -> None:

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import pytest
 from recorded_scene import RecordedScene, RunScene
-from street_scene import after, everywhere, private
+from storyboard_xml import global_xml, private_xml, speed_xml
+from street_scene import after
 from whole_run import Run
 
-DELETE = everywhere('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')
-TO_OTHER_S_LANE = private(
+DELETE = global_xml('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')
+TO_OTHER_S_LANE = private_xml(
     '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="linear" dynamicsDimension="time" '
     'value="1"/><LaneChangeTarget><RelativeTargetLane entityRef="Other" value="0"/></LaneChangeTarget>'
     "</LaneChangeAction></LateralAction>"
 )
-BESIDE_OTHER = private(
+BESIDE_OTHER = private_xml(
     '<LateralAction><LaneOffsetAction continuous="true"><LaneOffsetActionDynamics dynamicsShape="step"/>'
     '<LaneOffsetTarget><RelativeTargetLaneOffset entityRef="Other" value="1"/></LaneOffsetTarget>'
     "</LaneOffsetAction></LateralAction>"
 )
-BEHIND_EGO = private(
+BEHIND_EGO = private_xml(
     '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="20" continuous="false" '
     'freespace="false"/></LongitudinalAction>'
 )
-DRIVE_TO = private(
+DRIVE_TO = private_xml(
     '<RoutingAction><AcquirePositionAction><Position><LanePosition roadId="1" laneId="-1" s="300"/></Position>'
     "</AcquirePositionAction></RoutingAction>"
 )
@@ -65,7 +66,7 @@ def test_action_with_absent_entity_warns_at_the_end(run: Run) -> None:
 @pytest.mark.element("AddEntityAction", "DeleteEntityAction")
 def test_entity_deleted_and_added_at_one_instant_is_moved(run: Run) -> None:
     """After deletion and addition in one event, Other is at its new position in the next view, as after a teleport."""
-    back = everywhere(
+    back = global_xml(
         '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
         "</Position></AddEntityAction></EntityAction>"
     )
@@ -75,25 +76,22 @@ def test_entity_deleted_and_added_at_one_instant_is_moved(run: Run) -> None:
     assert x[10:13] == pytest.approx([155.0, 300.0, 300.5])
 
 
-SPEED_UP = private(
-    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="1"/>'
-    '<SpeedActionTarget><AbsoluteTargetSpeed value="20"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-)
-TO_THE_SIDE = private(
+SPEED_UP = speed_xml(20, 1)
+TO_THE_SIDE = private_xml(
     '<LateralAction><LaneOffsetAction continuous="false"><LaneOffsetActionDynamics maxLateralAcc="1" '
     'dynamicsShape="linear"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget>'
     "</LaneOffsetAction></LateralAction>"
 )
-PROFILE = private(
+PROFILE = private_xml(
     '<LongitudinalAction><SpeedProfileAction followingMode="position"><SpeedProfileEntry speed="20" time="1"/>'
     "</SpeedProfileAction></LongitudinalAction>"
 )
-TOGETHER = private(
+TOGETHER = private_xml(
     '<SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="400"/>'
     '</TargetPositionMaster><TargetPosition><LanePosition roadId="1" laneId="-1" s="400"/></TargetPosition>'
     "</SynchronizeAction>"
 )
-BACK = everywhere(
+BACK = global_xml(
     '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
     "</Position></AddEntityAction></EntityAction>"
 )
@@ -125,7 +123,7 @@ def test_action_of_entity_added_at_the_same_instant_is_performed(
 
 
 def test_driven_ego_is_deleted_and_added_again(run: Run) -> None:
-    delete = everywhere('<EntityAction entityRef="Ego"><DeleteEntityAction/></EntityAction>')
+    delete = global_xml('<EntityAction entityRef="Ego"><DeleteEntityAction/></EntityAction>')
     add = BACK.replace('"Other"', '"Ego"')
     played = run(2, ("Ego", delete, after(0.475)), ("Ego", add, after(0.975)), others={"Other": (-2, 150.0, 10.0)})
     present = ["Ego" in frame.view for frame in played.frames]

@@ -4,49 +4,44 @@ from __future__ import annotations
 
 import pytest
 from recorded_scene import RunScene
+from storyboard_xml import private_xml, speed_xml
+from street_scene import after
 
 from eidrive_scenario.errors import ScenarioError
 
-ON = """<PrivateAction><ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/>
-  </ControllerAction></PrivateAction>"""
-SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
-  <SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
-  <SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
-  </PrivateAction>"""
-AFTER = '<ByValueCondition><SimulationTimeCondition value="{time}" rule="greaterThan"/></ByValueCondition>'
+ON = private_xml('<ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/></ControllerAction>')
 
 
 def test_cruise_behind_slower_car_settles_at_time_gap_plus_3_m(scene: RunScene) -> None:
     """Behind 10 m/s with 1.5 s: a gap of 3 + 15 m between the bumpers, plus 5 m of both cars."""
-    played = scene(60, ("Ego", ON), cruise="", ego=(-1, 50.0, 20.0), other=(-1, 150.0, 10.0))
+    played = scene(60, ("Ego", ON), cruise={}, ego=(-1, 50.0, 20.0), other=(-1, 150.0, 10.0))
     assert played.at(60).speed == pytest.approx(10.0, abs=0.01)
     assert played.at(60, "Other").x - played.at(60).x - 5.0 == pytest.approx(18.0, abs=0.2)
 
 
 def test_cruise_at_half_the_wanted_gap_brakes_by_the_law(scene: RunScene) -> None:
     """Wanted gap 3 + 1.5 · 10 = 18 m, actual gap 9 m: f = -0.5 and a = 2.5 · -0.5 - 0 - 0 = -1.25 m/s²."""
-    played = scene(1, ("Ego", ON), cruise="", ego=(-1, 100.0, 10.0), other=(-1, 114.0, 10.0))
+    played = scene(1, ("Ego", ON), cruise={}, ego=(-1, 100.0, 10.0), other=(-1, 114.0, 10.0))
     assert played.at(0.1).speed == pytest.approx(10.0 - 1.25 * 0.1)
 
 
 def test_cruise_on_a_free_road_keeps_the_speed_of_speed_actions(scene: RunScene) -> None:
-    faster = ("Ego", SPEED.format(speed=30), AFTER.format(time=2))
-    played = scene(6, ("Ego", ON), faster, cruise="", other=(-2, 150.0, 10.0))
+    faster = ("Ego", speed_xml(30), after(2))
+    played = scene(6, ("Ego", ON), faster, cruise={}, other=(-2, 150.0, 10.0))
     assert played.at(2.0).speed == pytest.approx(20.0)
     assert played.at(6.0).speed == pytest.approx(30.0)
 
 
 def test_cruise_in_override_mode_keeps_the_set_speed_property(scene: RunScene) -> None:
     """The acceleration is up to 0.7 of the maximum of 10 m/s²."""
-    mode = '<Property name="mode" value="override"/><Property name="setSpeed" value="25"/>'
-    slower = ("Ego", SPEED.format(speed=5), AFTER.format(time=2))
-    played = scene(4, ("Ego", ON), slower, cruise=mode, other=(-2, 150.0, 10.0))
+    slower = ("Ego", speed_xml(5), after(2))
+    played = scene(4, ("Ego", ON), slower, cruise={"mode": "override", "setSpeed": 25}, other=(-2, 150.0, 10.0))
     assert played.at(0.1).speed == pytest.approx(20.7)
     assert played.at(4.0).speed == pytest.approx(25.0, abs=0.1)
 
 
 def test_cruise_without_activation_keeps_the_speed(scene: RunScene) -> None:
-    played = scene(3, cruise="", other=(-1, 150.0, 10.0))
+    played = scene(3, cruise={}, other=(-1, 150.0, 10.0))
     assert played.at(3.0).speed == pytest.approx(20.0)
 
 
@@ -54,14 +49,13 @@ def test_cruise_without_activation_keeps_the_speed(scene: RunScene) -> None:
     ("name", "value"), [("timeGap", "soon"), ("timeGap", "-1"), ("lateralDist", "NaN"), ("setSpeed", "fast")]
 )
 def test_cruise_with_invalid_property_is_rejected_with_its_line(scene: RunScene, name: str, value: str) -> None:
-    mode = f'<Property name="mode" value="override"/><Property name="{name}" value="{value}"/>'
     with pytest.raises(
         ScenarioError,
         match=rf"scene\.xosc:\d+: controller 'cruise': invalid property {name} \(got '{value}'; expected a",
     ):
-        scene(1, ("Ego", ON), cruise=mode)
+        scene(1, ("Ego", ON), cruise={"mode": "override", name: value})
 
 
 def test_cruise_of_vehicle_without_brakes_keeps_the_speed(scene: RunScene) -> None:
-    played = scene(2, ("Ego", ON), cruise="", brakes=0.0, ego=(-1, 50.0, 20.0), other=(-1, 100.0, 19.0))
+    played = scene(2, ("Ego", ON), cruise={}, brakes=0.0, ego=(-1, 50.0, 20.0), other=(-1, 100.0, 19.0))
     assert played.at(2).speed == pytest.approx(20.0)

@@ -6,32 +6,26 @@ from typing import Any
 
 import pytest
 from recorded_scene import RunScene
-from street_scene import after, private
+from storyboard_xml import private_xml, speed_xml
+from street_scene import after
 
 from eidrive_scenario.errors import ScenarioError
 
-ON = private('<ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/></ControllerAction>')
-CHANGE = private("""<LateralAction><LaneChangeAction>
+ON = private_xml('<ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/></ControllerAction>')
+CHANGE = private_xml("""<LateralAction><LaneChangeAction>
   <LaneChangeActionDynamics dynamicsShape="sinusoidal" dynamicsDimension="time" value="3"/>
   <LaneChangeTarget><AbsoluteTargetLane value="-1"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
-BRAKE = private("""<LongitudinalAction><SpeedAction>
-  <SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="rate" value="{rate}"/>
-  <SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>""")
-
-
-def properties_of(**properties: str) -> str:
-    return "".join(f'<Property name="{name}" value="{value}"/>' for name, value in properties.items())
 
 
 @pytest.mark.parametrize("model", ["Regulation", "ReferenceDriver", "RSS", "FSM"])
 def test_alks_behind_car_that_brakes_to_standstill_avoids_collision(scene: RunScene, model: str) -> None:
     """The lead brakes from 20 m/s at 6 m/s²; 40 m between the bumpers are 45 m between the reference points."""
-    stop = ("Other", BRAKE.format(rate=6, speed=0), after(1))
+    stop = ("Other", speed_xml(0, 6, dimension="rate"), after(1))
     steps = (("Ego", ON), stop)
     played = scene(
         20,
         *steps,
-        cruise=properties_of(model=model),
+        cruise=dict(model=model),
         controller_model="alks",
         ego=(-1, 100.0, 20.0),
         other=(-1, 145.0, 20.0),
@@ -44,7 +38,7 @@ def test_alks_behind_car_that_brakes_to_standstill_avoids_collision(scene: RunSc
 
 @pytest.mark.parametrize("model", ["Regulation", "ReferenceDriver", "RSS", "FSM"])
 def test_alks_brakes_for_cut_in_but_not_for_adjacent_car(scene: RunScene, model: str) -> None:
-    properties = properties_of(model=model, cruise="false", cutInPerceptionDelayMode="Time")
+    properties = dict(model=model, cruise="false", cutInPerceptionDelayMode="Time")
     scenery: dict[str, Any] = {
         "cruise": properties,
         "controller_model": "alks",
@@ -60,22 +54,20 @@ def test_alks_brakes_for_cut_in_but_not_for_adjacent_car(scene: RunScene, model:
 def test_alks_on_a_free_road_returns_to_set_speed_comfortably(scene: RunScene) -> None:
     slower = (
         "Ego",
-        private("""<ControllerAction><ActivateControllerAction longitudinal="false"/></ControllerAction>"""),
+        private_xml("""<ControllerAction><ActivateControllerAction longitudinal="false"/></ControllerAction>"""),
     )
-    steps = (("Ego", ON), (*slower, after(1)), ("Ego", BRAKE.format(rate=10, speed=10), after(1)))
-    played = scene(3, *steps, cruise=properties_of(model="FSM"), controller_model="alks", other=(1, 900.0, 1.0))
+    steps = (("Ego", ON), (*slower, after(1)), ("Ego", speed_xml(10, 10, dimension="rate"), after(1)))
+    played = scene(3, *steps, cruise=dict(model="FSM"), controller_model="alks", other=(1, 900.0, 1.0))
     assert played.at(3).speed == pytest.approx(10.0)
-    faster = ("Ego", BRAKE.format(rate=10, speed=30), after(1))
-    played = scene(
-        4, ("Ego", ON), faster, cruise=properties_of(model="FSM"), controller_model="alks", other=(1, 900.0, 1.0)
-    )
+    faster = ("Ego", speed_xml(30, 10, dimension="rate"), after(1))
+    played = scene(4, ("Ego", ON), faster, cruise=dict(model="FSM"), controller_model="alks", other=(1, 900.0, 1.0))
     assert played.at(4).speed == pytest.approx(30.0)
 
 
 def test_alks_with_invalid_property_is_rejected(scene: RunScene) -> None:
     with pytest.raises(ScenarioError, match="did you mean 'ReferenceDriver'"):
-        scene(1, cruise=properties_of(model="ReferenzDriver"), controller_model="alks")
+        scene(1, cruise=dict(model="ReferenzDriver"), controller_model="alks")
     with pytest.raises(ScenarioError, match=r"invalid property aebTTC \(got 'soon'; expected"):
-        scene(1, cruise=properties_of(aebTTC="soon"), controller_model="alks")
+        scene(1, cruise=dict(aebTTC="soon"), controller_model="alks")
     with pytest.raises(ScenarioError, match=r"invalid property fullStop \(got 'ja'; expected true or false\)"):
-        scene(1, cruise=properties_of(fullStop="ja"), controller_model="alks")
+        scene(1, cruise=dict(fullStop="ja"), controller_model="alks")

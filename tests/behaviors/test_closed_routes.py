@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from street_scene import NOTHING, after, private
-from test_random_routes import road
+from opendrive_xml import junction_xml, map_xml, predecessor_xml, successor_xml
+from storyboard_xml import private_xml
+from street_scene import NOTHING, THROUGH, after, lane_road
 from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import ScenarioError
@@ -24,29 +25,20 @@ def ring() -> str:
     road 3.
     """
     half = 20.0 * math.pi
-    both = '<predecessor id="-1"/><successor id="-1"/>'
-    before = '<predecessor elementType="road" elementId="{}" contactPoint="end"/>'
-    after = '<successor elementType="road" elementId="{}" contactPoint="start"/>'
-    turn = '<arc curvature="0.05"/>'
-    junction = '<successor elementType="junction" elementId="9"/>'
-    behind = '<predecessor elementType="junction" elementId="9"/>'
+    into, out_of = successor_xml(junction="9"), predecessor_xml(junction="9")
     roads = (
-        road(1, (0, 0, 0), 100, "<line/>", before.format(4) + junction, both)
-        + road(11, (100, 0, 0), half, "<line/>", before.format(1) + after.format(3), both)
-        + road(12, (100, 0, 0), half, turn, before.format(1) + after.format(2), both)
-        + road(2, (100, 40, math.pi), 100, "<line/>", behind + after.format(4), both)
-        + road(3, (100 + half, 0, 0), 900, "<line/>", behind, both)
-        + road(4, (0, 40, math.pi), half, turn, before.format(2) + after.format(1), both).replace(
-            'junction="9"', 'junction="-1"'
-        )
+        lane_road(1, 0.0, 0.0, 0.0, 100.0, predecessor_xml("4") + into, THROUGH),
+        lane_road(11, 100.0, 0.0, 0.0, half, predecessor_xml("1") + successor_xml("3"), THROUGH, junction="9"),
+        lane_road(
+            *(12, 100.0, 0.0, 0.0, half, predecessor_xml("1") + successor_xml("2"), THROUGH),
+            curvature=0.05,
+            junction="9",
+        ),
+        lane_road(2, 100.0, 40.0, math.pi, 100.0, out_of + successor_xml("4"), THROUGH),
+        lane_road(3, 100.0 + half, 0.0, 0.0, 900.0, out_of, THROUGH),
+        lane_road(4, 0.0, 40.0, math.pi, half, predecessor_xml("2") + successor_xml("1"), THROUGH, curvature=0.05),
     )
-    connections = "".join(
-        f'<connection id="{number}" incomingRoad="1" connectingRoad="{number}" contactPoint="start">'
-        '<laneLink from="-1" to="-1"/></connection>'
-        for number in (11, 12)
-    )
-    return f"""<OpenDRIVE><header revMajor="1" revMinor="6"/>{roads}
-      <junction id="9" name="">{connections}</junction></OpenDRIVE>"""
+    return map_xml(*roads, rest=junction_xml("9", "1", {"11": -1, "12": -1}))
 
 
 def assign(closed: str, *places: tuple[int, float]) -> str:
@@ -54,7 +46,7 @@ def assign(closed: str, *places: tuple[int, float]) -> str:
     waypoint = f'<Waypoint routeStrategy="shortest">{position}</Waypoint>'
     waypoints = "".join(waypoint.format(*place) for place in places)
     route = f'<Route name="round" closed="{closed}">{waypoints}</Route>'
-    return private(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
+    return private_xml(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
 
 
 def played(run: Run, end: float, action: str, *steps: tuple[str, ...], **more: Any) -> RecordedRun:
@@ -98,7 +90,7 @@ def test_open_route_ends_at_its_last_waypoint(run: Run) -> None:
 def test_closed_route_of_driven_vehicle_is_driven_in_laps(run: Run, relieved: bool) -> None:
     """In the half circles sqrt(5 · 22) = 10.5 m/s at most: in 60 s it is once round and more, and never out."""
     switch = '<ControllerAction><ActivateControllerAction lateral="{0}" longitudinal="{0}"/></ControllerAction>'
-    off, on = (private(switch.format(word)) for word in ("false", "true"))
+    off, on = (private_xml(switch.format(word)) for word in ("false", "true"))
     steps = (("Ego", off, after(20.0)), ("Ego", on, after(22.0))) if relieved else ()
     watched = played(run, 60.0, assign("true", (1, 70.0), (4, 30.0)), *steps)
     x, y = (np.array([frame.view.position[0][axis] for frame in watched.frames]) for axis in (0, 1))

@@ -5,19 +5,20 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from street_scene import after, everywhere, private
+from storyboard_xml import global_xml, private_xml, speed_xml
+from street_scene import after
 from whole_run import Run, slope
 
 
 def hold(*controls: str) -> str:
     inside = "".join(controls)
-    return private(
+    return private_xml(
         f"<ControllerAction><OverrideControllerValueAction>{inside}</OverrideControllerValueAction></ControllerAction>"
     )
 
 
 def activate(on: str) -> str:
-    return private(
+    return private_xml(
         f'<ControllerAction><ActivateControllerAction lateral="{on}" longitudinal="{on}"/></ControllerAction>'
     )
 
@@ -78,11 +79,7 @@ def test_gear_and_clutch_overrides(run: Run) -> None:
 
 @pytest.mark.element("ActivateControllerAction")
 def test_controller_activation_continues_without_a_jump(run: Run) -> None:
-    stop = private(
-        "<LongitudinalAction><SpeedAction>"
-        '<SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="rate" value="2"/><SpeedActionTarget>'
-        '<AbsoluteTargetSpeed value="14"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-    )
+    stop = speed_xml(14, 2, dimension="rate")
     played = run(
         8,
         ("Ego", activate("false"), after(1.0)),
@@ -110,7 +107,7 @@ def test_pedal_override_of_deactivated_controller_has_no_effect(run: Run) -> Non
 @pytest.mark.element("EnvironmentAction")
 def test_low_road_friction_limits_braking(run: Run) -> None:
     """The brakes use 0.95 of the grip 0.2 · 9.81 m/s²."""
-    ice = everywhere(
+    ice = global_xml(
         '<EnvironmentAction><Environment name="ice"><RoadCondition frictionScaleFactor="0.2" wetness="moist"/>'
         "</Environment></EnvironmentAction>"
     )
@@ -125,7 +122,7 @@ def test_low_road_friction_limits_braking(run: Run) -> None:
 def other(name: str, **activate: str) -> str:
     """Return the assignment of a controller of another tool."""
     given = " ".join(f'activate{domain}="{on}"' for domain, on in activate.items())
-    return private(
+    return private_xml(
         f"<ControllerAction><AssignControllerAction {given}><ObjectController>"
         f'<Controller name="{name}" controllerType="movement"><Properties/></Controller></ObjectController>'
         "</AssignControllerAction></ControllerAction>"
@@ -133,7 +130,7 @@ def other(name: str, **activate: str) -> str:
 
 
 def by_name(name: str, on: str) -> str:
-    return private(
+    return private_xml(
         f'<ControllerAction><ActivateControllerAction objectControllerRef="{name}" lateral="{on}" longitudinal="{on}"/>'
         "</ControllerAction>"
     )

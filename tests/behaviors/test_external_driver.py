@@ -5,18 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from street_scene import CAR, STREET, at, private
+from openscenario_xml import road_file_xml, round_car_xml, scenario_xml
+from storyboard_xml import init_xml, private_xml
+from street_scene import STREET, at
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.simulation import RunSettings, Simulation
 
-SCENARIO = """<OpenSCENARIO>
-  <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="scene" author="test"/>
-  <CatalogLocations/><RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork><Entities>{cars}</Entities>
-  <Storyboard><Init><Actions><Private entityRef="Ego">{ego}</Private><Private entityRef="Other">{other}</Private>
-  </Actions></Init></Storyboard></OpenSCENARIO>"""
 JOYSTICK = """<ObjectController name="seat"><Controller name="joystick" controllerType="movement"><Properties/>
   </Controller></ObjectController>"""
 ON = """<ControllerAction><ActivateControllerAction {named} lateral="true" longitudinal="true"/></ControllerAction>"""
@@ -26,10 +23,15 @@ ON = """<ControllerAction><ActivateControllerAction {named} lateral="true" longi
 def simulation(tmp_path: Path, request: pytest.FixtureRequest) -> Simulation:
     """Return a run of Ego at 20 m/s in lane -1; its controller of another tool is active by default."""
     named = getattr(request, "param", "")
-    cars = CAR.format(name="Ego", controller=JOYSTICK) + CAR.format(name="Other", controller="")
-    ego = at(-1, 100.0, 20.0) + (private(ON.format(named=named)) if named is not None else "")
+    ego = at(-1, 100.0, 20.0) + (private_xml(ON.format(named=named)) if named is not None else "")
     (tmp_path / "street.xodr").write_text(STREET)
-    (tmp_path / "scene.xosc").write_text(SCENARIO.format(cars=cars, ego=ego, other=at(-2, 50.0, 10.0)))
+    (tmp_path / "scene.xosc").write_bytes(
+        scenario_xml(
+            road=road_file_xml("street.xodr"),
+            entities=round_car_xml("Ego", JOYSTICK) + round_car_xml("Other"),
+            init=init_xml("Ego", ego) + init_xml("Other", at(-2, 50.0, 10.0)),
+        )
+    )
     settings = RunSettings(dt=0.1, controllers={"joystick": "external"})
     return Simulation(load_scenario(tmp_path / "scene.xosc"), settings=settings)
 

@@ -6,13 +6,14 @@ Ego drives at 20 m/s from x = 100 in lane -1 (y = -2) by default.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 from eidrive_behaviors.actions.following import RateLimitedValue, speed_limiter
 from recorded_scene import RunScene
-from street_scene import private
+from storyboard_xml import private_xml
+from trajectories import follow_points
 
 from eidrive_scenario.api.actions import model
 from eidrive_scenario.api.common import Placement
@@ -21,30 +22,17 @@ LARGEST_CURVATURE = math.tan(0.5) / 3.0
 
 
 def speed(target: float, shape: str, value: float, mode: str) -> str:
-    return private(f"""<LongitudinalAction><SpeedAction>
+    return private_xml(f"""<LongitudinalAction><SpeedAction>
       <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{value}" followingMode="{mode}"/>
       <SpeedActionTarget><AbsoluteTargetSpeed value="{target}"/></SpeedActionTarget></SpeedAction>
       </LongitudinalAction>""")
 
 
 def change(shape: str, value: float, mode: str) -> str:
-    return private(f"""<LateralAction><LaneChangeAction>
+    return private_xml(f"""<LateralAction><LaneChangeAction>
       <LaneChangeActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{value}"
       followingMode="{mode}"/>
       <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
-
-
-def trajectory(points: Sequence[tuple[float, float, float | None]], mode: str) -> str:
-    timed = points[0][2] is not None
-    vertices = "".join(
-        f'<Vertex {f"time={chr(34)}{t}{chr(34)}" if timed else ""}><Position><WorldPosition x="{x}" y="{y}"/>'
-        "</Position></Vertex>"
-        for x, y, t in points
-    )
-    reference = '<Timing domainAbsoluteRelative="relative" offset="0" scale="1"/>' if timed else "<None/>"
-    return private(f"""<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="way" closed="false">
-      <Shape><Polyline>{vertices}</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference>{reference}
-      </TimeReference><TrajectoryFollowingMode followingMode="{mode}"/></FollowTrajectoryAction></RoutingAction>""")
 
 
 def motion(placement: Placement) -> tuple[float, ...]:
@@ -128,7 +116,7 @@ def test_request_within_the_limits_is_equal_in_both_modes(scene: RunScene) -> No
 @pytest.mark.element("FollowTrajectoryAction")
 def test_corner_in_follow_mode_uses_the_maximum_steering_angle(scene: RunScene) -> None:
     corner = [(100.0, -2.0, None), (120.0, -2.0, None), (120.0, 38.0, None)]
-    played = scene(10, ("Ego", trajectory(corner, "follow")), ego=(-1, 100.0, 5.0), dt=0.05)
+    played = scene(10, ("Ego", follow_points(corner, "follow")), ego=(-1, 100.0, 5.0), dt=0.05)
     path = [row["Ego"] for row in played.rows]
     for before, after in pairwise(path):
         way = math.hypot(after.x - before.x, after.y - before.y)
@@ -137,18 +125,18 @@ def test_corner_in_follow_mode_uses_the_maximum_steering_angle(scene: RunScene) 
     assert max(p.x for p in path) > 120.5
     late = [p for p in path if p.y > 25.0]
     assert [p.x for p in late] == pytest.approx([120.0] * len(late), abs=0.02)
-    exact = scene(10, ("Ego", trajectory(corner, "position")), ego=(-1, 100.0, 5.0), dt=0.05)
+    exact = scene(10, ("Ego", follow_points(corner, "position")), ego=(-1, 100.0, 5.0), dt=0.05)
     assert max(row["Ego"].x for row in exact.rows) == pytest.approx(120.0)
 
 
 def test_trajectory_in_follow_mode_starts_from_the_actual_position(scene: RunScene) -> None:
     """It starts 4 m to the left of the trajectory, and reaches the end in time."""
     way = [(100.0, -6.0, 0.0), (200.0, -6.0, 5.0)]
-    played = scene(6, ("Ego", trajectory(way, "follow")))
+    played = scene(6, ("Ego", follow_points(way, "follow")))
     assert (played.at(0.1).x, played.at(0.1).y) == pytest.approx((102.0, -2.0), abs=0.2)
     assert played.at(4.0).y == pytest.approx(-6.0, abs=0.05)
     assert played.at(5.0).x == pytest.approx(200.0, abs=0.2)
-    assert scene(1, ("Ego", trajectory(way, "position"))).at(0.1).y == pytest.approx(-6.0)
+    assert scene(1, ("Ego", follow_points(way, "position"))).at(0.1).y == pytest.approx(-6.0)
 
 
 def test_feasible_bend_is_equal_in_both_modes(scene: RunScene) -> None:
@@ -158,6 +146,6 @@ def test_feasible_bend_is_equal_in_both_modes(scene: RunScene) -> None:
         points.append((points[-1][0] + 10.0 * math.cos(heading), points[-1][1] + 10.0 * math.sin(heading)))
         heading += 0.1
     timed = [(x, y, 0.5 * number) for number, (x, y) in enumerate(points)]
-    one, other = (scene(4, ("Ego", trajectory(timed, mode))) for mode in ("position", "follow"))
+    one, other = (scene(4, ("Ego", follow_points(timed, mode))) for mode in ("position", "follow"))
     for before, after in zip(one.rows, other.rows, strict=True):
         assert motion(before["Ego"]) == pytest.approx(motion(after["Ego"]), abs=1e-9)

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from street_scene import NOTHING, STREET, after, everywhere, private
+from storyboard_xml import by_entity_xml, global_xml, private_xml, speed_xml
+from street_scene import NOTHING, after, street
 from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
@@ -17,10 +18,7 @@ MANY = """<EntitySelection name="all"><Members><ByType objectType="vehicle"/></M
   </EntitySelection>
   <EntitySelection name="nested"><Members><EntityRef entityRef="slow"/><EntityRef entityRef="Second"/></Members>
   </EntitySelection>"""
-SPEED = private(
-    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>'
-    '<SpeedActionTarget><AbsoluteTargetSpeed value="5"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-)
+SPEED = speed_xml(5)
 
 
 @pytest.fixture
@@ -34,12 +32,6 @@ def group(run: Run) -> Callable[..., RecordedRun]:
     return play
 
 
-def by(entities: str, condition: str, rule: str = "any") -> str:
-    return f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="{rule}">
-      <EntityRef entityRef="{entities}"/></TriggeringEntities>
-      <EntityCondition>{condition}</EntityCondition></ByEntityCondition>"""
-
-
 @pytest.mark.element("EntitySelection")
 def test_selection_as_actor_acts_as_each_member(group: Run) -> None:
     for selection, expected in (("slow", [20, 5, 5]), ("nested", [20, 5, 5]), ("all", [5, 5, 5])):
@@ -47,10 +39,7 @@ def test_selection_as_actor_acts_as_each_member(group: Run) -> None:
         assert [played.of(name, "speed")[-1] for name in CARS] == expected
 
 
-SLOW_DOWN = private(
-    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>'
-    '<SpeedActionTarget><AbsoluteTargetSpeed value="6"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-)
+SLOW_DOWN = speed_xml(6, 2)
 
 
 @pytest.mark.element("EntitySelection")
@@ -67,13 +56,13 @@ def test_selection_in_init_with_preempted_member_releases_all_members(group: Run
 
 
 def test_actors_listed_individually_are_preempted_individually(group: Run) -> None:
-    named = 'Second"/><EntityRef entityRef="Third'
+    named = "Second Third"
     played = group(3, (named, SLOW_DOWN), ("Second", SPEED, after(0.95)))
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 6])
 
 
 def test_selection_with_deleted_member_continues_with_the_others(group: Run) -> None:
-    delete = everywhere('<EntityAction entityRef="Second"><DeleteEntityAction/></EntityAction>')
+    delete = global_xml('<EntityAction entityRef="Second"><DeleteEntityAction/></EntityAction>')
     played = group(3, ("slow", SLOW_DOWN), ("Ego", delete, after(0.95)))
     assert played.of("Third", "speed")[-1] == pytest.approx(6)
 
@@ -81,7 +70,7 @@ def test_selection_with_deleted_member_continues_with_the_others(group: Run) -> 
 @pytest.mark.element("EntitySelection", "triggeringEntitiesRule")
 def test_selection_triggers_by_any_or_all_members(group: Run) -> None:
     """The condition is 10 m: Ego covers it at 20 m/s in 0.5 s, the others at 10 m/s in 1.0 s."""
-    gone = by("all", '<TraveledDistanceCondition value="{}"/>', "{}")
+    gone = by_entity_xml('<TraveledDistanceCondition value="{}"/>', "all", "{}")
     assert group(3, ("Ego", NOTHING, gone.format("any", 10.0))).begun("event 0") == pytest.approx([0.5])
     assert group(3, ("Ego", NOTHING, gone.format("all", 10.0))).begun("event 0") == pytest.approx([1.0])
 
@@ -91,7 +80,7 @@ def test_condition_with_selection_as_target_holds_for_any_member(group: Run) -> 
     near = (
         '<RelativeDistanceCondition entityRef="slow" relativeDistanceType="longitudinal" value="10" freespace="false"'
     )
-    near = by("Ego", f'{near} coordinateSystem="road" rule="lessOrEqual"/>')
+    near = by_entity_xml(f'{near} coordinateSystem="road" rule="lessOrEqual"/>')
     played = group(2, ("Ego", NOTHING, near))
     assert played.begun("event 0") == pytest.approx([1.0])
     why = next(
@@ -106,15 +95,15 @@ def test_clearance_of_selection_requires_all_members_absent(group: Run) -> None:
     free = """<RelativeClearanceCondition distanceForward="{}" distanceBackward="0" freeSpace="false"
       oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/><EntityRef entityRef="slow"/>
       </RelativeClearanceCondition>"""
-    assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(5)))).begun("event 0") == [0.0]
-    assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(50)))).begun("event 0") == []
+    assert group(0.5, ("Ego", NOTHING, by_entity_xml(free.format(5)))).begun("event 0") == [0.0]
+    assert group(0.5, ("Ego", NOTHING, by_entity_xml(free.format(50)))).begun("event 0") == []
 
 
 @pytest.mark.element("selectTriggeringEntities")
 def test_triggering_entities_of_the_act_are_added_to_actors(group: Run) -> None:
     """Second and Third are slower than 15 m/s, Ego is faster. Those of a single event have no effect (7.3.1)."""
-    slower = by("all", '<SpeedCondition value="15" rule="lessThan"/>')
-    faster = by("all", '<SpeedCondition value="15" rule="greaterThan"/>')
+    slower = by_entity_xml('<SpeedCondition value="15" rule="lessThan"/>', "all")
+    faster = by_entity_xml('<SpeedCondition value="15" rule="greaterThan"/>', "all")
     for start, actor, speeds in (
         (slower, "Ego", [5, 5, 5]),
         (faster, "Second", [5, 5, 10]),
@@ -129,8 +118,8 @@ def test_triggering_entities_of_the_act_are_added_to_actors(group: Run) -> None:
 @pytest.mark.element("selectTriggeringEntities")
 def test_triggering_entities_of_all_fulfilled_groups_are_selected(group: Run) -> None:
     """Ego fulfils one of two condition groups, Third the other one; both act."""
-    far = by("Third", '<TraveledDistanceCondition value="0"/>')
-    fast = by("Ego", '<SpeedCondition value="15" rule="greaterThan"/>')
+    far = by_entity_xml('<TraveledDistanceCondition value="0"/>', "Third")
+    fast = by_entity_xml('<SpeedCondition value="15" rule="greaterThan"/>')
     other = '</Condition></ConditionGroup><ConditionGroup><Condition name="d" delay="0" conditionEdge="none">'
     played = group(1, ("Second", SPEED), start=f"{fast}{other}{far}")
     assert [played.of(name, "speed")[-1] for name in CARS] == [5, 5, 5]
@@ -139,12 +128,12 @@ def test_triggering_entities_of_all_fulfilled_groups_are_selected(group: Run) ->
 @pytest.mark.element("selectTriggeringEntities")
 def test_triggering_entities_with_delay_or_falling_edge_are_those_of_then(group: Run) -> None:
     """Ego is within 5 m of its start until 0.25 s; no entity is when the trigger fires."""
-    near = by(
-        "all",
+    near = by_entity_xml(
         '<DistanceCondition value="5" rule="lessThan" freespace="false"><Position><LanePosition roadId="1" laneId="-1" '
         's="100"/></Position></DistanceCondition>',
+        "all",
     )
-    brighter = private(
+    brighter = private_xml(
         '<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="lowBeam"/></LightType>'
         '<LightState mode="on"/></LightStateAction></AppearanceAction>'
     )
@@ -159,20 +148,20 @@ def test_empty_selection_is_never_near_and_always_clear(group: Run) -> None:
     empty = '<EntitySelection name="walkers"><Members><ByType objectType="pedestrian"/></Members></EntitySelection>'
     near = """<RelativeDistanceCondition entityRef="walkers" relativeDistanceType="longitudinal" value="1000"
       freespace="false" rule="lessThan"/>"""
-    assert group(0.5, ("Ego", NOTHING, by("Ego", near)), more=empty).begun("event 0") == []
+    assert group(0.5, ("Ego", NOTHING, by_entity_xml(near)), more=empty).begun("event 0") == []
     free = """<RelativeClearanceCondition distanceForward="50" distanceBackward="0" freeSpace="false"
       oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/>{}</RelativeClearanceCondition>"""
     walkers = free.format('<EntityRef entityRef="walkers"/>')
-    assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(""))), more=empty).begun("event 0") == []
-    assert group(0.5, ("Ego", NOTHING, by("Ego", walkers)), more=empty).begun("event 0") == [0.0]
+    assert group(0.5, ("Ego", NOTHING, by_entity_xml(free.format(""))), more=empty).begun("event 0") == []
+    assert group(0.5, ("Ego", NOTHING, by_entity_xml(walkers)), more=empty).begun("event 0") == [0.0]
 
 
 def test_selection_as_reference_requires_a_single_member(group: Run) -> None:
-    delete = everywhere('<EntityAction entityRef="slow"><DeleteEntityAction/></EntityAction>')
+    delete = global_xml('<EntityAction entityRef="slow"><DeleteEntityAction/></EntityAction>')
     played = group(1, ("Ego", delete, after(0.5)))
     assert played.frames[0].view.names == ("Ego", "Second", "Third")
     assert played.frames[-1].view.names == ("Ego",)
-    follow = private(
+    follow = private_xml(
         '<LongitudinalAction><LongitudinalDistanceAction entityRef="{}" freespace="false" continuous="false" '
         'distance="30"/></LongitudinalAction>'
     )
@@ -194,10 +183,9 @@ OBJECT = """<objects><object id="77" name="hut" type="building" s="200" t="-9" z
 
 @pytest.mark.element("ExternalObjectReference")
 def test_external_object_has_pose_and_size_of_the_road_object(run: Run) -> None:
-    street = STREET.replace("</lanes>", f"</lanes>{OBJECT}")
     external = '<ScenarioObject name="Hut"><ExternalObjectReference name="{}"/></ScenarioObject>'
     for name in ("77", "hut"):
-        played = run(0.2, more=external.format(name), street=street)
+        played = run(0.2, more=external.format(name), street=street(extra=OBJECT))
         view = played.frames[0].view
         row = view.row("Hut")
         assert view.boxes[row].tolist() == pytest.approx([200.0, -9.0, 1.25, 4.0, 3.0, 2.5, 0.5])
@@ -206,7 +194,7 @@ def test_external_object_has_pose_and_size_of_the_road_object(run: Run) -> None:
 
 def test_unknown_external_object_is_a_box_with_a_warning(run: Run) -> None:
     external = '<ScenarioObject name="Thing"><ExternalObjectReference name="elsewhere"/></ScenarioObject>'
-    add = everywhere(
+    add = global_xml(
         '<EntityAction entityRef="Thing"><AddEntityAction><Position><WorldPosition x="140" y="-2" h="0"/></Position>'
         "</AddEntityAction></EntityAction>"
     )
@@ -220,8 +208,8 @@ def test_unknown_external_object_is_a_box_with_a_warning(run: Run) -> None:
 def test_selection_by_type_includes_external_objects(run: Run) -> None:
     external = '<ScenarioObject name="Thing"><ExternalObjectReference name="elsewhere"/></ScenarioObject>'
     chosen = '<EntitySelection name="outer"><Members><ByType objectType="external"/></Members></EntitySelection>'
-    put = private('<TeleportAction><Position><WorldPosition x="140" y="-2" h="0"/></Position></TeleportAction>')
-    add = everywhere(
+    put = private_xml('<TeleportAction><Position><WorldPosition x="140" y="-2" h="0"/></Position></TeleportAction>')
+    add = global_xml(
         '<EntityAction entityRef="outer"><AddEntityAction><Position><WorldPosition x="150" y="-2" h="0"/></Position>'
         "</AddEntityAction></EntityAction>"
     )
@@ -234,10 +222,10 @@ def test_selection_by_type_includes_external_objects(run: Run) -> None:
 def test_collision_by_type_distinguishes_external_objects(run: Run, kind: str, collides: bool) -> None:
     """The box of 0.5 m at x = 103 is within the body of Ego, which extends from 99 to 104."""
     external = '<ScenarioObject name="Thing"><ExternalObjectReference name="elsewhere"/></ScenarioObject>'
-    add = everywhere(
+    add = global_xml(
         '<EntityAction entityRef="Thing"><AddEntityAction><Position><WorldPosition x="103" y="-2" h="0"/></Position>'
         "</AddEntityAction></EntityAction>"
     )
-    touched = by("Ego", f'<CollisionCondition><ByType type="{kind}"/></CollisionCondition>')
+    touched = by_entity_xml(f'<CollisionCondition><ByType type="{kind}"/></CollisionCondition>')
     played = run(0.2, ("Ego", NOTHING, touched), driven=False, ego=(-1, 100.0, 0.0), more=external, globally=add)
     assert bool(played.begun("action 0")) is collides

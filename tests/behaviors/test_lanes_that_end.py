@@ -6,13 +6,11 @@ import math
 from itertools import pairwise
 
 import pytest
-from street_scene import STREET
+from opendrive_xml import lanes_xml
+from street_scene import LANES, street
 from whole_run import RecordedRun, Run
 
-FROM_150 = """<laneSection s="150"><center><lane id="0" type="none" level="false"/></center><right>
-  <lane id="-1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
-  </laneSection></lanes>"""
-NARROWED = STREET.replace("</lanes>", FROM_150)
+NARROWED = street(LANES + lanes_xml(0, 1, 4, s=150.0))
 """Street whose lane -2 (y = -6) ends at x = 150; lane -1 (y = -2) continues."""
 
 

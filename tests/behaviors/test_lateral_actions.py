@@ -6,11 +6,12 @@ Ego drives at 20 m/s from x = 100 in lane -1 (y = -2).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import pytest
 from recorded_scene import RunScene
+from storyboard_xml import speed_xml
 from street_scene import after
+from trajectories import RELATIVE, follow_points
 from whole_run import Run
 
 from eidrive_scenario.errors import ScenarioError
@@ -190,24 +191,12 @@ def test_teleport_is_visible_in_the_next_view(scene: RunScene) -> None:
     assert played.at(0.2).x == pytest.approx(498.0)
 
 
-def trajectory(points: Sequence[tuple[float, float, float | None]], reference: str, mode: str = "position") -> str:
-    vertices = "".join(
-        f'<Vertex {"" if t is None else f"time={chr(34)}{t}{chr(34)}"}><Position><WorldPosition x="{x}" y="{y}"/>'
-        "</Position></Vertex>"
-        for x, y, t in points
-    )
-    return f"""<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef>
-      <Trajectory name="way" closed="false"><Shape><Polyline>{vertices}</Polyline></Shape></Trajectory></TrajectoryRef>
-      <TimeReference>{reference}</TimeReference><TrajectoryFollowingMode followingMode="{mode}"/>
-      </FollowTrajectoryAction></RoutingAction></PrivateAction>"""
-
-
 CORNER = [(100.0, -2.0, None), (110.0, -2.0, None), (110.0, 18.0, None)]
 
 
 @pytest.mark.element("FollowTrajectoryAction", "Polyline")
 def test_trajectory_without_timing_keeps_the_own_speed(scene: RunScene) -> None:
-    played = scene(2, ("Ego", trajectory(CORNER, "<None/>")))
+    played = scene(2, ("Ego", follow_points(CORNER)))
     assert (played.at(0.4).x, played.at(0.4).y) == pytest.approx((108.0, -2.0))
     assert (played.at(1.0).x, played.at(1.0).y, played.at(1.0).yaw) == pytest.approx((110.0, 8.0, math.pi / 2))
     assert played.when("action 0", "completeState") == pytest.approx(1.5)
@@ -224,8 +213,8 @@ def test_trajectory_with_timing_passes_vertices_at_their_times(
     """10 m in 2 s from 0.5 s: 5 m/s, and half of it with doubled times."""
     timed = [(100.0, -2.0, 0.0), (110.0, -2.0, 2.0)]
     timing = f'<Timing domainAbsoluteRelative="{domain}" offset="{offset}" scale="{scale}"/>'
-    later = '<ByValueCondition><SimulationTimeCondition value="0.45" rule="greaterThan"/></ByValueCondition>'
-    played = scene(6, ("Ego", trajectory(timed, timing), later))
+    later = after(0.45)
+    played = scene(6, ("Ego", follow_points(timed, reference=timing), later))
     assert played.at(start + scale).x == pytest.approx(105.0)
     assert played.at(start + scale).speed == pytest.approx(5.0 / scale)
     assert played.when("action 0", "completeState") == pytest.approx(start + 2 * scale)
@@ -234,17 +223,14 @@ def test_trajectory_with_timing_passes_vertices_at_their_times(
 def test_trajectory_in_follow_mode_changes_speed_linearly(scene: RunScene) -> None:
     """From 20 m/s, 10 m in 1 s: braking to standstill."""
     timed = [(100.0, -2.0, 0.0), (110.0, -2.0, 1.0)]
-    played = scene(
-        2, ("Ego", trajectory(timed, '<Timing domainAbsoluteRelative="relative" offset="0" scale="1"/>', "follow"))
-    )
+    played = scene(2, ("Ego", follow_points(timed, "follow")))
     assert played.at(0.5).x == pytest.approx(107.5)
 
 
 @pytest.mark.parametrize("later", [False, True])
 def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Run, later: bool) -> None:
     """At 20 m/s from x = 110, in an event as in Init: x = 150 after 2 s."""
-    timing = '<Timing domainAbsoluteRelative="relative" offset="0" scale="1"/>'
-    action = trajectory([(110.0, -2.0, None), (500.0, -2.0, None)], timing)
+    action = follow_points([(110.0, -2.0, None), (500.0, -2.0, None)], reference=RELATIVE)
     warnings: list[str] = []
 
     def look(simulation: Simulation, frame: Frame) -> None:
@@ -264,12 +250,9 @@ def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Run
 
 
 def test_trajectory_without_timing_holds_the_lateral_domain_only(scene: RunScene) -> None:
-    step = """<PrivateAction><LongitudinalAction><SpeedAction>
-      <SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
-      <SpeedActionTarget><AbsoluteTargetSpeed value="5"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
-      </PrivateAction>"""
-    later = '<ByValueCondition><SimulationTimeCondition value="0.15" rule="greaterThan"/></ByValueCondition>'
-    played = scene(2, ("Ego", trajectory(CORNER, "<None/>")), ("Ego", step, later), ("Ego", change(lane(-2)), later))
+    step = speed_xml(5)
+    later = after(0.15)
+    played = scene(2, ("Ego", follow_points(CORNER)), ("Ego", step, later), ("Ego", change(lane(-2)), later))
     assert played.at(0.3).speed == 5.0
     assert played.when("action 0", "completeState") == pytest.approx(0.2)
 
@@ -296,7 +279,7 @@ def test_preempted_init_trajectory_is_no_longer_followed(run: Run) -> None:
         followed[round(frame.view.time, 3)] = simulation.storyboard.context.actors["Ego"].trajectory is not None
 
     aside = offset('<AbsoluteTargetLaneOffset value="1"/>')
-    init = f'<Private entityRef="Ego">{trajectory(CORNER, "<None/>")}</Private>'
+    init = f'<Private entityRef="Ego">{follow_points(CORNER)}</Private>'
     run(1, ("Ego", aside, after(0.45)), driven=False, init=init, during=look)
     assert followed[0.4]
     assert not followed[0.6]

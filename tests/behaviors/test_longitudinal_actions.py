@@ -11,6 +11,7 @@ import pytest
 from eidrive_behaviors.actions.speed import duration_over
 from eidrive_behaviors.actions.speed_profile import smoothed_segments
 from recorded_scene import RunScene
+from street_scene import after
 
 
 def speed(target: str, shape: str = "linear", dimension: str = "time", value: float = 0.0) -> str:
@@ -79,7 +80,7 @@ def test_speed_action_relative_target_is_reached(scene: RunScene, value: float, 
 
 @pytest.mark.element("SpeedAction")
 def test_speed_action_continuous_follows_until_it_is_preempted(scene: RunScene) -> None:
-    later = '<ByValueCondition><SimulationTimeCondition value="2.95" rule="greaterThan"/></ByValueCondition>'
+    later = after(2.95)
     played = scene(
         4,
         ("Other", speed(absolute(20), "linear", "rate", 5)),
@@ -121,7 +122,7 @@ def profile(mode: str, *entries: tuple[float | None, float], rates: str = "") ->
 @pytest.mark.parametrize("step_first", [True, False])
 def test_speed_step_beside_profile_sets_the_start_of_the_profile(scene: RunScene, step_first: bool) -> None:
     """At 0.5 s from 20 m/s to 0 at once, from there to 4 m/s within 4 s: v = t - 0.5 s."""
-    later = '<ByValueCondition><SimulationTimeCondition value="0.45" rule="greaterThan"/></ByValueCondition>'
+    later = after(0.45)
     step, rise = speed(absolute(0), "step"), profile("position", (4.0, 4.0))
     actions = [step, rise] if step_first else [rise, step]
     played = scene(6, ("Ego", '</Action><Action name="second">'.join(actions), later))

@@ -11,6 +11,7 @@ from itertools import pairwise
 import pytest
 from eidrive_behaviors.actions.speed import slope_limit
 from recorded_scene import RecordedScene, RunScene
+from storyboard_xml import speed_xml
 from street_scene import after
 from whole_run import Run
 
@@ -50,13 +51,6 @@ def keep(displacement: str, limits: str = LIMITS) -> str:
       continuous="true" coordinateSystem="lane" displacement="{displacement}">{limits}</LongitudinalDistanceAction>""")
 
 
-def speed(value: float, dimension: str = "time", extent: float = 0.0) -> str:
-    shape = "linear" if extent else "step"
-    return longitudinal(f"""<SpeedAction>
-      <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="{dimension}" value="{extent}"/>
-      <SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget></SpeedAction>""")
-
-
 def largest_slip(played: RecordedScene, dt: float) -> float:
     """Return the maximum speed across the mean heading of a step [m/s]; 0 without side slip."""
     worst = 0.0
@@ -84,7 +78,9 @@ def test_lateral_motion_follows_the_heading_forwards_and_backwards(scene: RunSce
 @pytest.mark.element("LaneOffsetAction", "LateralDistanceAction", "LaneChangeAction")
 @pytest.mark.parametrize("action", [offset(1.0), beside(), change("cubic", "time", 4.0)])
 def test_lateral_motion_at_standstill_waits_for_speed(scene: RunScene, action: str) -> None:
-    played = scene(8, ("Ego", action), ("Ego", speed(5.0), after(1.95)), ego=(-1, 300.0, 0.0), other=(-1, 330.0, 0.0))
+    played = scene(
+        8, ("Ego", action), ("Ego", speed_xml(5.0), after(1.95)), ego=(-1, 300.0, 0.0), other=(-1, 330.0, 0.0)
+    )
     assert {played.at(0.1 * n).y for n in range(21)} == {-2.0}
     assert abs(played.at(8.0).y + 2.0) > 0.9
 
@@ -159,7 +155,7 @@ def test_slope_limit_depends_on_acceleration_or_deceleration(start: float, targe
 @pytest.mark.element("SpeedAction")
 def test_braking_from_negative_speed_is_limited_by_the_deceleration(scene: RunScene) -> None:
     """From -20 m/s at 4 m/s² to standstill takes 5 s, although the maximum acceleration is 10 m/s²."""
-    played = scene(6, ("Ego", speed(0.0, "rate", 50.0)), ego=(-1, 500.0, -20.0), brakes=4.0)
+    played = scene(6, ("Ego", speed_xml(0.0, 50.0, dimension="rate")), ego=(-1, 500.0, -20.0), brakes=4.0)
     assert played.at(2.0).speed == pytest.approx(-12.0)
     assert played.when("action 0", "completeState") == pytest.approx(5.0)
 
@@ -208,7 +204,7 @@ def test_synchronize_with_opposite_final_speed_arrives_at_standstill(run: Run, w
 @pytest.mark.element("EndOfRoadCondition")
 def test_end_of_road_ends_after_driving_backwards(run: Run) -> None:
     """At 20 m/s from 980 m, Ego is at the end, 1000 m, after 1 s; from 2 s it drives backwards."""
-    played = run(4.0, ("Ego", speed(-5.0), after(1.995)), driven=False, ego=(-1, 980.0, 20.0), during=_record_end)
+    played = run(4.0, ("Ego", speed_xml(-5.0), after(1.995)), driven=False, ego=(-1, 980.0, 20.0), during=_record_end)
     assert played.x("Ego")[round(1.5 / 0.05)] == pytest.approx(1000.0)
     assert ENDS[1.5]
     assert played.x("Ego")[-1] == pytest.approx(990.0, abs=0.3)

@@ -5,21 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from recorded_scene import RunScene
+from storyboard_xml import global_xml, private_xml
+from street_scene import after
 
 from eidrive_scenario.api.actions import CustomCommand, LightState, Override, Visibility
 from eidrive_scenario.errors import ScenarioError
-
-
-def after(time: float) -> str:
-    return f'<ByValueCondition><SimulationTimeCondition value="{time}" rule="greaterThan"/></ByValueCondition>'
-
-
-def private(action: str) -> str:
-    return f"<PrivateAction>{action}</PrivateAction>"
-
-
-def everywhere(action: str) -> str:
-    return f"<GlobalAction>{action}</GlobalAction>"
 
 
 @pytest.mark.element("AssignRouteAction")
@@ -27,7 +17,7 @@ def test_assigned_route_is_the_path_of_a_driven_vehicle(scene: RunScene) -> None
     position = '<Position><LanePosition roadId="1" laneId="-1" s="{}"/></Position>'
     waypoint = f'<Waypoint routeStrategy="shortest">{position}</Waypoint>'
     route = f'<Route name="way" closed="false">{waypoint.format(120)}{waypoint.format(400)}</Route>'
-    action = private(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
+    action = private_xml(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
     path = scene(0.2, ("Ego", action), driven=True).commands[0].goals["Ego"].path
     assert path is not None
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [400.0, -2.0]])
@@ -36,7 +26,7 @@ def test_assigned_route_is_the_path_of_a_driven_vehicle(scene: RunScene) -> None
 @pytest.mark.element("AcquirePositionAction")
 def test_acquire_position_assigns_a_route_from_the_actor(scene: RunScene) -> None:
     position = '<Position><LanePosition roadId="1" laneId="-1" s="300"/></Position>'
-    action = private(f"<RoutingAction><AcquirePositionAction>{position}</AcquirePositionAction></RoutingAction>")
+    action = private_xml(f"<RoutingAction><AcquirePositionAction>{position}</AcquirePositionAction></RoutingAction>")
     path = scene(0.2, ("Ego", action), driven=True).commands[0].goals["Ego"].path
     assert path is not None
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [300.0, -2.0]])
@@ -54,15 +44,17 @@ def test_route_to_unreachable_position_is_rejected_with_its_line(scene: RunScene
     """The position is behind the actor, in a lane of the same direction."""
     behind, further = (f'<Position><LanePosition roadId="1" laneId="-2" s="{s}"/></Position>' for s in (50, 20))
     with pytest.raises(ScenarioError, match=r"scene\.xosc:\d+: .*no route over the lanes leads from road '1' lane -"):
-        scene(0.2, ("Ego", private(f"<RoutingAction>{action.format(behind, further)}</RoutingAction>")))
+        scene(0.2, ("Ego", private_xml(f"<RoutingAction>{action.format(behind, further)}</RoutingAction>")))
 
 
 @pytest.mark.element("ActivateControllerAction")
 def test_deactivated_controller_leaves_the_actor_in_its_lane(scene: RunScene) -> None:
-    off = private(
+    off = private_xml(
         '<ControllerAction><ActivateControllerAction lateral="false" longitudinal="false"/></ControllerAction>'
     )
-    on = private('<ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/></ControllerAction>')
+    on = private_xml(
+        '<ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/></ControllerAction>'
+    )
     played = scene(1.0, ("Ego", off, after(0.25)), ("Ego", on, after(0.65)), driven=True)
     assert [("Ego" in commands.driven) for commands in played.commands] == [True] * 3 + [False] * 4 + [True] * 4
     assert played.at(0.3).x == 100.0
@@ -74,12 +66,12 @@ def test_driven_vehicle_starts_with_the_speed_of_init(scene: RunScene) -> None:
 
 
 def test_controller_with_one_active_domain_is_not_driving(scene: RunScene) -> None:
-    off = private('<ControllerAction><ActivateControllerAction lateral="false"/></ControllerAction>')
+    off = private_xml('<ControllerAction><ActivateControllerAction lateral="false"/></ControllerAction>')
     assert scene(0.3, ("Ego", off), driven=True).commands[-1].driven == frozenset()
 
 
 def test_assignment_of_eidrive_controller_during_the_run_is_rejected(scene: RunScene) -> None:
-    action = private("""<ControllerAction><AssignControllerAction activateLateral="true"><ObjectController>
+    action = private_xml("""<ControllerAction><AssignControllerAction activateLateral="true"><ObjectController>
       <Controller name="late" controllerType="movement"><Properties>
       <Property name="module" value="eidrive"/></Properties></Controller></ObjectController></AssignControllerAction>
       </ControllerAction>""")
@@ -88,7 +80,7 @@ def test_assignment_of_eidrive_controller_during_the_run_is_rejected(scene: RunS
 
 
 def test_pedal_override_lasts_until_its_release(scene: RunScene) -> None:
-    hold = private(
+    hold = private_xml(
         '<ControllerAction><OverrideControllerValueAction><Brake active="{}"><BrakePercent value="0.5"/></Brake>'
         "</OverrideControllerValueAction></ControllerAction>"
     )
@@ -99,13 +91,13 @@ def test_pedal_override_lasts_until_its_release(scene: RunScene) -> None:
 
 @pytest.mark.element("VariableSetAction", "VariableModifyAction", "VariableCondition", "VariableDeclaration")
 def test_variable_set_and_modify_apply_to_conditions(scene: RunScene) -> None:
-    triple = everywhere(
+    triple = global_xml(
         '<VariableAction variableRef="Mood"><ModifyAction><Rule><MultiplyByValue value="3"/></Rule></ModifyAction>'
         "</VariableAction>"
     )
-    number = everywhere('<VariableAction variableRef="Mood"><SetAction value="7"/></VariableAction>')
+    number = global_xml('<VariableAction variableRef="Mood"><SetAction value="7"/></VariableAction>')
     seen = '<ByValueCondition><VariableCondition variableRef="Mood" rule="equalTo" value="{}"/></ByValueCondition>'
-    nothing = private('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
+    nothing = private_xml('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
     played = scene(
         1,
         ("Ego", number, after(0.15)),
@@ -129,11 +121,11 @@ def test_parameter_set_and_modify_apply_to_conditions(scene: RunScene) -> None:
         rule.format('<AddValue value="-1"/>'),
     )
     seen = '<ByValueCondition><ParameterCondition parameterRef="Level" rule="equalTo" value="{}"/></ByValueCondition>'
-    nothing = private('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
+    nothing = private_xml('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
     played = scene(
         1,
         *(
-            ("Ego", everywhere(action.format(change)), after(t))
+            ("Ego", global_xml(action.format(change)), after(t))
             for change, t in zip(changes, (0.15, 0.35, 0.55), strict=True)
         ),
         *(("Ego", nothing, seen.format(value)) for value in (2, 7, 21, 20)),
@@ -145,17 +137,17 @@ def test_variable_modify_of_text_is_rejected(scene: RunScene) -> None:
     rule = '<Rule><AddValue value="3"/></Rule>'
     add = f'<VariableAction variableRef="Mood"><ModifyAction>{rule}</ModifyAction></VariableAction>'
     with pytest.raises(ScenarioError, match=r"Mood is not a number \(got 'calm'; expected a number\)"):
-        scene(0.2, ("Ego", everywhere(add)))
+        scene(0.2, ("Ego", global_xml(add)))
 
 
 @pytest.mark.element("TrafficSignalStateAction", "TrafficSignalCondition")
 def test_signal_state_applies_to_conditions_in_the_same_tick(scene: RunScene) -> None:
-    change = everywhere(
+    change = global_xml(
         "<InfrastructureAction><TrafficSignalAction>"
         '<TrafficSignalStateAction name="17" state="green"/></TrafficSignalAction></InfrastructureAction>'
     )
     green = '<ByValueCondition><TrafficSignalCondition name="17" state="green"/></ByValueCondition>'
-    nothing = private('<VisibilityAction graphics="true" sensors="false" traffic="true"/>')
+    nothing = private_xml('<VisibilityAction graphics="true" sensors="false" traffic="true"/>')
     played = scene(0.5, ("Ego", change, after(0.15)), ("Ego", nothing, green))
     assert played.commands[2].signals == {"17": "green"}
     assert played.when("event 1", "runningState") == pytest.approx(0.2)
@@ -164,13 +156,13 @@ def test_signal_state_applies_to_conditions_in_the_same_tick(scene: RunScene) ->
 
 @pytest.mark.element("TimeOfDayCondition")
 def test_time_of_day_condition_follows_the_environment_clock(scene: RunScene) -> None:
-    environment = everywhere(
+    environment = global_xml(
         '<EnvironmentAction><Environment name="noon"><TimeOfDay animation="true" dateTime="2024-06-01T12:00:00"/>'
         "</Environment></EnvironmentAction>"
     )
     past = '<TimeOfDayCondition rule="greaterThan" dateTime="2024-06-01T12:00:00.45"/>'
     noon = f"<ByValueCondition>{past}</ByValueCondition>"
-    nothing = private('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
+    nothing = private_xml('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
     played = scene(1, ("Ego", environment, after(0.15)), ("Ego", nothing, noon))
     noon_environment = played.commands[2].environment
     assert noon_environment is not None
@@ -180,7 +172,7 @@ def test_time_of_day_condition_follows_the_environment_clock(scene: RunScene) ->
 
 @pytest.mark.element("LightStateAction")
 def test_light_actions_on_different_lights_do_not_preempt(scene: RunScene) -> None:
-    light = private(
+    light = private_xml(
         '<AppearanceAction><LightStateAction transitionTime="{}"><LightType><VehicleLight vehicleLightType="{}"/>'
         '</LightType><LightState mode="{}"/></LightStateAction></AppearanceAction>'
     )

@@ -5,50 +5,33 @@ from __future__ import annotations
 import math
 
 import pytest
-from street_scene import CAR, GROUP, private
-from whole_run import FILE, Run
+from opendrive_xml import junction_xml, map_xml, predecessor_xml, successor_xml
+from openscenario_xml import scenario_xml
+from storyboard_xml import init_xml, private_xml
+from street_scene import THROUGH, lane_road
+from whole_run import Run
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
-RANDOM = private("<RoutingAction><RandomRouteAction/></RoutingAction>")
+RANDOM = private_xml("<RoutingAction><RandomRouteAction/></RoutingAction>")
 LONG, TURN = 40.0, math.pi / 6
 """Length of the connecting roads [m], and turning angle of the curved ones [rad]."""
-
-
-def road(number: int, pose: tuple[float, float, float], length: float, shape: str, links: str, lane: str = "") -> str:
-    junction = 9 if number > 10 else -1
-    x, y, h = pose
-    return f"""<road name="" length="{length}" id="{number}" junction="{junction}"><link>{links}</link>
-      <planView><geometry s="0" x="{x}" y="{y}" hdg="{h}" length="{length}">{shape}</geometry></planView>
-      <lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center><right>
-      <lane id="-1" type="driving" level="false"><link>{lane}</link><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>
-      </right></laneSection></lanes></road>"""
 
 
 def fork() -> str:
     """Return a junction: road 1 leads into connecting roads 11 (left), 12 (straight), 13 (right), those into roads 2,
     3, 4.
     """
-    roads = road(1, (0, 0, 0), 50, "<line/>", '<successor elementType="junction" elementId="9"/>')
+    roads = [lane_road(1, 0.0, 0.0, 0.0, 50.0, successor_xml(junction="9"))]
     for number, curvature in ((11, TURN / LONG), (12, 0.0), (13, -TURN / LONG)):
-        shape = f'<arc curvature="{curvature}"/>' if curvature else "<line/>"
-        links = f"""<predecessor elementType="road" elementId="1" contactPoint="end"/>
-          <successor elementType="road" elementId="{number - 9}" contactPoint="start"/>"""
-        lane = '<predecessor id="-1"/><successor id="-1"/>'
-        roads += road(number, (50, 0, 0), LONG, shape, links, lane)
+        link = predecessor_xml("1") + successor_xml(str(number - 9))
+        roads.append(lane_road(number, 50.0, 0.0, 0.0, LONG, link, THROUGH, curvature=curvature, junction="9"))
         turn = curvature * LONG
         x, y = (math.sin(turn) / curvature, (1 - math.cos(turn)) / curvature) if curvature else (LONG, 0.0)
-        links = '<predecessor elementType="junction" elementId="9"/>'
-        roads += road(number - 9, (50 + x, y, turn), 200, "<line/>", links)
-    connections = "".join(
-        f'<connection id="{number}" incomingRoad="1" connectingRoad="{number}" contactPoint="start">'
-        '<laneLink from="-1" to="-1"/></connection>'
-        for number in (11, 12, 13)
-    )
-    return f"""<OpenDRIVE><header revMajor="1" revMinor="6"/>{roads}
-      <junction id="9" name="">{connections}</junction></OpenDRIVE>"""
+        roads.append(lane_road(number - 9, 50.0 + x, y, turn, 200.0, predecessor_xml(junction="9")))
+    return map_xml(*roads, rest=junction_xml("9", "1", {"11": -1, "12": -1, "13": -1}))
 
 
 @pytest.mark.element("RandomRouteAction")
@@ -69,7 +52,7 @@ def test_random_route_ends_with_an_assigned_route(run: Run) -> None:
     waypoint = '<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="{}" laneId="-1" s="{}"/></Position>'
     waypoints = "".join(waypoint.format(*place) + "</Waypoint>" for place in ((1, 25), (4, 150)))
     route = f'<Route name="to the right" closed="false">{waypoints}</Route>'
-    assign = private(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
+    assign = private_xml(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
     for seed in range(6):
         played = run(
             7.5, ("Ego", RANDOM), ("Ego", assign), street=fork(), ego=(-1, 20.0, 15.0), seed=seed, driven=False
@@ -78,15 +61,6 @@ def test_random_route_ends_with_an_assigned_route(run: Run) -> None:
 
 
 def test_random_route_without_roads_is_rejected() -> None:
-    text = FILE.format(
-        cars=CAR.format(name="Ego", controller=""),
-        more="",
-        everywhere="",
-        start="",
-        private=f'<Private entityRef="Ego">{RANDOM}</Private>',
-        groups=GROUP.format(number=0, actor="Ego", action=RANDOM, trigger=""),
-        end=1,
-        signals="",
-    ).replace('<LogicFile filepath="street.xodr"/>', "")
+    scenario = load_scenario(scenario_xml(init=init_xml("Ego", RANDOM)))
     with pytest.raises(ScenarioError, match="RandomRouteAction: the scenario has no road network"):
-        Storyboard(load_scenario(text.encode()), None, dt=0.1)
+        Storyboard(scenario, None, dt=0.1)

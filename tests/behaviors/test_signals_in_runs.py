@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from street_scene import NOTHING, after, everywhere
+from storyboard_xml import global_xml
+from street_scene import NOTHING, after
 from whole_run import Run
 
 from eidrive_scenario.errors import InputError
@@ -22,7 +23,7 @@ LIGHTS = """<TrafficSignals><TrafficSignalController name="crossing">
 def test_signal_phases_are_executed_and_recorded(run: Run, tmp_path: Path) -> None:
     go = '<ByValueCondition><TrafficSignalControllerCondition trafficSignalControllerRef="crossing" phase="stop"/>'
     red = '<ByValueCondition><TrafficSignalCondition name="7" state="ON;OFF;OFF"/></ByValueCondition>'
-    restart = everywhere(
+    restart = global_xml(
         "<InfrastructureAction><TrafficSignalAction><TrafficSignalControllerAction "
         'trafficSignalControllerRef="crossing" phase="go"/></TrafficSignalAction></InfrastructureAction>'
     )
@@ -56,7 +57,7 @@ def test_signal_phases_are_executed_and_recorded(run: Run, tmp_path: Path) -> No
 )
 def test_unknown_signal_phase_is_rejected_before_the_run(run: Run, phase: str, expected: str) -> None:
     reference = f'trafficSignalControllerRef="crossing" phase="{phase}"'
-    action = everywhere(
+    action = global_xml(
         f"<InfrastructureAction><TrafficSignalAction><TrafficSignalControllerAction {reference}/></TrafficSignalAction>"
         "</InfrastructureAction>"
     )

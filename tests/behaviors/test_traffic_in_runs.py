@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from street_scene import STREET, TRIGGER
+from opendrive_xml import lane_xml, section_xml
+from storyboard_xml import by_entity_xml, speed_xml
+from street_scene import street
 from traffic_scene import (
-    CATEGORIES,
-    DEFINITION,
-    DRIVER,
-    FASTER,
     PEDESTRIAN,
-    VEHICLE,
     area,
     at_time,
+    crowd,
+    definition,
     distribution,
     position,
     road_range,
@@ -27,19 +25,11 @@ from traffic_scene import (
     swarm,
     traffic,
 )
-from whole_run import RecordedRun
+from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
-
-Run = Callable[..., RecordedRun]
-
-
-def crowd(played: RecordedRun, time: float, name: str = "crowd") -> list[str]:
-    """Return the names of the road users of a traffic at a time."""
-    frame = played.frames[round(time / 0.05)]
-    return [one for one in frame.view.names if one.startswith(f"{name}.")]
 
 
 @pytest.mark.element("TrafficSwarmAction")
@@ -58,9 +48,7 @@ def test_swarm_in_init_is_present_after_the_first_step(run: Run) -> None:
 
 
 def test_swarm_velocity_is_the_initial_speed(run: Run) -> None:
-    played = run(
-        0.1, globally=traffic(swarm(more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b")), velocity="21"))
-    )
+    played = run(0.1, globally=traffic(swarm(more=definition(a="b"), velocity="21")))
     frame = played.frames[1]
     speeds = [float(frame.view.speed[frame.view.row(name)]) for name in crowd(played, 0.05)]
     assert speeds == pytest.approx([21.0] * 12, abs=0.5)
@@ -177,13 +165,13 @@ def test_area_by_polygon_is_filled_once_and_completes(run: Run) -> None:
 
 
 def test_area_pedestrians_walk_on_sidewalks(run: Run) -> None:
-    walk = '<lane id="-3" type="sidewalk"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right>'
+    lanes = "".join(lane_xml(-number, 4) for number in (1, 2)) + lane_xml(-3, 3, kind="sidewalk")
     entities = distribution((1.0, PEDESTRIAN))
     played = run(
         6.0,
         driven=False,
         globally=traffic(area(4, "true", road_range(300.0, 400.0), entities)),
-        street=STREET.replace("</right>", walk),
+        street=street(section_xml(right=lanes)),
     )
     frame = played.frames[-1]
     rows = [frame.view.row(name) for name in crowd(played, 5.9)]
@@ -191,46 +179,6 @@ def test_area_pedestrians_walk_on_sidewalks(run: Run) -> None:
     assert {frame.view.categories[row] for row in rows} == {"pedestrian"}
     assert frame.view.position[rows, 1] == pytest.approx(-9.5)
     assert all(1.0 < speed < 1.7 for speed in frame.view.speed[rows])
-
-
-@pytest.mark.element("TrafficDefinition", "TrafficDistribution")
-def test_traffic_mix_follows_shares_of_categories_and_entities(run: Run) -> None:
-    categories = '<VehicleCategoryDistributionEntry category="{}" weight="{}"/>'
-    mixed = categories.format("truck", 1) + categories.format("car", 1) + categories.format("bicycle", 0)
-    played = run(0.1, globally=traffic(swarm(40, reach=400, more=DEFINITION.format(mixed, DRIVER.format("a", "b")))))
-    frame = played.frames[1]
-    drawn = [frame.view.categories[frame.view.row(name)] for name in crowd(played, 0.05)]
-    assert 10 <= drawn.count("truck") <= 30
-    assert set(drawn) == {"car", "truck"}
-    played = run(0.1, globally=traffic(swarm(20, reach=400, more=distribution((1.0, VEHICLE.format(5))))))
-    frame = played.frames[1]
-    rows = [frame.view.row(name) for name in crowd(played, 0.05)]
-    assert len(rows) == 20
-    assert {tuple(size) for size in frame.view.size[rows].tolist()} == {(3.0, 1.5, 1.5)}
-    assert max(frame.view.speed[rows]) <= 5.01
-
-
-def test_traffic_controller_properties_set_the_driver_model(run: Run) -> None:
-    def lead_gap(time_gap: float) -> float:
-        properties = "".join(
-            f'<Property name="{name}" value="{value}"/>'
-            for name, value in (("module", "eidrive.traffic"), ("time_gap", time_gap))
-        )
-        driver = f'<Controller name="d"><Properties>{properties}</Properties></Controller>'
-        definition = DEFINITION.format(CATEGORIES, driver)
-        played = run(
-            40.0,
-            driven=False,
-            ego=(-1, 140.0, 8.0),
-            globally=traffic(source(0.04, 100.0, more=definition, speed=8.0)),
-            street=STREET.replace('<lane id="-2" type="driving"', '<lane id="-2" type="none"'),
-        )
-        frame = played.frames[-1]
-        return float(
-            frame.view.position[frame.view.row("Ego"), 0] - frame.view.position[frame.view.row("crowd.0001"), 0]
-        )
-
-    assert lead_gap(2.5) - lead_gap(0.8) == pytest.approx(1.7 * 8.0, rel=0.25)
 
 
 @pytest.mark.parametrize(
@@ -245,17 +193,7 @@ def test_traffic_controller_properties_set_the_driver_model(run: Run) -> None:
         (swarm(center="Egon"), "Egon"),
         (swarm(more=distribution((0.0, PEDESTRIAN))), "are invalid; give weights of at least 0"),
         (area(2, "true", road_range(0.0, 10.0).replace('roadId="1"', 'roadId="9"', 1)), "road '9' does not exist"),
-        (
-            swarm(
-                more=DEFINITION.format(
-                    CATEGORIES,
-                    DRIVER.format("module", "eidrive.traffic").replace(
-                        "</Properties>", '<Property name="time_gab" value="1"/></Properties>'
-                    ),
-                )
-            ),
-            "time_gab",
-        ),
+        (swarm(more=definition(module="eidrive.traffic", time_gab=1)), "time_gab"),
     ],
 )
 def test_invalid_traffic_action_is_rejected_before_the_run(run: Run, inside: str, message: str) -> None:
@@ -280,15 +218,11 @@ def test_traffic_without_roads_is_rejected(run: Run, tmp_path: Path) -> None:
 
 def test_collision_condition_by_type_includes_background_traffic(run: Run) -> None:
     """Ego follows a car that has just come from a source at 5 m/s, and accelerates into it."""
-    touch = (
-        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>'
-        '</TriggeringEntities><EntityCondition><CollisionCondition><ByType type="vehicle"/></CollisionCondition>'
-        "</EntityCondition></ByEntityCondition>"
-    )
+    touch = by_entity_xml('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>')
     played = run(
         8.0,
         ("Ego", traffic("<TrafficStopAction/>"), touch),
-        ("Ego", FASTER, at_time(1.0)),
+        ("Ego", speed_xml(30), at_time(1.0)),
         driven=False,
         ego=(-1, 100.0, 5.0),
         globally=traffic(source(0.01, 130.0, speed=5.0)),
@@ -311,54 +245,3 @@ def test_traffic_with_equal_seed_has_equal_trace_in_another_process(run: Run, tm
     printed = subprocess.run([sys.executable, "-c", code, scene], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == played.result.trace_hash
     assert not math.isnan(played.result.simulated_s)
-
-
-@pytest.mark.parametrize(
-    ("version", "inside", "warned"),
-    [
-        ("0", swarm(9, velocity="9", more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b"))), False),
-        ("1", source(1.0, 300.0, more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b")), velocity=9), False),
-        (
-            "2",
-            swarm(
-                9,
-                more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b"))
-                + '<SpeedRange lowerLimit="8.5" upperLimit="9.4"/>'
-                + '<AreaDistribution front="1" rear="0" left="0" right="0"/>',
-            ),
-            False,
-        ),
-        ("3", swarm(9, velocity="9", more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b"))), True),
-    ],
-)
-def test_deprecated_traffic_elements_warn_in_newer_versions(
-    run: Run, tmp_path: Path, version: str, inside: str, warned: bool
-) -> None:
-    run(0.2)
-    text = (tmp_path / "scene.xosc").read_text()
-    name = ' trafficName="crowd"' if version != "0" else ""
-    text = text.replace('revMinor="3"', f'revMinor="{version}"').replace(
-        "<Actions>", f"<Actions><GlobalAction><TrafficAction{name}>{inside}</TrafficAction></GlobalAction>"
-    )
-    start, end = text.index("<MonitorDeclarations>"), text.index("</MonitorDeclarations>")
-    text = text[:start] + text[end + len("</MonitorDeclarations>") :]
-    if version in "012":
-        start_trigger = TRIGGER.format(edge="none", condition=at_time(0.0))
-        text = text.replace("</Axles></Vehicle>", "</Axles><Properties/></Vehicle>")
-        text = text.replace("</ManeuverGroup></Act>", f"</ManeuverGroup>{start_trigger}</Act>")
-        text = text.replace("</Action></Event>", f"</Action>{start_trigger}</Event>")
-        text = text.replace("greaterOrEqual", "greaterThan")
-    text = text.replace(' controllerType="movement"', "") if version in "01" else text
-    path = tmp_path / "older.xosc"
-    path.write_text(text)
-    simulation = Simulation(load_scenario(path))
-    with simulation:
-        simulation.tick()
-        frame, _ = simulation.tick()
-    rows = [row for name, row in frame.view.rows.items() if name != "Ego"]
-    assert len(rows) == (1 if version == "1" else 9)
-    assert frame.view.speed[rows] == pytest.approx([9.0] * len(rows), abs=0.6)
-    if version == "2":
-        assert min(frame.view.position[rows, 0]) > frame.view.position[frame.view.row("Ego"), 0]
-    deprecated = [str(warning) for warning in simulation.scenario.warnings if "deprecated" in str(warning)]
-    assert any("velocity" in one or "TrafficDefinition" in one for one in deprecated) is warned

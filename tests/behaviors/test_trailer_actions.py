@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 
 import pytest
-from street_scene import STREET, after, everywhere, private
+from storyboard_xml import global_xml, private_xml, speed_xml
+from street_scene import after, street
 from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
@@ -21,19 +22,16 @@ TRAIN = f"""<ScenarioObject name="Truck"><Vehicle name="truck" vehicleCategory="
     <TrailerCoupler dx="3"/></Vehicle></ScenarioObject>"""
 PLACE = """<EntityAction entityRef="{}"><AddEntityAction><Position>
   <LanePosition roadId="1" laneId="-1" s="{}"/></Position></AddEntityAction></EntityAction>"""
-COUPLE = private('<TrailerAction><ConnectTrailerAction trailerRef="Trailer"/></TrailerAction>')
-UNCOUPLE = private("<TrailerAction><DisconnectTrailerAction/></TrailerAction>")
-DRIVE = private(
-    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>'
-    '<SpeedActionTarget><AbsoluteTargetSpeed value="10"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-)
-ASIDE = private("""<LateralAction><LaneChangeAction>
+COUPLE = private_xml('<TrailerAction><ConnectTrailerAction trailerRef="Trailer"/></TrailerAction>')
+UNCOUPLE = private_xml("<TrailerAction><DisconnectTrailerAction/></TrailerAction>")
+DRIVE = speed_xml(10)
+ASIDE = private_xml("""<LateralAction><LaneChangeAction>
   <LaneChangeActionDynamics dynamicsShape="cubic" dynamicsDimension="time" value="3"/>
   <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
 
 
 def play(run: Run, end: float, *steps: tuple[str, ...]) -> RecordedRun:
-    placed = everywhere(PLACE.format("Truck", 200)) + everywhere(PLACE.format("Trailer", 196))
+    placed = global_xml(PLACE.format("Truck", 200)) + global_xml(PLACE.format("Trailer", 196))
     return run(end, *steps, driven=False, ego=(1, 900.0, 0.0), more=TRAIN, globally=placed)
 
 
@@ -84,7 +82,7 @@ def test_trailer_of_itself_is_rejected(run: Run) -> None:
     """Front tows A, A tows B, and B tows A."""
     train = link("Front", "A") + link("A", "B") + link("B", "A")
     with pytest.raises(InputError) as caught:
-        run(1, driven=False, more=train, globally=everywhere(PLACE.format("Front", 200)))
+        run(1, driven=False, more=train, globally=global_xml(PLACE.format("Front", 200)))
     messages = [diagnostic.message for diagnostic in caught.value.diagnostics]
     assert messages == ["entity 'A' is its own trailer", "entity 'B' is its own trailer"]
 
@@ -92,7 +90,7 @@ def test_trailer_of_itself_is_rejected(run: Run) -> None:
 def test_trailer_of_two_vehicles_follows_the_first(run: Run) -> None:
     """This also holds after it tows the second one itself."""
     train = link("First", "A") + link("Second", "A") + link("A")
-    placed = everywhere(PLACE.format("First", 200)) + everywhere(PLACE.format("Second", 192))
+    placed = global_xml(PLACE.format("First", 200)) + global_xml(PLACE.format("Second", 192))
     couple = COUPLE.replace('Trailer"', 'Second"')
     played = run(1, ("A", couple, after(0.5)), driven=False, ego=(1, 900.0, 0.0), more=train, globally=placed)
     assert played.x("A") == pytest.approx([196.0] * len(played.frames))
@@ -109,11 +107,10 @@ def test_trailer_of_two_vehicles_follows_the_first(run: Run) -> None:
     ],
 )  # fmt: skip
 def test_trailer_on_a_slope_stands_on_the_road(run: Run, elevation: str, height: Callable[[float], float]) -> None:
-    street = STREET.replace("<lanes>", f"<elevationProfile>{elevation}</elevationProfile><lanes>")
-    placed = everywhere(PLACE.format("Truck", 200)) + everywhere(PLACE.format("Trailer", 196))
+    placed = global_xml(PLACE.format("Truck", 200)) + global_xml(PLACE.format("Trailer", 196))
     played = run(
         5, ("Truck", COUPLE), ("Truck", DRIVE), driven=False, ego=(1, 900.0, 0.0), more=TRAIN, globally=placed,
-        street=street,
+        street=street(profiles=f"<elevationProfile>{elevation}</elevationProfile>"),
     )  # fmt: skip
     for frame in played.frames:
         for name in ("Truck", "Trailer"):

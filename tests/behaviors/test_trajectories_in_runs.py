@@ -7,48 +7,14 @@ from itertools import pairwise
 
 import pytest
 from recorded_scene import RunScene
+from storyboard_xml import speed_xml, teleport_xml
 from street_scene import after
+from trajectories import curve, follow, on_road, world
 from whole_run import RecordedRun, Run
 
 from eidrive_scenario.simulation import RunSettings
 
 HALF_TURN = math.pi
-
-
-def world(x: float, y: float, h: float | None = None) -> str:
-    heading = "" if h is None else f' h="{h}"'
-    return f'<WorldPosition x="{x}" y="{y}"{heading}/>'
-
-
-def on_road(s: float, t: float) -> str:
-    return f'<RoadPosition roadId="1" s="{s}" t="{t}"/>'
-
-
-def curve(*places: str, closed: bool = False, times: tuple[float, ...] = ()) -> str:
-    clock = [f' time="{time}"' for time in times] or [""] * len(places)
-    vertices = "".join(
-        f"<Vertex{at}><Position>{place}</Position></Vertex>" for place, at in zip(places, clock, strict=True)
-    )
-    shape = f"<Shape><Polyline>{vertices}</Polyline></Shape>"
-    return f'<Trajectory name="way" closed="{str(closed).lower()}">{shape}</Trajectory>'
-
-
-def follow(way: str, mode: str = "position", reference: str = "<None/>") -> str:
-    return f"""<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef>{way}</TrajectoryRef>
-      <TimeReference>{reference}</TimeReference><TrajectoryFollowingMode followingMode="{mode}"/>
-      </FollowTrajectoryAction></RoutingAction></PrivateAction>"""
-
-
-def teleport(place: str) -> str:
-    return f"<PrivateAction><TeleportAction><Position>{place}</Position></TeleportAction></PrivateAction>"
-
-
-def speed(value: float, seconds: float = 0.0) -> str:
-    shape = "linear" if seconds else "step"
-    return f"""<PrivateAction><LongitudinalAction><SpeedAction>
-      <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{seconds}"/>
-      <SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
-      </PrivateAction>"""
 
 
 WALKER = """<ScenarioObject name="Walker"><Pedestrian name="w" pedestrianCategory="pedestrian" mass="70">
@@ -80,7 +46,7 @@ BACK_ON_ROAD = curve(on_road(500.0, 0.0), on_road(50.0, 0.0))
 @pytest.mark.parametrize("order", ["teleport speed follow", "speed follow teleport", "follow teleport speed"])
 def test_trajectory_with_negative_speed_leads_backwards_in_any_order(run: Run, mode: str, way: str, order: str) -> None:
     """At -5 m/s from x = 150, facing along the curve: x = 150 - 5 t."""
-    parts = {"teleport": teleport(world(150.0, -2.0, 0.0)), "speed": speed(-5.0), "follow": follow(way, mode)}
+    parts = {"teleport": teleport_xml(world(150.0, -2.0, 0.0)), "speed": speed_xml(-5.0), "follow": follow(way, mode)}
     played = drive(run, *(parts[name] for name in order.split()))
     for time in (0.05, 1.0, 3.0):
         assert row(played, time) == pytest.approx((150.0 - 5.0 * time, -2.0, 0.0, -5.0), abs=1e-6)
@@ -90,7 +56,11 @@ def test_trajectory_with_negative_speed_leads_backwards_in_any_order(run: Run, m
 @pytest.mark.parametrize("order", ["teleport speed follow", "speed follow teleport", "follow speed teleport"])
 def test_trajectory_against_the_heading_is_driven_in_reverse(run: Run, mode: str, order: str) -> None:
     """Reversing car of Euro NCAP's CPRA: it faces along the road, and its trajectory leads back on it."""
-    parts = {"teleport": teleport(world(500.0, 0.0, 0.0)), "speed": speed(-5.0), "follow": follow(BACK_ON_ROAD, mode)}
+    parts = {
+        "teleport": teleport_xml(world(500.0, 0.0, 0.0)),
+        "speed": speed_xml(-5.0),
+        "follow": follow(BACK_ON_ROAD, mode),
+    }
     played = drive(run, *(parts[name] for name in order.split()))
     for time in (0.0, 0.05, 1.0, 3.0):
         assert row(played, time) == pytest.approx((500.0 - 5.0 * time, 0.0, 0.0, -5.0), abs=1e-6)
@@ -100,7 +70,7 @@ def test_trajectory_of_absent_reversing_actor_uses_the_lane_heading(run: Run) ->
     lane = '<LanePosition roadId="1" laneId="-1" s="{}"/>'
     back = curve(lane.format(500), lane.format(50))
     walker = WALKER
-    for order in ((speed(-5.0), follow(back)), (follow(back), speed(-5.0))):
+    for order in ((speed_xml(-5.0), follow(back)), (follow(back), speed_xml(-5.0))):
         init = f'<Private entityRef="Walker">{"".join(order)}</Private>'
         played = run(2.0, driven=False, more=walker, init=init)
         for time in (0.0, 1.0, 2.0):
@@ -113,7 +83,7 @@ def test_trajectory_with_change_of_direction_is_driven_back(run: Run, mode: str)
     way = curve(world(100.0, -2.0), world(900.0, -2.0))
     played = run(
         4.0,
-        ("Ego", speed(-10.0, 2.0), after(0.995)),
+        ("Ego", speed_xml(-10.0, 2.0), after(0.995)),
         driven=False,
         ego=(-1, 100.0, 10.0),
         init=f'<Private entityRef="Ego">{follow(way, mode)}</Private>',
@@ -129,7 +99,7 @@ def test_trajectory_with_change_of_direction_is_driven_back(run: Run, mode: str)
 def test_trajectory_in_reverse_respects_the_maximum_steering_angle(run: Run) -> None:
     """The maximum curvature is tan 0.5 / 3 m; the corner is behind the car, at (80, -2)."""
     way = curve(world(100.0, -2.0), world(80.0, -2.0), world(80.0, -42.0))
-    played = drive(run, teleport(world(100.0, -2.0, 0.0)), speed(-5.0), follow(way, "follow"), end=11.0)
+    played = drive(run, teleport_xml(world(100.0, -2.0, 0.0)), speed_xml(-5.0), follow(way, "follow"), end=11.0)
     largest = math.tan(0.5) / 3.0
     places = [row(played, 0.05 * n) for n in range(len(played.frames))]
     for before, now in pairwise(places):
@@ -193,8 +163,8 @@ def test_synchronize_with_reversing_master_arrives_with_it(run: Run) -> None:
     """The master is at the target after 20 m at -5 m/s, at 4 s; the walker arrives with it at 1 m/s."""
     master_way = curve(on_road(500.0, 0.0), on_road(50.0, 0.0))
     at_480 = f'<TrajectoryPosition s="20"><TrajectoryRef>{master_way}</TrajectoryRef></TrajectoryPosition>'
-    init = f'<Private entityRef="Ego">{teleport(world(500.0, 0.0, 0.0))}'
-    init += f'{speed(-5.0)}{follow(master_way)}</Private><Private entityRef="Walker">{follow(CROSSING)}</Private>'
+    init = f'<Private entityRef="Ego">{teleport_xml(world(500.0, 0.0, 0.0))}'
+    init += f'{speed_xml(-5.0)}{follow(master_way)}</Private><Private entityRef="Walker">{follow(CROSSING)}</Private>'
     played = run(
         5.0,
         ("Walker", together(ON_IT, '<AbsoluteSpeed value="1"/>', at_480)),
@@ -228,14 +198,14 @@ def test_trajectory_position_refers_to_the_tangent_not_vertex_headings(run: Run)
     place = f'<TrajectoryPosition s="50" t="-10"><TrajectoryRef>{way}</TrajectoryRef>{{}}</TrajectoryPosition>'
     turned = '<Orientation type="relative" h="0.3"/>'
     for orientation, h in (("", 0.0), (turned, 0.3)):
-        played = drive(run, teleport(place.format(orientation)), speed(0.0), end=0.1)
+        played = drive(run, teleport_xml(place.format(orientation)), speed_xml(0.0), end=0.1)
         assert row(played, 0.0) == pytest.approx((150.0, -10.0, h, 0.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("trajectory_first", [True, False])
 def test_synchronize_started_with_the_trajectory_measures_along_it(run: Run, trajectory_first: bool) -> None:
     """Along the road the walker is already at its target; along its trajectory 3.61 m remain."""
-    start = f'<Private entityRef="Walker">{teleport(world(150.0, -6.0, math.pi / 2))}{speed(0.0)}</Private>'
+    start = f'<Private entityRef="Walker">{teleport_xml(world(150.0, -6.0, math.pi / 2))}{speed_xml(0.0)}</Private>'
     steps = [("Walker", follow(CROSSING)), ("Walker", together(world(150.0, -2.39), STEADY))]
     played = run(
         7.0,
@@ -253,7 +223,7 @@ def test_synchronize_started_with_the_trajectory_measures_along_it(run: Run, tra
 def test_trajectory_end_off_the_road_continues_straight(run: Run) -> None:
     """The street is 12 m wide: at y = 20 the car does not move along it at 90°."""
     way = curve(world(150.0, -6.0), world(150.0, 20.0))
-    played = drive(run, speed(10.0), teleport(world(150.0, -6.0, math.pi / 2)), follow(way), end=4.0)
+    played = drive(run, speed_xml(10.0), teleport_xml(world(150.0, -6.0, math.pi / 2)), follow(way), end=4.0)
     assert row(played, 4.0) == pytest.approx((150.0, 34.0, math.pi / 2, 10.0), abs=1e-6)
 
 
@@ -261,7 +231,7 @@ def test_trajectory_initial_offset_is_limited_to_its_length(run: Run) -> None:
     action = follow(AHEAD.replace('x="900.0"', 'x="160.0"')).replace(
         "<FollowTrajectoryAction>", '<FollowTrajectoryAction initialDistanceOffset="25">'
     )
-    played = drive(run, speed(10.0), action, end=1.0)
+    played = drive(run, speed_xml(10.0), action, end=1.0)
     assert row(played, 0.0)[0] == pytest.approx(160.0)
     assert row(played, 1.0) == pytest.approx((170.0, -2.0, 0.0, 10.0), abs=1e-6)
 

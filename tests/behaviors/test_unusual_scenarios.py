@@ -6,16 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from street_scene import NOTHING, after, everywhere, private
+from storyboard_xml import global_xml, private_xml, speed_xml
+from street_scene import NOTHING, after
 from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError
 
 GROUPS = """<EntitySelection name="all"><Members><ByType objectType="vehicle"/></Members></EntitySelection>"""
-PROFILE = private(
-    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>'
-    '<SpeedActionTarget><AbsoluteTargetSpeed value="5"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-)
+PROFILE = speed_xml(5, 2)
 FOLLOW = """<RoutingAction><FollowTrajectoryAction>{trajectory}<TimeReference><None/></TimeReference>
   <TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
 CLOTHOID = """<TrajectoryRef><Trajectory name="way" closed="false"><Shape><Clothoid curvature="0" curvaturePrime="0"
@@ -32,7 +30,7 @@ def assert_states_are_finite(played: RecordedRun) -> None:
 
 @pytest.mark.parametrize("actors", [("Ego", "Ego"), ("Ego", "all"), ("all", "all")])
 def test_actor_listed_twice_acts_once(run: Run, actors: tuple[str, str]) -> None:
-    played = run(3, ('"/><EntityRef entityRef="'.join(actors), PROFILE), driven=False, more=GROUPS)
+    played = run(3, (" ".join(actors), PROFILE), driven=False, more=GROUPS)
     assert played.of("Ego", "speed")[-1] == 5
     assert played.of("Ego", "speed")[20] == pytest.approx(12.5)
 
@@ -41,11 +39,11 @@ def test_missing_trajectory_is_rejected_with_its_line(run: Run) -> None:
     with pytest.raises(
         InputError, match=r"scene\.xosc:\d+: FollowTrajectoryAction: Trajectory is missing; define it in place"
     ):
-        run(1, ("Ego", private(FOLLOW.format(trajectory=""))), driven=False)
+        run(1, ("Ego", private_xml(FOLLOW.format(trajectory=""))), driven=False)
 
 
 def test_trajectory_of_a_thousand_kilometers_starts(run: Run) -> None:
-    played = run(1, ("Ego", private(FOLLOW.format(trajectory=CLOTHOID.format(length=1e6)))), driven=False)
+    played = run(1, ("Ego", private_xml(FOLLOW.format(trajectory=CLOTHOID.format(length=1e6)))), driven=False)
     assert played.x("Ego")[-1] == pytest.approx(120.0)
 
 
@@ -55,7 +53,7 @@ WEATHER = """<EnvironmentAction><Environment name="storm"><Weather><Wind directi
 
 def test_infinite_visual_range_and_extreme_wind_are_accepted(run: Run) -> None:
     """An infinite visual range is the standard's notation for no fog."""
-    played = run(0.2, ("Ego", everywhere(WEATHER.format(wind=300, fog="INF"))), driven=False)
+    played = run(0.2, ("Ego", global_xml(WEATHER.format(wind=300, fog="INF"))), driven=False)
     environment = played.frames[-1].environment
     assert environment is not None
     assert environment.fog_range == math.inf
@@ -64,7 +62,7 @@ def test_infinite_visual_range_and_extreme_wind_are_accepted(run: Run) -> None:
 
 def test_negative_wind_speed_is_rejected(run: Run) -> None:
     with pytest.raises(InputError, match=r"scene\.xosc:\d+: speed of Wind is -1; a number of at least 0 is expected"):
-        run(0.2, ("Ego", everywhere(WEATHER.format(wind=-1, fog=100))), driven=False)
+        run(0.2, ("Ego", global_xml(WEATHER.format(wind=-1, fog=100))), driven=False)
 
 
 ON_ROUTE = """<TeleportAction><Position><RoutePosition><RouteRef><Route name="way" closed="false">
@@ -77,7 +75,7 @@ ON_ROUTE = """<TeleportAction><Position><RoutePosition><RouteRef><Route name="wa
 def test_route_position_in_missing_lane_is_rejected_with_its_line(run: Run) -> None:
     message = r"scene\.xosc:\d+: RoutePosition: not resolvable: road '1' has no lane 7 at s = 150"
     with pytest.raises(InputError, match=message):
-        run(1, ("Ego", private(ON_ROUTE)), driven=False)
+        run(1, ("Ego", private_xml(ON_ROUTE)), driven=False)
 
 
 FAR = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="way" closed="false"><Shape><Polyline>
@@ -96,7 +94,7 @@ def test_traveled_distance_excludes_the_teleport_to_a_trajectory(run: Run, timin
     traveled = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
       </TriggeringEntities><EntityCondition><TraveledDistanceCondition value="50"/></EntityCondition>
       </ByEntityCondition>"""
-    steps = (("Ego", private(FAR.format(timing=timing)), after(0.975)), ("Ego", NOTHING, traveled))
+    steps = (("Ego", private_xml(FAR.format(timing=timing)), after(0.975)), ("Ego", NOTHING, traveled))
     played = run(3, *steps, driven=False)
     assert played.x("Ego")[19:22] == pytest.approx([119.0, 120.0, start])
     assert played.of("Ego", "speed") == pytest.approx([20.0] * len(played.frames))
@@ -106,7 +104,7 @@ def test_traveled_distance_excludes_the_teleport_to_a_trajectory(run: Run, timin
 
 def test_longitudinal_distance_is_limited_by_the_maximum_speed(run: Run) -> None:
     """A time gap to the actor itself is never reached; the Performance of the car is limited to 70 m/s."""
-    gap = private(
+    gap = private_xml(
         '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="true" freespace="false" '
         'timeGap="10"><DynamicConstraints maxAcceleration="100"/></LongitudinalDistanceAction></LongitudinalAction>'
     )

@@ -5,7 +5,8 @@ from __future__ import annotations
 from datetime import datetime
 
 import pytest
-from street_scene import NOTHING, after, everywhere, private
+from storyboard_xml import global_xml, private_xml
+from street_scene import NOTHING, after
 from whole_run import Run
 
 from eidrive_scenario.recording.frame import Frame
@@ -15,12 +16,12 @@ from eidrive_scenario.storyboard.state.states import ElementTransition
 
 @pytest.mark.element("EnvironmentAction")
 def test_environment_action_keeps_omitted_values(run: Run) -> None:
-    first = everywhere("""<EnvironmentAction><Environment name="morning">
+    first = global_xml("""<EnvironmentAction><Environment name="morning">
       <TimeOfDay animation="true" dateTime="2024-06-01T06:00:00"/>
       <Weather fractionalCloudCover="fourOktas" temperature="283"><Sun azimuth="1" elevation="0.2" illuminance="9000"/>
       <Fog visualRange="150"/><Precipitation precipitationType="rain" precipitationIntensity="4"/></Weather>
       <RoadCondition frictionScaleFactor="0.7"/></Environment></EnvironmentAction>""")
-    later = everywhere(
+    later = global_xml(
         '<EnvironmentAction><Environment name="clearer"><Weather><Fog visualRange="900"/></Weather></Environment>'
         "</EnvironmentAction>"
     )
@@ -62,7 +63,7 @@ def test_monitor_is_in_frames_metrics_and_verdict(run: Run) -> None:
         '<UserDefinedAction><CustomCommandAction type="eidrive.criterion">[{{monitor: {{of: Passed{0}}}}}]'
         "</CustomCommandAction></UserDefinedAction>"
     )
-    passed = everywhere('<SetMonitorAction monitorRef="Passed" value="true"/>')
+    passed = global_xml('<SetMonitorAction monitorRef="Passed" value="true"/>')
     played = run(2, ("Ego", passed, after(1.0)), globally=criterion.format(""))
     assert [frame.monitors["Passed"] for frame in played.frames] == [False] * 21 + [True] * 20
     assert played.result.metrics["monitor.Passed"] == 1.0
@@ -76,12 +77,12 @@ def test_monitor_is_in_frames_metrics_and_verdict(run: Run) -> None:
 
 @pytest.mark.element("LightStateAction", "AnimationAction")
 def test_light_and_animation_states_are_in_the_frames(run: Run) -> None:
-    light = private("""<AppearanceAction><LightStateAction transitionTime="0.5"><LightType><UserDefinedLight
+    light = private_xml("""<AppearanceAction><LightStateAction transitionTime="0.5"><LightType><UserDefinedLight
       userDefinedLightType="rotating beacon"/></LightType><LightState mode="flashing" flashingOnDuration="0.2"
       flashingOffDuration="0.3" luminousIntensity="40"><Color colorType="blue">
       <ColorRgb red="0" green="0" blue="1"/></Color></LightState></LightStateAction>
       </AppearanceAction>""")
-    door = private("""<AppearanceAction><AnimationAction animationDuration="1"><AnimationType><ComponentAnimation>
+    door = private_xml("""<AppearanceAction><AnimationAction animationDuration="1"><AnimationType><ComponentAnimation>
       <VehicleComponent vehicleComponentType="doorFrontLeft"/></ComponentAnimation></AnimationType>
       <AnimationState state="0.8"/></AnimationAction></AppearanceAction>""")
     played = run(2, ("Ego", light, after(0.3)), ("Ego", door, after(0.5)))
@@ -111,14 +112,14 @@ def test_light_and_animation_states_are_in_the_frames(run: Run) -> None:
     ],
 )
 def test_light_color_is_converted_to_rgb(run: Run, color: str, expected: tuple[float, ...]) -> None:
-    light = private(f"""<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="highBeam"/>
+    light = private_xml(f"""<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="highBeam"/>
       </LightType><LightState mode="on"><Color {color}</Color></LightState></LightStateAction></AppearanceAction>""")
     found = run(0.2, ("Ego", light)).frames[-1].appearances["Ego"].lights["highBeam"].color
     assert found == pytest.approx(expected)
 
 
 def test_light_brightness_changes_over_its_transition(run: Run) -> None:
-    light = private("""<AppearanceAction><LightStateAction transitionTime="1"><LightType><VehicleLight
+    light = private_xml("""<AppearanceAction><LightStateAction transitionTime="1"><LightType><VehicleLight
       vehicleLightType="lowBeam"/></LightType><LightState mode="{}"/></LightStateAction></AppearanceAction>""")
     lights = run(0.5, ("Ego", light.format("on"))).frames[-1].appearances["Ego"].lights
     assert [lights["lowBeam"].brightness(t) for t in (0.0, 0.25, 1.0, 3.0)] == [0.0, 0.25, 1.0, 1.0]
@@ -128,7 +129,7 @@ def test_light_brightness_changes_over_its_transition(run: Run) -> None:
 
 @pytest.mark.element("AnimationAction")
 def test_pedestrian_animation_in_a_loop_does_not_end(run: Run) -> None:
-    wave = private("""<AppearanceAction><AnimationAction loop="true" animationDuration="0.2"><AnimationType>
+    wave = private_xml("""<AppearanceAction><AnimationAction loop="true" animationDuration="0.2"><AnimationType>
       <PedestrianAnimation motion="standing"><PedestrianGesture gesture="wavingRightArm"/></PedestrianAnimation>
       </AnimationType></AnimationAction></AppearanceAction>""")
     played = run(1, ("Ego", wave))
@@ -141,7 +142,7 @@ def test_pedestrian_animation_in_a_loop_does_not_end(run: Run) -> None:
 
 @pytest.mark.element("VisibilityAction")
 def test_visibility_action_hides_an_entity_from_sensors_only(run: Run) -> None:
-    hide = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
+    hide = private_xml('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
     played = run(
         2,
         ("Other", hide.format("false"), after(0.5)),
@@ -155,7 +156,7 @@ def test_visibility_action_hides_an_entity_from_sensors_only(run: Run) -> None:
 
 @pytest.mark.element("VisibilityAction")
 def test_sensor_reference_set_hides_from_listed_sensors_only(run: Run) -> None:
-    hide = private("""<VisibilityAction graphics="true" sensors="{}" traffic="true"><SensorReferenceSet>
+    hide = private_xml("""<VisibilityAction graphics="true" sensors="{}" traffic="true"><SensorReferenceSet>
       <SensorReference name="{}"/></SensorReferenceSet></VisibilityAction>""")
     played = run(
         2,

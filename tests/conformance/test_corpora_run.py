@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
+from corpora import corpora_folder, corpora_name, needs_corpora, scenario_files
 from lxml import etree
 from reference_traces import END
 
@@ -16,8 +15,7 @@ from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation
 
-CORPORA = os.environ.get("EIDRIVE_CORPORA", "")
-pytestmark = pytest.mark.skipif(not CORPORA, reason="EIDRIVE_CORPORA does not say where the third-party scenarios are")
+pytestmark = needs_corpora
 
 ENDS = {"stop trigger", "storyboard complete", "time limit"}
 BROKEN = {
@@ -31,10 +29,10 @@ SMALLEST = {"esmini": 65, "alks": 15, "asam-1.2.0": 13, "asam-1.3.1": 14, "scena
 def scenarios() -> list[str]:
     """Return the files with a storyboard; the others are catalogs and distributions."""
     found = []
-    for path in sorted(Path(CORPORA).rglob("*.xosc")) if CORPORA else ():
+    for path in scenario_files():
         root = etree.parse(path, etree.XMLParser(recover=True)).getroot()
         if root is not None and root.find("Storyboard") is not None:
-            found.append(path.relative_to(CORPORA).as_posix())
+            found.append(corpora_name(path))
     return found or ["none"]
 
 
@@ -57,14 +55,14 @@ class PresenceObserver:
 
 @pytest.fixture(autouse=True)
 def maps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("EIDRIVE_MAPS", str(Path(CORPORA) / "carla_towns"))
+    monkeypatch.setenv("EIDRIVE_MAPS", str(corpora_folder() / "carla_towns"))
 
 
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", [name for name in scenarios() if name not in BROKEN])
 @pytest.mark.filterwarnings("default")
 def test_corpora_scenario_runs_to_its_end(name: str, record_property: Callable[[str, object], None]) -> None:
-    scenario, watch = load_scenario(Path(CORPORA) / name), PresenceObserver()
+    scenario, watch = load_scenario(corpora_folder() / name), PresenceObserver()
     settings = RunSettings(dt=0.05, time_limit=60.0)
     result = Simulation(scenario, settings=settings, observers=[watch]).run()
     record_property(END, f"{name}: {result.end_reason} at {result.simulated_s:.2f} s")
@@ -82,7 +80,7 @@ def _placed(private: object) -> bool:
 @pytest.mark.parametrize("name", BROKEN)
 def test_corpora_invalid_scenario_has_expected_error(name: str, record_property: Callable[[str, object], None]) -> None:
     with pytest.raises(ScenarioError) as caught:
-        load_scenario(Path(CORPORA) / name)
+        load_scenario(corpora_folder() / name)
     assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
     record_property(END, f"{name}: refused, as {BROKEN[name]} at line {caught.value.diagnostics[0].line}")
 
@@ -105,7 +103,7 @@ def test_corpora_scenarios_are_all_covered() -> None:
 )
 def test_carla_scenarios_start_on_lanes_in_driving_direction(name: str, entity: str, lane: tuple[str, int]) -> None:
     """Their world positions have the left-handed axes of CARLA; with y to the left they are outside of the town."""
-    scenario = load_scenario(Path(CORPORA) / "scenario_runner" / f"{name}.xosc")
+    scenario = load_scenario(corpora_folder() / "scenario_runner" / f"{name}.xosc")
     with Simulation(scenario, settings=RunSettings(dt=0.05)) as simulation:
         simulation.tick()
         stage = simulation.storyboard.context

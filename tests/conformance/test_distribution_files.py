@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import time
 import tracemalloc
 from pathlib import Path
 
 import pytest
+from corpora import needs_corpora, scenario_files
 
 from eidrive_scenario.checks.distribution_checks import check_distribution
 from eidrive_scenario.errors import ConstraintError
@@ -15,15 +15,14 @@ from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 
-CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
-pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA names no folder with distribution files")
+pytestmark = needs_corpora
 
 LARGEST = "alks_scenario_4_4_1_cut_in_no_collision_variation.xosc"
 TRIGGER = "CutInVehicle_HeadwayDistanceTrigger_dx0_m"
 
 
 def distributions() -> list[Path]:
-    return [path for path in sorted(CORPORA.rglob("*.xosc")) if definition(path) == "distribution"] if CORPORA else []
+    return [path for path in scenario_files() if definition(path) == "distribution"]
 
 
 def test_distribution_files_are_all_covered() -> None:

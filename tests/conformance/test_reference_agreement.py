@@ -6,18 +6,16 @@ change of a named element within 0.05 s. A table of all deviations is printed at
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
+from corpora import CORPORA, corpora_folder, needs_corpora
 from reference_traces import LINE, comparable, compare, line_of, source_of
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
 
-CORPORA = os.environ.get("EIDRIVE_CORPORA", "")
-pytestmark = pytest.mark.skipif(not CORPORA, reason="EIDRIVE_CORPORA is not set")
+pytestmark = needs_corpora
 
 NOT_MET = {
     "esmini__auto_light": (
@@ -56,7 +54,7 @@ NOT_MET = {
 
 
 def names() -> list[str]:
-    return comparable(Path(CORPORA)) if CORPORA else ["none"]
+    return comparable(CORPORA) if CORPORA else ["none"]
 
 
 @pytest.mark.timeout(240)
@@ -65,7 +63,7 @@ def names() -> list[str]:
 def test_scenario_matches_reference_or_known_deviation(
     name: str, record_property: Callable[[str, object], None]
 ) -> None:
-    found = compare(source_of(Path(CORPORA), name), Path(CORPORA) / "reference", name)
+    found = compare(source_of(corpora_folder(), name), corpora_folder() / "reference", name)
     record_property(LINE, line_of(name, found) + (f"  - {NOT_MET[name]}" if name in NOT_MET else ""))
     beyond = {actor: drift for actor, drift in found.actors.items() if not drift.within}
     if name in NOT_MET:
@@ -83,7 +81,7 @@ def test_known_deviations_are_compared_scenarios() -> None:
 @pytest.mark.parametrize("name", ["ALKS__alks_scenario_4_2_1_fully_blocking_target_template", "esmini__acc-test"])
 @pytest.mark.filterwarnings("default")
 def test_unknown_controller_without_model_keeps_lane_and_speed(name: str) -> None:
-    scenario = load_scenario(source_of(Path(CORPORA), name))
+    scenario = load_scenario(source_of(corpora_folder(), name))
     with Simulation(scenario, settings=RunSettings(dt=0.1)) as simulation:
         frames = [simulation.tick()[0] for _ in range(100)]
         warnings = [str(warning) for warning in simulation.storyboard.context.warnings]

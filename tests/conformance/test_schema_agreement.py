@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from corpora import corpora_folder, corpora_name, needs_corpora, scenario_files
 from lxml import etree
 
 from eidrive_scenario.errors import ScenarioError
@@ -26,8 +27,7 @@ from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.reading.document import read_root
 from eidrive_scenario.openscenario.reading.parsing import open_document
 
-CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
-pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA names no folder with files and schemas")
+pytestmark = needs_corpora
 
 MUTANTS_OF_A_KIND = 300
 SEED = 20260131
@@ -220,19 +220,10 @@ MUTATIONS: list[Mutation] = [
 ]
 
 
-def files() -> list[Path]:
-    return sorted(CORPORA.rglob("*.xosc")) if CORPORA else []
-
-
-def name_of(path: Path) -> str:
-    assert CORPORA is not None
-    return path.relative_to(CORPORA).as_posix()
-
-
 def mutants(count: int, seed: int, changes: int = 1) -> Iterator[tuple[Path, str, bytes]]:
     """Yield `count` changed files for each kind of mutation, evenly from all files."""
     dice = random.Random(seed)
-    trees = {path: etree.parse(path).getroot() for path in files()}
+    trees = {path: etree.parse(path).getroot() for path in scenario_files()}
     pool = Pool(list(trees.values()))
     paths = list(trees)
     for kind in MUTATIONS:
@@ -251,8 +242,7 @@ def mutants(count: int, seed: int, changes: int = 1) -> Iterator[tuple[Path, str
 
 @pytest.fixture(scope="module")
 def judge() -> Validator:
-    assert CORPORA is not None
-    return Validator(CORPORA / "schema")
+    return Validator(corpora_folder() / "schema")
 
 
 def table(judged: list[Verdict]) -> list[str]:
@@ -282,7 +272,7 @@ def assert_explained(judged: list[Verdict], capsys: pytest.CaptureFixture[str]) 
 
 def test_reader_and_schema_agree_on_every_file(judge: Validator, capsys: pytest.CaptureFixture[str]) -> None:
     """Five catalogs have version 0.9 without a schema; the schema of 1.0 and the reader reject them."""
-    judged = [judge.judge(name_of(path), path.read_bytes(), ("1", "0")) for path in files()]
+    judged = [judge.judge(corpora_name(path), path.read_bytes(), ("1", "0")) for path in scenario_files()]
     assert len(judged) > 150
     assert sum(not one.agreed for one in judged) <= 1
     assert_explained(judged, capsys)
@@ -292,7 +282,7 @@ def test_reader_and_schema_agree_on_mutants(judge: Validator, capsys: pytest.Cap
     judged = []
     for path, kind, xml in mutants(MUTANTS_OF_A_KIND, SEED):
         version = judge.version_of(etree.parse(path).getroot()) or ("1", "0")
-        judged.append(judge.judge(f"{name_of(path)} {kind}", xml, version))
+        judged.append(judge.judge(f"{corpora_name(path)} {kind}", xml, version))
     assert len(judged) == len(MUTATIONS) * MUTANTS_OF_A_KIND
     assert sum(not one.schema for one in judged) > 500
     assert sum(bool(one.schema) for one in judged) > 1500
@@ -301,8 +291,7 @@ def test_reader_and_schema_agree_on_mutants(judge: Validator, capsys: pytest.Cap
 
 def test_mutants_raise_only_scenario_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     """The file is loaded with its catalogs and the path of its road file, or expanded."""
-    assert CORPORA is not None
-    folders = sorted({str(path.parent) for path in CORPORA.rglob("*.xodr")})
+    folders = sorted({str(path.parent) for path in corpora_folder().rglob("*.xodr")})
     monkeypatch.setenv("EIDRIVE_MAPS", os.pathsep.join(folders))
     taken = refused = 0
     for path, _, xml in itertools.chain(mutants(60, SEED + 1), mutants(30, SEED + 2, changes=3)):

@@ -1,4 +1,4 @@
-"""Import path and shared fixtures of the engine tests."""
+"""Shared fixtures of the engine tests."""
 
 from __future__ import annotations
 
@@ -7,17 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from faulty_extensions import BROKEN_MODULES, install
 
-sys.path.insert(0, str(Path(__file__).parent / "shared"))
+from eidrive_scenario.registry import registry
 
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Install the package of faulty extensions and return its folder."""
-    from faulty_extensions import BROKEN_MODULES, install
-
-    from eidrive_scenario.registry import registry
-
     folder = install(tmp_path_factory.mktemp("faulty"))
     registry.cache_clear()
     with pytest.MonkeyPatch.context() as patch:

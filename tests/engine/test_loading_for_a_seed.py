@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from openscenario_xml import deterministic_xml, distribution_xml, values_xml
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import resolve_scenario
@@ -97,12 +98,7 @@ def test_unknown_library_name_suggests_the_nearest() -> None:
 
 def test_run_of_a_distribution_keeps_its_number_and_values(tmp_path: Path) -> None:
     distribution = tmp_path / "speeds.xosc"
-    distribution.write_text(
-        f"""<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
-        <ParameterValueDistribution><ScenarioFile filepath="{resolve_scenario(ONE)}"/><Deterministic>
-        <DeterministicSingleParameterDistribution parameterName="EgoSpeed"><DistributionSet>
-        <Element value="5"/><Element value="7"/></DistributionSet></DeterministicSingleParameterDistribution>
-        </Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
-    )
+    body = deterministic_xml(values_xml("EgoSpeed", "5", "7"))
+    distribution.write_bytes(distribution_xml(body, scenario=resolve_scenario(ONE)))
     results = [run_file(run, settings=SHORT) for run in load_distribution(distribution)]
     assert [(result.run, result.parameters["EgoSpeed"]) for result in results] == [(0, "5"), (1, "7")]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from openscenario_xml import catalog_xml, deterministic_xml, distribution_xml, parameters_xml, single_xml
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -79,13 +80,8 @@ def test_expression_sets_the_loss(make: Make) -> None:
 def test_distribution_varies_delay_and_results_tell_runs_apart(make: Make, tmp_path: Path) -> None:
     distribution = tmp_path / "latencies.xosc"
     make(DELAY)
-    distribution.write_text(
-        """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
-        <ParameterValueDistribution><ScenarioFile filepath="varied.xosc"/><Deterministic>
-        <DeterministicSingleParameterDistribution parameterName="Latency"><DistributionRange stepWidth="0.2">
-        <Range lowerLimit="0.0" upperLimit="0.4"/></DistributionRange></DeterministicSingleParameterDistribution>
-        </Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
-    )
+    steps = '<DistributionRange stepWidth="0.2"><Range lowerLimit="0.0" upperLimit="0.4"/></DistributionRange>'
+    distribution.write_bytes(distribution_xml(deterministic_xml(single_xml("Latency", steps)), scenario="varied.xosc"))
     printed = CliRunner().invoke(app, ["run", str(distribution), "--json", "--time-limit", "3"]).stdout
     runs = [json.loads(line) for line in printed.splitlines()]
     assert [float(run["parameters"]["Latency"]) for run in runs] == pytest.approx([0.0, 0.2, 0.4])
@@ -106,15 +102,12 @@ def test_text_parameter_names_a_criterion(make: Make) -> None:
 
 
 def test_controller_of_a_catalog_uses_its_own_parameters(make: Make, tmp_path: Path) -> None:
-    header = '<FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>'
-    catalog = (
-        f'<OpenSCENARIO>{header}<Catalog name="stacks"><Controller name="stack"><ParameterDeclarations>'
-        '<ParameterDeclaration name="West" parameterType="double" value="1"/></ParameterDeclarations><Properties>'
+    controller = (
+        f'<Controller name="stack">{parameters_xml(West=("double", "1"))}<Properties>'
         '<Property name="module" value="eidrive"/><Property name="planner" value="conflict_area"/>'
         '<Property name="conflict_area" value="[$West, 32.0, ${$West / 10}, 10.5]"/></Properties></Controller>'
-        "</Catalog></OpenSCENARIO>"
     )
-    (tmp_path / "stacks.xosc").write_text(catalog)
+    (tmp_path / "stacks.xosc").write_bytes(catalog_xml("stacks", controller))
     text = make("ideal").read_text()
     start, end = text.index("<ObjectController>"), text.index("</ObjectController>")
     path = make(
@@ -129,12 +122,12 @@ def test_controller_of_a_catalog_uses_its_own_parameters(make: Make, tmp_path: P
     with Simulation(path, settings=RunSettings(parameters={"Gap": "28"})) as simulation:
         area = simulation.resolved.stations["Ego"]["planner_settings"]["conflict_area"]
     assert area[0][0] == [28.0, 2.8]
-    (tmp_path / "stacks.xosc").write_text(catalog.replace("${$West", "${$Wst"))
+    (tmp_path / "stacks.xosc").write_bytes(catalog_xml("stacks", controller.replace("${$West", "${$Wst")))
     with pytest.raises(InputError) as caught:
         run_file(path)
     (diagnostic,) = caught.value.diagnostics
     assert str(diagnostic).endswith(
-        "stacks.xosc:1: setting 'conflict_area.2': unknown parameter $Wst; did you mean 'West'?"
+        "stacks.xosc:3: setting 'conflict_area.2': unknown parameter $Wst; did you mean 'West'?"
     )
 
 

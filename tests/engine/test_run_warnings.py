@@ -7,10 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from scenario_1 import edited
+from storyboard_xml import condition_xml, event_xml, maneuver_xml, time_xml, trigger_xml
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
-from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
 
 Make = Callable[..., Path]
@@ -22,12 +23,9 @@ def maneuver(name: str, at: float, *, priority: str = "parallel", limit: int = 1
     action = action or (
         '<UserDefinedAction><CustomCommandAction type="test">nothing</CustomCommandAction></UserDefinedAction>'
     )
-    return (
-        f'<Maneuver name="M{name}"><Event name="{name}" priority="{priority}" maximumExecutionCount="{limit}">'
-        f'<Action name="A{name}">{action}</Action><StartTrigger><ConditionGroup>'
-        f'<Condition name="c" delay="0" conditionEdge="none"><ByValueCondition><SimulationTimeCondition value="{at}" '
-        'rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup></StartTrigger></Event></Maneuver>'
-    )
+    start = trigger_xml(condition_xml(time_xml(at)))
+    event = event_xml(name, action, start, action_name=f"A{name}", priority=priority, count=limit)
+    return maneuver_xml(event, f"M{name}")
 
 
 @pytest.fixture
@@ -35,14 +33,7 @@ def make(tmp_path: Path) -> Make:
     """Scenario 1 with texts replaced."""
 
     def write(*edits: tuple[str, str]) -> Path:
-        source = resolve_scenario("coop/scenario_1")
-        text = source.read_text().replace('"../', f'"{source.parent.parent}/')
-        for old, new in edits:
-            assert old in text, old
-            text = text.replace(old, new, 1)
-        path = tmp_path / "edited.xosc"
-        path.write_text(text)
-        return path
+        return edited(tmp_path, *edits, count=1)
 
     return write
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from scenario_1 import FrameCollector, edited
 
 from eidrive_scenario.errors import ExtensionError, InputError
 from eidrive_scenario.library import resolve_scenario
@@ -18,21 +19,9 @@ from eidrive_scenario.world import World
 ONE = "coop/scenario_1"
 
 
-class Frames:
-    """Keeps all frames of a run."""
-
-    def __init__(self) -> None:
-        self.frames: list[Frame] = []
-        self.closed = 0
-
-    def observe(self, frame: Frame) -> None:
-        self.frames.append(frame)
-
-    def close(self) -> None:
-        self.closed += 1
-
-
-def play(name: str = ONE, seed: int = 1, *observers: Frames, channel: str | None = None, **more: object) -> RunResult:
+def play(
+    name: str = ONE, seed: int = 1, *observers: FrameCollector, channel: str | None = None, **more: object
+) -> RunResult:
     settings = RunSettings(channel=channel, **more)  # type: ignore[arg-type]
     return run_file(resolve_scenario(name), seed=seed, settings=settings, observers=observers)
 
@@ -60,16 +49,6 @@ def test_set_driven_is_called_in_order_of_names(tmp_path: Path, monkeypatch: pyt
     assert asked == sorted([*names, "Ego"])
 
 
-def edited(old: str, new: str, tmp_path: Path) -> Path:
-    """Scenario 1 with one place of its text changed, its references still leading to the library."""
-    source = resolve_scenario(ONE)
-    text = source.read_text()
-    assert old in text
-    path = tmp_path / "edited.xosc"
-    path.write_text(text.replace(old, new).replace('"../', f'"{source.parent.parent}/'))
-    return path
-
-
 @pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_2"])
 def test_hidden_car_collides_without_cooperation_only(name: str) -> None:
     alone, helped = play(name, channel="none"), play(name, channel="ideal")
@@ -83,7 +62,7 @@ def test_hidden_car_collides_without_cooperation_only(name: str) -> None:
 
 
 def test_ego_receives_detection_of_hidden_car_before_line_of_sight() -> None:
-    watch = Frames()
+    watch = FrameCollector()
     play(ONE, 1, watch, channel="ideal")
 
     def first(kind: str) -> float:
@@ -113,7 +92,7 @@ def test_equal_seed_gives_equal_trace_in_any_order_and_process() -> None:
 
 def test_total_loss_equals_no_cooperation_and_zero_loss_equals_ideal(tmp_path: Path) -> None:
     def trace(channel: str) -> list[tuple[float, ...]]:
-        watch = Frames()
+        watch = FrameCollector()
         play(ONE, 2, watch, channel=channel)
         return [tuple(frame.view.position[frame.view.rows["Ego"]].tolist()) for frame in watch.frames]
 
@@ -131,7 +110,7 @@ def test_cooperate_option_disables_cooperation() -> None:
 
 
 def test_added_roadside_unit_transmits_from_its_entry() -> None:
-    watch = Frames()
+    watch = FrameCollector()
     result = play("coop/scenario_1_late_rsu", 1, watch)
     assert "RSU" not in watch.frames[0].view
     assert "RSU" in watch.frames[-1].view
@@ -142,7 +121,7 @@ def test_channel_command_of_event_loses_all_later_messages(tmp_path: Path) -> No
     jammer = """<Action name="Jam"><UserDefinedAction><CustomCommandAction type="eidrive.channel">
         {loss: {kind: bernoulli, probability: 1.0}}</CustomCommandAction></UserDefinedAction></Action>
         <Action name="EgoSpeedsUp">"""
-    path = edited('<Action name="EgoSpeedsUp">', jammer, tmp_path)
+    path = edited(tmp_path, ('<Action name="EgoSpeedsUp">', jammer))
     result = run_file(path, seed=1)
     assert result.passed is False
     # The message of the first tick was sent before the event
@@ -168,7 +147,7 @@ def test_channel_command_of_event_loses_all_later_messages(tmp_path: Path) -> No
 def test_invalid_setting_is_reported_with_file_and_line_before_run(
     old: str, new: str, expected: str, tmp_path: Path
 ) -> None:
-    path = edited(old, new, tmp_path)
+    path = edited(tmp_path, (old, new))
     with pytest.raises(InputError) as caught:
         Simulation(load_for_seed(path, 1, {}))
     diagnostic = caught.value.diagnostics[0]
@@ -203,7 +182,7 @@ def test_drawn_parameters_differ_by_seed_and_given_ones_override() -> None:
 
 
 def test_observers_are_closed_once_after_an_exception() -> None:
-    class Breaks(Frames):
+    class Breaks(FrameCollector):
         def observe(self, frame: Frame) -> None:
             raise RuntimeError("full disk")
 
@@ -216,7 +195,7 @@ def test_observers_are_closed_once_after_an_exception() -> None:
 def test_observers_are_closed_even_if_one_raises() -> None:
     order: list[str] = []
 
-    class Closes(Frames):
+    class Closes(FrameCollector):
         def __init__(self, name: str, error: str = "") -> None:
             super().__init__()
             self.name, self.error = name, error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scenario_1 import edited
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import resolve_scenario
@@ -21,18 +22,6 @@ RAIN = """<GlobalAction><EnvironmentAction><Environment name="Shower">
 FROM_CATALOG = """<GlobalAction><EnvironmentAction>
   <CatalogReference catalogName="environments" entryName="storm"/></EnvironmentAction></GlobalAction>
 """
-
-
-def edited(tmp_path: Path, *changes: tuple[str, str]) -> Path:
-    """Scenario 1 with places of its text changed, its references still leading to the library."""
-    source = resolve_scenario("coop/scenario_1")
-    text = source.read_text()
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
-    path = tmp_path / "edited.xosc"
-    path.write_text(text.replace('"../', f'"{source.parent.parent}/'))
-    return path
 
 
 def test_environment_action_sets_light_fog_and_friction(tmp_path: Path) -> None:

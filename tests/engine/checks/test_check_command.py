@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive
+from opendrive_xml import lanes_xml, map_xml, road_xml, successor_xml
+from openscenario_xml import catalog_xml
 
 
 @pytest.fixture
@@ -71,17 +73,14 @@ def test_check_folder_without_scenarios_is_an_error(eidrive: Eidrive, tmp_path: 
     assert "no .xosc or .xodr file in" in result.stdout
 
 
-ROADS = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-<road id="1" length="100" junction="-1">{}<planView>
-<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView>
-<lanes><laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">
-<width sOffset="0" a="{}" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road></OpenDRIVE>"""
-DEAD_END = '<link><successor elementType="junction" elementId="4"/></link>'
+def write_road(path: Path, link: str = "", width: str = "3") -> None:
+    path.write_text(map_xml("\n", road_xml(link=link, lanes="\n" + lanes_xml(0, 1, width))), encoding="utf-8")
 
 
 def test_check_road_files_reports_errors_and_map_warnings(eidrive: Eidrive, tmp_path: Path) -> None:
-    for name, link, width in (("sound", "", "3"), ("doubtful", DEAD_END, "3"), ("wrong", "", "wide")):
-        (tmp_path / f"{name}.xodr").write_text(ROADS.format(link, width), encoding="utf-8")
+    write_road(tmp_path / "sound.xodr")
+    write_road(tmp_path / "doubtful.xodr", link=successor_xml(junction="4"))
+    write_road(tmp_path / "wrong.xodr", width="wide")
     (tmp_path / "broken.xodr").write_text("<OpenDRIVE>\n<road></OpenDRIVE>", encoding="utf-8")
     result = eidrive("check", tmp_path)
     assert result.exit_code == 2
@@ -91,7 +90,7 @@ def test_check_road_files_reports_errors_and_map_warnings(eidrive: Eidrive, tmp_
         f"{tmp_path}/doubtful.xodr:2: road '1' links to junction '4', which does not exist; "
         "remove the link or add the junction with its connections (warning: road-link)"
     )
-    assert wrong == f"{tmp_path}/wrong.xodr:5: <width> has a='wide'; give a finite number"
+    assert wrong == f"{tmp_path}/wrong.xodr:3: <width> has a='wide'; give a finite number"
     assert count == "4 files, 2 errors, 1 warning"
     doubtful = tmp_path / "doubtful.xodr"
     assert eidrive("check", doubtful).exit_code == 0
@@ -197,11 +196,6 @@ def test_check_circular_selections_are_an_error(eidrive: Eidrive, folder: Callab
     assert "selection 'a' is a member of itself" in result.stdout
 
 
-CATALOG = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="" author=""/>
-<Catalog name="boxes">
-{entries}
-</Catalog></OpenSCENARIO>
-"""
 ENTRY = """<MiscObject name="{name}" miscObjectCategory="obstacle" mass="10">{declared}
 <BoundingBox><Center x="{x}" y="0" z="0"/><Dimensions length="1" width="1" height="1"/></BoundingBox></MiscObject>"""
 DECLARED = """<ParameterDeclarations><ParameterDeclaration name="Limit" parameterType="{kind}" value="{value}"/>
@@ -222,7 +216,7 @@ def test_check_catalog_without_scenario_reports_errors(
 ) -> None:
     path = tmp_path / "boxes.xosc"
     text = "\n".join(ENTRY.format(name=name, declared=declared, x=x) for name, declared, x in entries)
-    path.write_text(CATALOG.format(entries=text), encoding="utf-8")
+    path.write_bytes(catalog_xml("boxes", text))
     result = eidrive("check", path)
     assert result.exit_code == 2, result.output
     assert re.search(rf"^{re.escape(str(path))}:{line}: .*({message})", result.stdout, re.MULTILINE), result.stdout
@@ -231,7 +225,7 @@ def test_check_catalog_without_scenario_reports_errors(
 def test_check_valid_catalog_reports_no_diagnostic(eidrive: Eidrive, tmp_path: Path) -> None:
     path = tmp_path / "boxes.xosc"
     declared = DECLARED.format(kind="double", value="2")
-    path.write_text(CATALOG.format(entries=ENTRY.format(name="a", declared=declared, x="$Limit")), encoding="utf-8")
+    path.write_bytes(catalog_xml("boxes", ENTRY.format(name="a", declared=declared, x="$Limit")))
     result = eidrive("check", path)
     assert (result.exit_code, result.stdout) == (0, "1 file, 0 errors, 0 warnings\n")
 

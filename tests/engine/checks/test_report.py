@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml, successor_xml
+from openscenario_xml import catalog_xml, road_file_xml, scenario_xml
 
 from eidrive_scenario.checks.catalog_checks import check_catalog
 from eidrive_scenario.checks.distribution_checks import DistributionCheckReport
@@ -16,14 +17,11 @@ from eidrive_scenario.checks.scenario_checks import check_road_file, check_scena
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic
 from eidrive_scenario.roads.model.map_warnings import MAP_RULES
 
-ROADS = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-<road id="1" length="100" junction="-1"><link><successor elementType="junction" elementId="4"/></link><planView>
-<geometry s="0" x="0" y="0" hdg="0" length="50"><line/></geometry>
-<geometry s="50" x="52" y="0" hdg="0" length="50"><line/></geometry></planView>
-<lanes><laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">
-<width sOffset="0" a="-3" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road></OpenDRIVE>"""
-CATALOG = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="" author=""/>
-<Catalog name="boxes">{entries}</Catalog></OpenSCENARIO>"""
+TWO_LINES = (
+    '<geometry s="0" x="0" y="0" hdg="0" length="50"><line/></geometry>\n'
+    '<geometry s="50" x="52" y="0" hdg="0" length="50"><line/></geometry>'
+)
+ROADS = map_xml(road_xml(link=successor_xml(junction="4"), geometry=TWO_LINES, lanes=lanes_xml(0, 1, -3)))
 
 
 def diagnostic(source: str, line: int | None, message: str = "message") -> Diagnostic:
@@ -51,12 +49,10 @@ def test_registry_defines_each_name_and_summary_once() -> None:
     assert {rule.name for rule in MAP_RULES} <= {rule.name for rule in ALL_RULES}
 
 
-def test_check_of_road_file_and_of_scenario_report_the_same_map_warnings(
-    tmp_path: Path, scenario_xml: Callable[..., bytes]
-) -> None:
+def test_check_of_road_file_and_of_scenario_report_the_same_map_warnings(tmp_path: Path) -> None:
     (tmp_path / "street.xodr").write_text(ROADS, encoding="utf-8")
     scenario = tmp_path / "scenario.xosc"
-    scenario.write_bytes(scenario_xml(road='<LogicFile filepath="street.xodr"/>'))
+    scenario.write_bytes(scenario_xml(road=road_file_xml("street.xodr")))
     of_road_file = check_road_file(tmp_path / "street.xodr").warnings
     of_scenario = [one for one in check_scenario(scenario).warnings if one.source.endswith("street.xodr")]
     assert list(of_road_file) == of_scenario
@@ -71,7 +67,7 @@ def test_check_catalog_with_many_warnings_counts_the_unlisted_ones(tmp_path: Pat
 <BoundingBox><Center x="0" y="0" z="0"/><Dimensions length="1" width="1" height="1"/></BoundingBox></MiscObject>"""
     path = tmp_path / "boxes.xosc"
     entries = "\n".join(entry.format(number) for number in range(MAX_DIAGNOSTICS + 5))
-    path.write_text(CATALOG.format(entries=entries), encoding="utf-8")
+    path.write_bytes(catalog_xml("boxes", entries))
     report = check_catalog(path)
     assert report.errors == ()
     assert len(report.warnings) == MAX_DIAGNOSTICS + 1

@@ -6,6 +6,23 @@ from pathlib import Path
 
 import pytest
 from lxml import etree
+from opendrive_xml import lanes_xml, map_xml, road_xml
+from openscenario_xml import catalog_xml, object_xml, road_file_xml, scenario_xml, vehicle_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    event_xml,
+    group_xml,
+    groups_xml,
+    init_xml,
+    lane_position_xml,
+    maneuver_xml,
+    speed_xml,
+    teleport_xml,
+    time_xml,
+    trigger_xml,
+)
 
 from eidrive_scenario.checks.registry import ALL_RULES, run_rules
 from eidrive_scenario.checks.rule import Level
@@ -14,54 +31,31 @@ from eidrive_scenario.openscenario import load_scenario
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "checks.md"
 
-ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="street" length="200" id="1" junction="-1"><link/>
-  <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
-  <lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center>
-  <right><lane id="-1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
-  </laneSection></lanes></road></OpenDRIVE>"""
+ROAD = map_xml(road_xml(length=200.0, lanes=lanes_xml(0, 1, 4)))
+CATALOG = catalog_xml("cars", vehicle_xml())
+SPEED = speed_xml(10, 2)
 
-CATALOG = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="3" date="2025-01-01T00:00:00" description="cars" author="test"/>
-<Catalog name="cars"><Vehicle name="car" vehicleCategory="car">
-  <BoundingBox><Center x="1.4" y="0" z="0.75"/><Dimensions length="4.5" width="1.8" height="1.5"/></BoundingBox>
-  <Performance maxSpeed="60" maxAcceleration="5" maxDeceleration="9"/>
-  <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
-  <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles>
-</Vehicle></Catalog></OpenSCENARIO>"""
 
-SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
-  <SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>
-  <SpeedActionTarget><AbsoluteTargetSpeed value="10"/></SpeedActionTarget>
-  </SpeedAction></LongitudinalAction></PrivateAction>"""
+def car(name: str) -> str:
+    return object_xml(name, '<CatalogReference catalogName="cars" entryName="car"/>')
 
-TIME = """<ConditionGroup><Condition name="at {0} s" delay="0" conditionEdge="none"><ByValueCondition>
-  <SimulationTimeCondition rule="greaterOrEqual" value="{0}"/></ByValueCondition></Condition></ConditionGroup>"""
 
-PLACED = """<Private entityRef="{}"><PrivateAction><TeleportAction><Position>
-  <LanePosition roadId="1" laneId="-1" s="{}"/></Position></TeleportAction></PrivateAction></Private>"""
+def at(time: float) -> str:
+    return condition_xml(time_xml(time, "greaterOrEqual"), name=f"at {time} s")
 
-SCENARIO = f"""<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="3" date="2025-01-01T00:00:00" description="a scaffold" author="test"/>
-<ParameterDeclarations/><VariableDeclarations/><MonitorDeclarations/>
-<CatalogLocations><VehicleCatalog><Directory path="."/></VehicleCatalog></CatalogLocations>
-<RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork>
-<Entities>
-  <ScenarioObject name="Ego"><CatalogReference catalogName="cars" entryName="car"/></ScenarioObject>
-  <ScenarioObject name="Other"><CatalogReference catalogName="cars" entryName="car"/></ScenarioObject>
-</Entities>
-<Storyboard><Init><Actions>{PLACED.format("Ego", 10)}{PLACED.format("Other", 50)}</Actions></Init>
-<Story name="Story"><Act name="Act">
-  <ManeuverGroup name="Group" maximumExecutionCount="1">
-    <Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>
-    <Maneuver name="Maneuver">
-      <Event name="First" priority="override"><Action name="Speed">{SPEED}</Action>
-        <StartTrigger>{TIME.format(1)}</StartTrigger></Event>
-      <Event name="Later" priority="parallel"><Action name="Speed later">{SPEED}</Action>
-        <StartTrigger>{TIME.format(9)}</StartTrigger></Event>
-    </Maneuver>
-  </ManeuverGroup>
-</Act></Story>
-<StopTrigger>{TIME.format(20)}</StopTrigger></Storyboard></OpenSCENARIO>"""
+
+EVENTS = event_xml("First", SPEED, trigger_xml(at(1)), priority="override") + event_xml(
+    "Later", SPEED, trigger_xml(at(9))
+)
+SCENARIO = scenario_xml(
+    declarations="<ParameterDeclarations/><VariableDeclarations/><MonitorDeclarations/>",
+    catalogs='<VehicleCatalog><Directory path="."/></VehicleCatalog>',
+    road=road_file_xml("street.xodr"),
+    entities=car("Ego") + car("Other"),
+    init="".join(init_xml(name, teleport_xml(lane_position_xml(-1, s))) for name, s in (("Ego", 10), ("Other", 50))),
+    story=acts_xml(act_xml(group_xml(maneuver_xml(EVENTS, "Maneuver"), name="Group"), name="Act"), name="Story"),
+    stop=groups_xml(at(20)),
+)
 
 INTO = {
     "EntitySelection": "Entities",
@@ -88,13 +82,13 @@ ROAD_ELEMENTS = {"header", "link", "planView", "lateralProfile", "lanes", "signa
 def folder(tmp_path: Path) -> Path:
     """Return a folder with a road of 200 m with one lane, and a catalog with one car."""
     (tmp_path / "street.xodr").write_text(ROAD, encoding="utf-8")
-    (tmp_path / "cars.xosc").write_text(CATALOG, encoding="utf-8")
+    (tmp_path / "cars.xosc").write_bytes(CATALOG)
     return tmp_path
 
 
-def diagnostics_of(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Diagnostic]]:
+def diagnostics_of(folder: Path, *fragments: str) -> list[tuple[Level, Diagnostic]]:
     """Return the diagnostics of the rules in the scaffold with additional or replaced elements."""
-    root = etree.fromstring(text)
+    root = etree.fromstring(SCENARIO)
     for fragment in fragments:
         for element in list(etree.fromstring(f"<Fragment>{fragment}</Fragment>")):
             if element.tag in ROAD_ELEMENTS:
@@ -189,8 +183,8 @@ def test_document_example_violates_only_its_rule(folder: Path, name: str) -> Non
 
 
 def test_above_max_speed_applies_to_negative_speeds(folder: Path) -> None:
-    assert "above-max-speed" in violated_rules(folder, SPEED.replace('value="10"', 'value="-61"'))
-    assert "above-max-speed" not in violated_rules(folder, SPEED.replace('value="10"', 'value="-60"'))
+    assert "above-max-speed" in violated_rules(folder, speed_xml(-61, 2))
+    assert "above-max-speed" not in violated_rules(folder, speed_xml(-60, 2))
 
 
 def test_run_rules_ignored_rule_yields_nothing(folder: Path) -> None:

@@ -1,18 +1,16 @@
 """Rules on third-party files: every diagnostic was examined by hand, so that there are no false positives."""
 
-import os
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
+from corpora import corpora_folder, corpora_name, needs_corpora, scenario_files
 
 from eidrive_scenario.checks.registry import run_rules
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
 
-CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
-pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA is not set")
+pytestmark = needs_corpora
 
 FREQUENT = {"unused-parameter", "unused-catalog", "no-stop-trigger"}
 """Rules that many files violate: copied declarations, and empty stop triggers of 1.0."""
@@ -63,7 +61,7 @@ EXAMINED = {
 def maps() -> Iterator[None]:
     """Set the folder of the maps of ScenarioRunner."""
     patch = pytest.MonkeyPatch()
-    patch.setenv("EIDRIVE_MAPS", f"{CORPORA}/carla_towns")
+    patch.setenv("EIDRIVE_MAPS", f"{corpora_folder()}/carla_towns")
     yield
     patch.undo()
 
@@ -71,9 +69,8 @@ def maps() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def found(maps: None) -> dict[str, Counter[str]]:
     """Return the number of violations of each rule by file."""
-    assert CORPORA is not None
     counts: dict[str, Counter[str]] = {}
-    for path in sorted(CORPORA.rglob("*.xosc")):
+    for path in scenario_files():
         if "<Storyboard" not in path.read_text(encoding="utf-8", errors="replace"):
             continue
         try:
@@ -81,7 +78,7 @@ def found(maps: None) -> dict[str, Counter[str]]:
         except ScenarioError:
             continue
         rules = Counter(diagnostic.rule for _, diagnostic in run_rules(scenario))
-        counts[path.relative_to(CORPORA).as_posix()] = rules
+        counts[corpora_name(path)] = rules
     return counts
 
 

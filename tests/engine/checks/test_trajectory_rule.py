@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import pytest
+from openscenario_xml import road_file_xml, scenario_xml
+from storyboard_xml import end_xml, init_xml, private_xml
 
 from eidrive_scenario.checks.road_rules.context import RoadLintContext
 from eidrive_scenario.checks.road_rules.paths import MAX_POINTS, SPACING
 from eidrive_scenario.checks.scenario_checks import check_scenario
 
-FILE = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2024-01-01T00:00:00" description="t" author="test"/>
-<CatalogLocations><VehicleCatalog><Directory path="eidrive_library/catalogs"/></VehicleCatalog></CatalogLocations>
-<RoadNetwork><LogicFile filepath="eidrive_library/roads/coop_1.xodr"/></RoadNetwork>
-<Entities><ScenarioObject name="Ego"><CatalogReference catalogName="vehicles" entryName="lincoln_mkz"/></ScenarioObject>
-</Entities><Storyboard><Init><Actions><Private entityRef="Ego"><PrivateAction><RoutingAction><FollowTrajectoryAction>
-<Trajectory name="far" closed="false"><Shape><Polyline>
+FOLLOW = """<RoutingAction><FollowTrajectoryAction><Trajectory name="far" closed="false"><Shape><Polyline>
 <Vertex><Position><WorldPosition x="0" y="0"/></Position></Vertex>
 <Vertex><Position><WorldPosition x="0" y="{end}"/></Position></Vertex>
 </Polyline></Shape></Trajectory><TimeReference><None/></TimeReference>
-<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction></Private>
-</Actions></Init><StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
-<SimulationTimeCondition value="1" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup></StopTrigger>
-</Storyboard></OpenSCENARIO>"""
+<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
 
 
 @pytest.mark.parametrize(("end", "points"), [(1000.0, round(1000.0 / SPACING) + 1), (1.5e6, MAX_POINTS)])
@@ -35,7 +29,14 @@ def test_trajectory_off_road_checks_a_bounded_number_of_points(
         return outside(self, x, y)
 
     monkeypatch.setattr(RoadLintContext, "outside", count_points)
-    report = check_scenario(FILE.format(end=end).encode())
+    report = check_scenario(
+        scenario_xml(
+            minor=2,
+            road=road_file_xml("eidrive_library/roads/coop_1.xodr"),
+            init=init_xml("Ego", private_xml(FOLLOW.format(end=end))),
+            stop=end_xml(1),
+        )
+    )
     assert not report.errors
     assert any("trajectory 'far' leaves the road after" in str(warning) for warning in report.warnings)
     assert max(counts) == points

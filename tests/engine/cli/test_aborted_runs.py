@@ -12,19 +12,12 @@ from pathlib import Path
 
 import pytest
 from faulty_extensions import install, line_of, write_scenario
+from openscenario_xml import deterministic_xml, distribution_xml, parameters_xml, values_xml
 
 from eidrive_scenario.recording import read_recording
 
 pytestmark = pytest.mark.timeout(600)
 """Hung runs last for the limit and the grace period, and several processes load the engine."""
-
-DISTRIBUTION = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>
-<ParameterValueDistribution><ScenarioFile filepath="s.xosc"/><Deterministic>
-<DeterministicSingleParameterDistribution parameterName="Speed">
-<DistributionSet><Element value="4"/><Element value="5"/></DistributionSet>
-</DeterministicSingleParameterDistribution></Deterministic></ParameterValueDistribution>
-</OpenSCENARIO>"""
 
 
 @pytest.fixture
@@ -89,13 +82,10 @@ def test_sys_exit_of_detector_aborts_only_its_run(folder: Path) -> None:
 
 def test_aborted_run_of_distribution_does_not_end_other_runs(folder: Path) -> None:
     """The action fails for a parameter of 4, and not for 5."""
-    text = write_scenario(folder / "s.xosc", action="fails below 5").read_text()
-    parameter = '<ParameterDeclaration name="Speed" parameterType="double" value="5"/>'
-    text = text.replace(
-        "<CatalogLocations/>", f"<ParameterDeclarations>{parameter}</ParameterDeclarations><CatalogLocations/>"
-    )
-    (folder / "s.xosc").write_text(text.replace('AbsoluteTargetSpeed value="5"', 'AbsoluteTargetSpeed value="$Speed"'))
-    (folder / "d.xosc").write_text(DISTRIBUTION)
+    declared = parameters_xml(Speed=("double", "5"))
+    write_scenario(folder / "s.xosc", action="fails below 5", declarations=declared, speed="$Speed")
+    body = deterministic_xml(values_xml("Speed", "4", "5"))
+    (folder / "d.xosc").write_bytes(distribution_xml(body, scenario="s.xosc"))
     code, out, err = run(folder, "d.xosc", "--json")
     assert code == 3
     entries = [json.loads(line) for line in out.splitlines()]

@@ -7,20 +7,7 @@ from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive
-
-DISTRIBUTION = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="a test" author="test"/>
-<ParameterValueDistribution>
-<ScenarioFile filepath="passing_by.xosc"/>
-{}
-</ParameterValueDistribution>
-</OpenSCENARIO>"""
-SINGLE = '<DeterministicSingleParameterDistribution parameterName="{}">{}</DeterministicSingleParameterDistribution>'
-
-
-def values(name: str, *texts: str) -> str:
-    elements = "".join(f'<Element value="{text}"/>' for text in texts)
-    return SINGLE.format(name, f"<DistributionSet>{elements}</DistributionSet>")
+from openscenario_xml import deterministic_xml, distribution_xml, single_xml, values_xml
 
 
 @pytest.fixture
@@ -36,9 +23,9 @@ def vary(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
         (tmp_path / "passing_by.xosc").write_text(text, encoding="utf-8")
         body = distributions[0]
         if not body.startswith("<Stochastic"):
-            body = "<Deterministic>\n" + "\n".join(distributions) + "\n</Deterministic>"
+            body = deterministic_xml(*distributions)
         path = tmp_path / "distribution.xosc"
-        path.write_text(DISTRIBUTION.format(body), encoding="utf-8")
+        path.write_bytes(distribution_xml(body, scenario="passing_by.xosc"))
         return path
 
     return write
@@ -47,7 +34,7 @@ def vary(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
 @pytest.fixture
 def six(vary: Callable[..., Path]) -> Path:
     """Write a distribution of six runs: a collision at 0 m, and a constraint violation at 9 m."""
-    return vary(values("OtherY", "5", "0", "9"), values("End", "2", "3"))
+    return vary(values_xml("OtherY", "5", "0", "9"), values_xml("End", "2", "3"))
 
 
 def test_run_of_distribution_executes_every_run(eidrive: Eidrive, six: Path) -> None:
@@ -82,7 +69,7 @@ def test_run_of_distribution_reports_varied_parameters_and_counts(eidrive: Eidri
 
 def test_max_runs_selects_runs_over_all_values(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
     one_to_thousand = '<DistributionRange stepWidth="1"><Range lowerLimit="1" upperLimit="1000"/></DistributionRange>'
-    path = vary(SINGLE.format("End", one_to_thousand), values("OtherY", "5", "4"))
+    path = vary(single_xml("End", one_to_thousand), values_xml("OtherY", "5", "4"))
     result = eidrive("run", path, "--max-runs", "3", "--time-limit", "0.2", "--json")
     lines = [json.loads(line) for line in result.stdout.splitlines()]
     assert len(lines) == 3
@@ -93,7 +80,7 @@ def test_max_runs_selects_runs_over_all_values(eidrive: Eidrive, vary: Callable[
 def test_run_of_distribution_writes_files_per_run_and_seed(
     eidrive: Eidrive, vary: Callable[..., Path], tmp_path: Path
 ) -> None:
-    out, path = tmp_path / "out", vary(values("OtherY", "5", "4"))
+    out, path = tmp_path / "out", vary(values_xml("OtherY", "5", "4"))
     eidrive("run", path, "--out", out, "--no-record", "--csv", out / "motion.csv", "--repeat", "2")
     files = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
     short = [re.sub(r"-[0-9a-f]{10}/", "/", file) for file in files]
@@ -120,7 +107,7 @@ def test_stochastic_draws_depend_on_random_seed_or_seed_option(eidrive: Eidrive,
 
 
 def test_distribution_without_allowed_run_is_invalid_input(eidrive: Eidrive, vary: Callable[..., Path]) -> None:
-    result = eidrive("run", vary(values("OtherY", "9", "10")))
+    result = eidrive("run", vary(values_xml("OtherY", "9", "10")))
     assert result.exit_code == 2
     assert result.stdout == ""
     assert "outside its constraints" in result.stderr.splitlines()[-1]
@@ -132,7 +119,7 @@ def test_distribution_without_allowed_run_is_invalid_input(eidrive: Eidrive, var
 def test_invalid_value_of_first_run_ends_distribution(
     eidrive: Eidrive, vary: Callable[..., Path], texts: tuple[str], completed: int, code: int
 ) -> None:
-    path = vary(values("OtherY", *texts))
+    path = vary(values_xml("OtherY", *texts))
     result = eidrive("run", path, "--json")
     assert result.exit_code == code
     assert len(result.stdout.splitlines()) == completed
@@ -149,20 +136,20 @@ class TestCheck:
     def test_check_of_valid_distribution_reports_number_of_runs(
         self, eidrive: Eidrive, vary: Callable[..., Path]
     ) -> None:
-        path = vary(values("OtherY", "5", "4"), values("End", "1", "2", "3"))
+        path = vary(values_xml("OtherY", "5", "4"), values_xml("End", "1", "2", "3"))
         result = eidrive("check", path)
         assert result.exit_code == 0
         assert result.stdout.splitlines() == [f"{path}: 6 runs", "1 file, 0 errors, 0 warnings"]
 
     def test_check_of_unknown_parameter_reports_error(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
-        path = vary(values("OtherY", "5"), values("Edn", "1", "2"))
+        path = vary(values_xml("OtherY", "5"), values_xml("Edn", "1", "2"))
         result = eidrive("check", path)
         assert result.exit_code == 2
         assert f"{path}:7: unknown parameter 'Edn'; did you mean 'End'?" in result.stdout.splitlines()
         assert result.stdout.splitlines()[-1] == "1 file, 1 error, 0 warnings"
 
     def test_check_validates_every_listed_value(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
-        path = vary(values("OtherY", "5", "4", "3", "far", "9"), values("End", "1", "late"))
+        path = vary(values_xml("OtherY", "5", "4", "3", "far", "9"), values_xml("End", "1", "late"))
         result = eidrive("check", path)
         assert result.exit_code == 2
         lines = result.stdout.splitlines()
@@ -176,7 +163,7 @@ class TestCheck:
 
     def test_check_reports_diagnostics_of_single_runs(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
         """The time is never below 0 s, and at first below an End of 1 s."""
-        path = vary(values("OtherY", "5", "4"), values("End", "1", "0"))
+        path = vary(values_xml("OtherY", "5", "4"), values_xml("End", "1", "0"))
         scenario = path.with_name("passing_by.xosc")
         text = scenario.read_text(encoding="utf-8")
         late = text.replace('value="$End" rule="greaterOrEqual"', 'value="$End" rule="lessThan"')
@@ -190,7 +177,7 @@ class TestCheck:
         assert "impossible-condition" not in eidrive("check", path, "--ignore", "impossible-condition").stdout
 
     def test_check_reports_error_of_scenario_once(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
-        path = vary(values("OtherY", "5"))
+        path = vary(values_xml("OtherY", "5"))
         scenario = path.with_name("passing_by.xosc")
         text = scenario.read_text(encoding="utf-8").replace('dynamicsShape="step"', 'dynamicsShape="stp"')
         scenario.write_text(text, encoding="utf-8")

@@ -4,49 +4,33 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scenario_1 import ONE, FrameCollector, simulate, with_properties
 
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.perception_metrics import metric_sample, recall_by_sight
-from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.simulation import RunResult, RunSettings, run_file
+from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.world.actor import ActorSpec
 
-ONE = resolve_scenario("coop/scenario_1")
 MAST = ActorSpec("RSU", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
 
 
-class Kept:
-    def __init__(self) -> None:
-        self.frames: list[Frame] = []
-
-    def observe(self, frame: Frame) -> None:
-        self.frames.append(frame)
-
-    def close(self) -> None:
-        """Nothing to finish."""
+def listening(folder: Path, **properties: str) -> Path:
+    """Write scenario 1 with additional properties of its roadside unit."""
+    return with_properties(folder, "RsuStack", *properties.items(), name=f"scenario_{len(list(folder.iterdir()))}.xosc")
 
 
-def with_properties(tmp_path: Path, **properties: str) -> Path:
-    """Scenario 1 with more properties on its roadside unit."""
-    text = ONE.read_text()
-    start = text.index("<ObjectController", text.index('<ScenarioObject name="RSU"'))
-    lines = "".join(f'<Property name="{name}" value="{value}"/>' for name, value in properties.items())
-    path = tmp_path / f"scenario_{len(list(tmp_path.iterdir()))}.xosc"
-    text = text[:start] + text[start:].replace("<Properties>", f"<Properties>{lines}", 1)
-    path.write_text(text.replace('"../', f'"{ONE.parent.parent}/'))
-    return path
-
-
-def play(source: Path, channel: str = "ideal", **more: object) -> tuple[RunResult, list[Frame]]:
-    kept = Kept()
-    settings = RunSettings(channel=channel, **{"time_limit": 4.0, **more})  # type: ignore[arg-type]
-    return run_file(source, seed=1, settings=settings, observers=[kept]), kept.frames
+def play(
+    source: Path, channel: str = "ideal", *, time_limit: float = 4.0, **more: Any
+) -> tuple[RunResult, list[Frame]]:
+    collector = FrameCollector()
+    return simulate(source, channel, collector, time_limit=time_limit, **more), collector.frames
 
 
 def links(frames: list[Frame]) -> set[tuple[str, str]]:
@@ -65,8 +49,8 @@ def test_mast_without_cooperates_with_receives_nothing() -> None:
 
 @pytest.mark.parametrize("names", ["[Ego]", "Ego", "all"])
 def test_mast_with_cooperates_with_fuses_received_and_sends_own_detections(tmp_path: Path, names: str) -> None:
-    _, deaf = play(with_properties(tmp_path, sensors="{truth: {range: 8}}"))
-    _, hearing = play(with_properties(tmp_path, sensors="{truth: {range: 8}}", cooperates_with=names))
+    _, deaf = play(listening(tmp_path, sensors="{truth: {range: 8}}"))
+    _, hearing = play(listening(tmp_path, sensors="{truth: {range: 8}}", cooperates_with=names))
     assert links(hearing) == {("RSU", "Ego"), ("Ego", "RSU")}
     learned = 0
     for before, after in zip(deaf, hearing, strict=True):
@@ -86,8 +70,8 @@ def test_mast_with_cooperates_with_fuses_received_and_sends_own_detections(tmp_p
 
 
 def test_fused_objects_of_mast_count_in_perception_metrics(tmp_path: Path) -> None:
-    _, deaf = play(with_properties(tmp_path, sensors="{truth: {range: 8}}"))
-    _, hearing = play(with_properties(tmp_path, sensors="{truth: {range: 8}}", cooperates_with="Ego"))
+    _, deaf = play(listening(tmp_path, sensors="{truth: {range: 8}}"))
+    _, hearing = play(listening(tmp_path, sensors="{truth: {range: 8}}", cooperates_with="Ego"))
     alone, joined = (
         recall_by_sight([metric_sample(frame, "RSU", reach=60.0) for frame in frames[2:]], 0.1)
         for frames in (deaf, hearing)
@@ -99,7 +83,7 @@ def test_fused_objects_of_mast_count_in_perception_metrics(tmp_path: Path) -> No
 
 
 def test_cooperate_option_applies_to_receiving_stations_only(tmp_path: Path) -> None:
-    hearing = with_properties(tmp_path, cooperates_with="Ego")
+    hearing = listening(tmp_path, cooperates_with="Ego")
     assert links(play(ONE, cooperate=("Ego", "RSU"))[1]) == {("RSU", "Ego")}
     assert links(play(hearing, cooperate=("Ego", "RSU"))[1]) == {("RSU", "Ego"), ("Ego", "RSU")}
     assert links(play(hearing, cooperate=("RSU",))[1]) == {("RSU", "Ego")}
@@ -109,7 +93,7 @@ def test_cooperate_option_applies_to_receiving_stations_only(tmp_path: Path) -> 
 def test_mast_receives_over_radio_channel(tmp_path: Path) -> None:
     radio = "{model: radio, jitter: 0.001}"
     alone, _ = play(ONE, radio)
-    both, frames = play(with_properties(tmp_path, cooperates_with="Ego"), radio)
+    both, frames = play(listening(tmp_path, cooperates_with="Ego"), radio)
     assert both.links["RSU", "Ego"] == alone.links["RSU", "Ego"], "receivers do not change transmissions"
     assert both.links["Ego", "RSU"].received > 70
     assert any(item.message.sender == "Ego" for frame in frames for item in frame.steps["RSU"].inbox)
@@ -118,7 +102,7 @@ def test_mast_receives_over_radio_channel(tmp_path: Path) -> None:
 def test_mast_merges_points_of_selected_senders(tmp_path: Path) -> None:
     frames = {}
     for names in ("none", "Ego"):
-        path = with_properties(tmp_path, cooperates_with=names)
+        path = listening(tmp_path, cooperates_with=names)
         text = path.read_text().replace('"average"', '"early"').replace('"oracle"', '"lidar"')
         path.write_text(re.sub(r'<Property name="(range|field_of_view|visibility)" value="[^"]*"/>', "", text))
         frames[names] = play(path, time_limit=0.6)[1]
@@ -133,21 +117,21 @@ def test_own_perception_of_channel_applies_to_receiving_stations_only(tmp_path: 
     late = "{delay: {kind: constant, seconds: 0.3}, own_perception: true}"
     _, frames = play(ONE, late)
     assert len(frames[0].steps["RSU"].fused) > 0, "a mast that does not receive uses its own detections"
-    _, frames = play(with_properties(tmp_path, cooperates_with="Ego"), late)
+    _, frames = play(listening(tmp_path, cooperates_with="Ego"), late)
     known = [len(frame.steps["RSU"].fused) for frame in frames]
     assert known[:6] == [0] * 6
     assert known[6] > 0
 
 
 def test_unknown_sender_is_reported_with_line(tmp_path: Path) -> None:
-    wrong = with_properties(tmp_path, cooperates_with="Egoo")
+    wrong = listening(tmp_path, cooperates_with="Egoo")
     line = wrong.read_text()[: wrong.read_text().index("Egoo")].count("\n") + 1
     with pytest.raises(InputError, match=re.escape(f"{wrong}:{line}: 'RSU' cooperates with 'Egoo'")):
         play(wrong)
 
 
 def test_planner_without_wheels_is_reported_with_line_before_run(tmp_path: Path) -> None:
-    wrong = with_properties(tmp_path, planner="route")
+    wrong = listening(tmp_path, planner="route")
     line = wrong.read_text()[: wrong.read_text().index('value="route"')].count("\n") + 1
     with pytest.raises(InputError, match=re.escape(f"{wrong}:{line}: 'RSU' has no wheels for planner 'route'")):
         play(wrong)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 from scenariogeneration import xodr
 
 from eidrive_scenario.detections import Detections
@@ -116,13 +117,9 @@ def test_route_without_goal_follows_lane_to_end_of_road(car: ActorSpec, roads: R
 @pytest.mark.parametrize("radius", [3.5, 6.0, 20.0])
 def test_route_on_ring_road_does_not_end(car: ActorSpec, radius: float) -> None:
     length = 2.0 * math.pi * radius
-    ring = f"""<OpenDRIVE><header revMajor="1" revMinor="7"/><road id="1" length="{length!r}" junction="-1"><link>
-      <predecessor elementType="road" elementId="1" contactPoint="end"/>
-      <successor elementType="road" elementId="1" contactPoint="start"/></link><planView>
-      <geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="{1 / radius!r}"/></geometry></planView>
-      <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><link>
-      <predecessor id="-1"/><successor id="-1"/></link><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right>
-      </laneSection></lanes></road></OpenDRIVE>"""
+    lanes = section_xml(right=lane_xml(-1, 3, link=lane_links_xml(-1, -1)))
+    itself = predecessor_xml("1") + successor_xml("1")
+    ring = map_xml(road_xml(length=length, curvature=1 / radius, link=itself, lanes=lanes))
     route = planner(car, RoadNetwork.parse(ring), target_speed=3.0)
     start = RoadNetwork.parse(ring).lane_pose_at("1", -1, 0.75 * length)
     route.plan(ego(start.x, start.y, start.h), NOTHING, None, 0.0)

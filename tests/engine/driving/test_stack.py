@@ -8,21 +8,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scenario_1 import ONE, FrameCollector
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.stack import DrivingStack, EmptyStack, StackContext, StackInputs, StackSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.requests import Overrides
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
-
-ONE = resolve_scenario("coop/scenario_1")
 
 
 class ThrottleStack(DrivingStack):
@@ -68,22 +65,9 @@ class ThrottleStack(DrivingStack):
         return StackSettings(stations={name: {"stack": "throttle"} for name in self.possible_drivers})
 
 
-class Frames:
-    """Keeps all frames of a run."""
-
-    def __init__(self) -> None:
-        self.frames: list[Frame] = []
-
-    def observe(self, frame: Frame) -> None:
-        self.frames.append(frame)
-
-    def close(self) -> None:
-        """Nothing to finish."""
-
-
 def test_other_stack_drives_the_vehicles_of_a_library_scenario() -> None:
     """Full throttle from rest: after t the speed is a t, less rolling resistance and drag."""
-    kept, stacks = Frames(), []
+    kept, stacks = FrameCollector(), []
 
     def build(context: StackContext) -> ThrottleStack:
         stacks.append(ThrottleStack(context))
@@ -99,7 +83,7 @@ def test_other_stack_drives_the_vehicles_of_a_library_scenario() -> None:
 
 
 def test_events_of_other_stack_are_in_the_next_frame() -> None:
-    kept = Frames()
+    kept = FrameCollector()
     run_file(ONE, settings=RunSettings(time_limit=0.3), observers=[kept], stack=ThrottleStack)
     assert kept.frames[0].links == ()
     for before, after in zip(kept.frames, kept.frames[1:], strict=False):

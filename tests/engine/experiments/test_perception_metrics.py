@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scenario_1 import ONE, FrameCollector, simulate
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.experiments.perception_metrics import (
@@ -18,10 +19,7 @@ from eidrive_scenario.experiments.perception_metrics import (
 )
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import registry
-from eidrive_scenario.simulation import RunSettings, run_file
 
 LENGTH = 4.5
 
@@ -113,20 +111,11 @@ def test_precision_bev_of_delayed_report_falls_at_shift_limit(min_iou: float, kn
 
 def test_recall_by_sight_of_scenario_1_requires_cooperation_for_hidden_car() -> None:
     """At first only the roadside unit sees the incoming car, so the ego detects it only from messages of the unit."""
-    frames: list[Frame] = []
-
-    class FrameList:
-        def observe(self, frame: Frame) -> None:
-            frames.append(frame)
-
-        def close(self) -> None:
-            pass
 
     def recall(channel: str) -> tuple[float, float]:
-        frames.clear()
-        settings = RunSettings(channel=channel, time_limit=2.0)
-        run_file(resolve_scenario("coop/scenario_1"), seed=1, settings=settings, observers=[FrameList()])
-        samples = [metric_sample(frame, "Ego", reach=60.0) for frame in frames]
+        collector = FrameCollector()
+        simulate(ONE, channel, collector, time_limit=2.0)
+        samples = [metric_sample(frame, "Ego", reach=60.0) for frame in collector.frames]
         assert {len(each.objects) for each in samples} == {2}, "the truck and the car, not the stations"
         found = recall_by_sight(samples, 0.3)
         assert found.own is not None

@@ -7,18 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_1 import FrameCollector, edited, simulate
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings
-from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
-from eidrive_scenario.simulation import RunSettings, Simulation, run_file
+from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.v2x.messages.message import ReceivedMessage
 from eidrive_scenario.v2x.messages.point_cloud import HEADER_BYTES
 from eidrive_scenario.world.actor import ActorSpec
@@ -151,18 +150,6 @@ def test_early_fusion_without_lidar_detector_raises() -> None:
         agent(EGO, detector="oracle")
 
 
-def edited(tmp_path: Path, *replacements: tuple[str, str]) -> Path:
-    """Write scenario 1 with text replacements; references still point to the library."""
-    source = resolve_scenario("coop/scenario_1")
-    text = source.read_text().replace('"../', f'"{source.parent.parent}/')
-    for old, new in replacements:
-        assert old in text
-        text = text.replace(old, new)
-    path = tmp_path / "edited.xosc"
-    path.write_text(text)
-    return path
-
-
 EARLY = ('name="fusion" value="average"/>', 'name="fusion" value="early"/>')
 
 
@@ -197,17 +184,10 @@ def test_fusion_with_invalid_settings_raises_with_file_and_line(
 
 def test_run_with_early_fusion_detects_the_hidden_car(tmp_path: Path) -> None:
     """Messages contain the size of the points, and the car behind the truck is in the fused objects."""
-    frames: list[Frame] = []
-
-    class Watch:
-        def observe(self, frame: Frame) -> None:
-            frames.append(frame)
-
-        def close(self) -> None:
-            pass
-
     path = edited(tmp_path, EARLY)
-    run_file(path, seed=1, settings=RunSettings(channel="ideal", detector="lidar", time_limit=1.0), observers=[Watch()])
+    collector = FrameCollector()
+    simulate(path, "ideal", collector, detector="lidar", time_limit=1.0)
+    frames = collector.frames
     sizes = [link.size for frame in frames for link in frame.links]
     assert min(sizes) > HEADER_BYTES + 3000
     last = frames[-1]

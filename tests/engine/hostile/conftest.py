@@ -1,14 +1,10 @@
-"""Import path of the shared modules, and a fixture that writes the scenario of the tests."""
+"""Fixture that writes the scenario of the tests."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent / "shared"))
-
 from hostile_scenario import Write, scenario_writer
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from hostile_scenario import Write
+from openscenario_xml import catalog_xml
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -147,7 +148,6 @@ def test_check_and_run_unknown_attribute_diagnostics_are_limited(write: Write) -
 
 def routes_of(tmp_path: Path, declared: str, assigned: str, count: int) -> tuple[str, str]:
     """A catalog of routes, of which each refers to the next one `count` times; locations and an action that uses it."""
-    header = '<FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" author="" description=""/>'
 
     def waypoint(level: int, number: int) -> str:
         given = f"<ParameterAssignments>{assigned.format(number)}</ParameterAssignments>" if assigned else ""
@@ -168,7 +168,7 @@ def routes_of(tmp_path: Path, declared: str, assigned: str, count: int) -> tuple
         for n in range(24)
     )
     routes += f'<Route name="r24" closed="false">{declared}{places}</Route>'
-    (tmp_path / "R.xosc").write_text(f'<OpenSCENARIO>{header}<Catalog name="R">\n{routes}\n</Catalog></OpenSCENARIO>')
+    (tmp_path / "R.xosc").write_bytes(catalog_xml("R", routes, minor=2))
     action = (
         '<Private entityRef="Ego"><PrivateAction><RoutingAction><AssignRouteAction>'
         '<CatalogReference catalogName="R" entryName="r0"/>'

@@ -23,9 +23,10 @@ def test_check_and_run_of_mutants_end_without_internal_error_or_hang(tmp_path: P
     """In a process with one thread: each trial is a fork, and locks of other threads would stay locked in it."""
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     program = Path(__file__).parent / "shared" / "campaign.py"
+    path = {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         [sys.executable, str(program), "--count", COUNT, "--out", str(tmp_path)],
-        env=dict(os.environ) | single,
+        env=dict(os.environ) | single | path,
         capture_output=True,
         text=True,
         check=False,

@@ -32,7 +32,6 @@ from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.profile import load_profile
 from eidrive_scenario.world.weather import Weather
 
-SHARED = Path(__file__).parent / "shared"
 COUNT = os.environ.get("EIDRIVE_SETTINGS_TRIALS", "16")
 TABLES = {"station": STATIONS, "channel": CHANNELS, "weather": WEATHER, "criterion": CRITERIA}
 CAMERA = "{truth: {}, camera: {width: 64, height: 48}, lidar: {channels: 16, points_per_second: 20000, rotation: 10}}"
@@ -151,7 +150,7 @@ def test_setting_with_hostile_value_is_accepted_or_refused() -> None:
 def test_runs_with_accepted_hostile_values_end_without_internal_error(tmp_path: Path) -> None:
     """In a process with one thread: each trial is a fork, and locks of other threads would stay locked in it."""
     single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    path = {"PYTHONPATH": os.pathsep.join([str(SHARED), os.environ.get("PYTHONPATH", "")])}
+    path = {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         [sys.executable, __file__, COUNT, str(tmp_path)],
         env=dict(os.environ) | single | path,

@@ -2,14 +2,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from openscenario_xml import catalog_xml, object_xml, parameters_xml, scenario_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario, model
 
 Write = Callable[..., Path]
-Build = Callable[..., bytes]
 
-HEADER = '<FileHeader revMajor="{0}" revMinor="{1}" date="2026-01-31T12:00:00" description="" author=""/>'
 LOCATIONS = "<{kind}Catalog><Directory path='{path}'/></{kind}Catalog>"
 CONTROLLER = """<Controller name="driver"><ParameterDeclarations>
 <ParameterDeclaration name="Model" parameterType="string" value="calm"/></ParameterDeclarations>
@@ -20,25 +19,28 @@ CONTROLLER = """<Controller name="driver"><ParameterDeclarations>
 def write_catalog(tmp_path: Path) -> Write:
     """Return a function that writes a catalog into the folder of the scenario."""
 
-    def put(file: str, name: str, content: str, revision: tuple[int, int] = (1, 3)) -> Path:
+    def put(file: str, name: str, content: str) -> Path:
         path = tmp_path / "catalogs" / file
         path.parent.mkdir(exist_ok=True)
-        header = HEADER.format(*revision)
-        path.write_text(f'<OpenSCENARIO>{header}\n<Catalog name="{name}">{content}</Catalog></OpenSCENARIO>')
+        path.write_bytes(catalog_xml(name, content))
         return path
 
     return put
 
 
 @pytest.fixture
-def write_scenario(tmp_path: Path, scenario_xml: Build) -> Write:
+def write_scenario(tmp_path: Path) -> Write:
     """Return a function that writes a scenario whose Ego has a controller from a catalog."""
 
     def write(reference: str, *, kind: str = "Controller", path: str = "catalogs", declarations: str = "") -> Path:
-        xml = scenario_xml(catalogs=LOCATIONS.format(kind=kind, path=path), declarations=declarations).decode()
-        xml = xml.replace("</Vehicle></Scen", f"</Vehicle><ObjectController>{reference}</ObjectController></Scen")
         file = tmp_path / "write_scenario.xosc"
-        file.write_text(xml)
+        file.write_bytes(
+            scenario_xml(
+                declarations=declarations,
+                catalogs=LOCATIONS.format(kind=kind, path=path),
+                entities=object_xml("Ego", controller=f"<ObjectController>{reference}</ObjectController>"),
+            )
+        )
         return file
 
     return write
@@ -74,7 +76,7 @@ def test_catalog_reference_remains_in_the_model(write_catalog: Write, write_scen
     entry = scenario.resolved(found)
     assert isinstance(entry, model.Controller)
     assert entry is scenario.controllers["Ego"][0]
-    assert (entry.source, entry.line) == (str(catalog), 2)
+    assert (entry.source, entry.line) == (str(catalog), 3)
 
 
 def test_catalog_is_found_by_its_name_attribute(write_catalog: Write, write_scenario: Write) -> None:
@@ -91,9 +93,7 @@ def test_catalog_found_by_file_name_is_a_warning(write_catalog: Write, write_sce
     ]
 
 
-def test_catalog_entry_using_scenario_parameter_is_a_warning(
-    write_catalog: Write, write_scenario: Write, parameters_xml: Callable[..., str]
-) -> None:
+def test_catalog_entry_using_scenario_parameter_is_a_warning(write_catalog: Write, write_scenario: Write) -> None:
     write_catalog("Drivers.xosc", "Drivers", CONTROLLER.format(limit="$Limit"))
     path = write_scenario(reference("Drivers", "driver"), declarations=parameters_xml(Limit=("int", "8")))
     scenario = load_scenario(path)
@@ -129,8 +129,8 @@ def test_duplicate_entry_name_error_has_both_lines(write_catalog: Write, write_s
     with pytest.raises(ScenarioError) as caught:
         load_scenario(write_scenario(reference("Drivers", "calm")))
     (diagnostic,) = caught.value.diagnostics
-    assert (diagnostic.source, diagnostic.line) == (str(catalog), 4)
-    assert diagnostic.message == "the catalog has a second entry 'calm'; the first is at line 2"
+    assert (diagnostic.source, diagnostic.line) == (str(catalog), 5)
+    assert diagnostic.message == "the catalog has a second entry 'calm'; the first is at line 3"
     load_scenario(write_scenario(reference("Drivers", "wild")))
 
 
@@ -149,11 +149,12 @@ def test_catalog_entry_error_has_catalog_file_and_line(write_catalog: Write, wri
     )
     with pytest.raises(ScenarioError) as caught:
         load_scenario(write_scenario(reference("Drivers", "driver")))
-    assert {(diagnostic.source, diagnostic.line) for diagnostic in caught.value.diagnostics} == {(str(catalog), 5)}
+    assert {(diagnostic.source, diagnostic.line) for diagnostic in caught.value.diagnostics} == {(str(catalog), 6)}
 
 
 def test_catalog_older_than_1_0_is_a_warning(write_catalog: Write, write_scenario: Write) -> None:
-    write_catalog("Drivers.xosc", "Drivers", CONTROLLER.format(limit=3), revision=(0, 9))
+    catalog = write_catalog("Drivers.xosc", "Drivers", CONTROLLER.format(limit=3))
+    catalog.write_text(catalog.read_text().replace('revMajor="1" revMinor="3"', 'revMajor="0" revMinor="9"'))
     warnings = load_scenario(write_scenario(reference("Drivers", "driver"))).warnings
     assert [warning.message for warning in warnings] == ["FileHeader has the version 0.9"]
 
@@ -191,9 +192,7 @@ def test_missing_catalog_folder_is_an_error(write_scenario: Write) -> None:
         load_scenario(write_scenario(reference("Drivers", "driver"), path=".\\gone"))
 
 
-def test_scenario_with_catalog_name_is_not_a_catalog(
-    write_catalog: Write, write_scenario: Write, scenario_xml: Build
-) -> None:
+def test_scenario_with_catalog_name_is_not_a_catalog(write_catalog: Write, write_scenario: Write) -> None:
     write_catalog("Drivers.xosc", "", "").write_bytes(scenario_xml())
     with pytest.raises(ScenarioError, match=r"no catalog 'Drivers' in"):
         load_scenario(write_scenario(reference("Drivers", "driver")))
@@ -215,7 +214,7 @@ def test_missing_catalog_beside_unlistable_folder_is_an_error(
 
 
 def test_entry_of_foreign_kind_is_an_error_with_its_location(write_catalog: Write, write_scenario: Write) -> None:
-    catalog = write_catalog("Drivers.xosc", "Drivers", '\n<Story name="driver"/>')
+    catalog = write_catalog("Drivers.xosc", "Drivers", '<Story name="driver"/>')
     with pytest.raises(ScenarioError) as caught:
         load_scenario(write_scenario(reference("Drivers", "driver")))
     (error,) = caught.value.diagnostics

@@ -1,8 +1,7 @@
 """Check of variable and parameter values against their declared types."""
 
-from collections.abc import Callable
-
 import pytest
+from openscenario_xml import scenario_xml
 
 from eidrive_scenario.openscenario import load_scenario
 
@@ -26,15 +25,13 @@ ADD = """<GlobalAction><VariableAction variableRef="{name}"><ModifyAction><Rule>
         ("1", ADD.format(name="mood"), "'mood' is declared as string, but modified as a number; declare it as double"),
     ],
 )
-def test_values_of_other_types_are_warnings(
-    scenario_xml: Callable[..., bytes], speed: str, init: str, message: str
-) -> None:
+def test_values_of_other_types_are_warnings(speed: str, init: str, message: str) -> None:
     (warning,) = load_scenario(scenario_xml(declarations=VARIABLES.format(speed=speed), init=init)).warnings
     assert message in str(warning)
     assert warning.line is not None
 
 
-def test_values_of_declared_types_are_accepted(scenario_xml: Callable[..., bytes]) -> None:
+def test_values_of_declared_types_are_accepted() -> None:
     """Booleans may be capitalized, as Python writes them."""
     init = "".join(
         (

@@ -18,6 +18,8 @@ from xml.sax.saxutils import quoteattr
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from openscenario_xml import parameters_xml, scenario_xml
+from storyboard_xml import story_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
@@ -33,8 +35,6 @@ from eidrive_scenario.openscenario.values.expressions import (
 HARMLESS = {"compile", "builtins.id"}
 """Audit events of parsing an expression and of traversing its tree; the execution of code is a different event."""
 
-Build = Callable[..., bytes]
-Text = Callable[..., str]
 
 TEXTS = 100_000
 LOADED = 4_000
@@ -267,9 +267,7 @@ def test_concatenation_accepts_only_texts() -> None:
             assert len(concatenate(text, texts)) <= len(text) + 310 * text.count("$")
 
 
-def test_scenario_expressions_execute_no_python_code(
-    audit_log: AuditLog, scenario_xml: Build, story_xml: Text, parameters_xml: Text
-) -> None:
+def test_scenario_expressions_execute_no_python_code(audit_log: AuditLog) -> None:
     """The texts are parameter defaults, assigned values and attributes."""
     dice = random.Random(3)
     kinds = ["double", "int", "string", "boolean", "dateTime", "unsignedShort", "integer"]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
 import pytest
+from corpora import corpora_folder
 from lxml import etree
+from openscenario_xml import deterministic_xml, distribution_xml, object_xml, road_file_xml, scenario_xml, values_xml
+from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -16,32 +18,22 @@ from eidrive_scenario.library import library_path, resolve_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.library_catalogs import library_catalog_entries
 
-SCENE = """<?xml version="1.0"?>
-<OpenSCENARIO>
-  <FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
-  <CatalogLocations>
-    <VehicleCatalog><Directory path="{catalogs}"/></VehicleCatalog>
-  </CatalogLocations>
-  <RoadNetwork><LogicFile filepath="eidrive_library/roads/coop_1.xodr"/></RoadNetwork>
-  <Entities>
-    <ScenarioObject name="Bus"><CatalogReference catalogName="vehicles" entryName="bus"/></ScenarioObject>
-  </Entities>
-  <Storyboard>
-    <Init><Actions><Private entityRef="Bus"><PrivateAction><TeleportAction><Position>
-      <LanePosition roadId="1" laneId="-1" s="20"/>
-      </Position></TeleportAction></PrivateAction></Private></Actions></Init>
-    <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
-      <SimulationTimeCondition value="0.5" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup>
-    </StopTrigger>
-  </Storyboard>
-</OpenSCENARIO>
-"""
+START = init_xml("Bus", teleport_xml(lane_position_xml(-1, 20)))
+BUS = object_xml("Bus", '<CatalogReference catalogName="vehicles" entryName="bus"/>')
 PLACE = "eidrive_library/catalogs"
 
 
 def write(folder: Path, catalogs: str = PLACE) -> Path:
     path = folder / "scene.xosc"
-    path.write_text(SCENE.format(catalogs=catalogs))
+    path.write_bytes(
+        scenario_xml(
+            catalogs=f'<VehicleCatalog><Directory path="{catalogs}"/></VehicleCatalog>',
+            road=road_file_xml("eidrive_library/roads/coop_1.xodr"),
+            entities=BUS,
+            init=START,
+            stop=end_xml(0.5),
+        )
+    )
     return path
 
 
@@ -68,22 +60,14 @@ def test_copy_in_scenario_folder_takes_precedence(tmp_path: Path) -> None:
 
 
 def test_file_stays_valid_against_the_schema(tmp_path: Path) -> None:
-    corpora = os.environ.get("EIDRIVE_CORPORA")
-    if not corpora:
-        pytest.skip("EIDRIVE_CORPORA is not set: ASAM's schema is not part of the project")
-    schema = etree.XMLSchema(etree.parse(Path(corpora) / "schema" / "OpenSCENARIOv1.3.1.xsd"))
+    schema = etree.XMLSchema(etree.parse(corpora_folder() / "schema" / "OpenSCENARIOv1.3.1.xsd"))
     schema.assertValid(etree.parse(write(tmp_path)))
 
 
 def test_distribution_may_refer_to_library_scenario(tmp_path: Path) -> None:
     path = tmp_path / "speeds.xosc"
-    path.write_text(
-        """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
-        <ParameterValueDistribution><ScenarioFile filepath="eidrive_library/coop/scenario_1.xosc"/><Deterministic>
-        <DeterministicSingleParameterDistribution parameterName="EgoSpeed"><DistributionSet>
-        <Element value="5"/></DistributionSet></DeterministicSingleParameterDistribution>
-        </Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
-    )
+    body = deterministic_xml(values_xml("EgoSpeed", "5"))
+    path.write_bytes(distribution_xml(body, scenario="eidrive_library/coop/scenario_1.xosc"))
     (run,) = load_distribution(path)
     assert load_scenario(run.scenario, run.assignments).parameters["EgoSpeed"] == "5"
 

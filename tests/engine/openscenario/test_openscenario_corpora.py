@@ -4,12 +4,12 @@ import os
 from pathlib import Path
 
 import pytest
+from corpora import corpora_folder, corpora_name, needs_corpora, scenario_files
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario, read_document
 
-CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
-pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA is not set")
+pytestmark = needs_corpora
 
 EXCEPTIONS = {
     "esmini/xosc/Catalogs/Maneuvers/HWManeuvers.xosc": "an entry uses a parameter that it does not declare",
@@ -23,25 +23,20 @@ EXCEPTIONS = {
 }
 
 
-def files() -> list[Path]:
-    return sorted(CORPORA.rglob("*.xosc")) if CORPORA else []
-
-
 def is_exempt(path: Path) -> bool:
-    return CORPORA is not None and path.relative_to(CORPORA).as_posix() in EXCEPTIONS
+    return corpora_name(path) in EXCEPTIONS
 
 
 @pytest.fixture
 def maps(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert CORPORA is not None
-    folders = sorted({str(path.parent) for path in CORPORA.rglob("*.xodr")})
+    folders = sorted({str(path.parent) for path in corpora_folder().rglob("*.xodr")})
     monkeypatch.setenv("EIDRIVE_MAPS", os.pathsep.join(folders))
 
 
 @pytest.mark.usefixtures("maps")
 def test_corpora_files_are_read() -> None:
     refused = {}
-    for path in files():
+    for path in scenario_files():
         try:
             document = read_document(path)
             if document.storyboard is not None:
@@ -50,4 +45,4 @@ def test_corpora_files_are_read() -> None:
             refused[path] = str(error)
     assert {path: text for path, text in refused.items() if not is_exempt(path)} == {}
     assert len(refused) <= len(EXCEPTIONS)
-    assert len(files()) > 150
+    assert len(scenario_files()) > 150

@@ -1,14 +1,11 @@
-from collections.abc import Callable
-
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from openscenario_xml import parameters_xml, scenario_xml
+from storyboard_xml import story_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import Scenario, load_scenario, model
-
-Build = Callable[..., bytes]
-Text = Callable[..., str]
 
 
 def speed_of(scenario: Scenario) -> float:
@@ -16,16 +13,14 @@ def speed_of(scenario: Scenario) -> float:
 
 
 @pytest.mark.element("$parameter")
-def test_parameter_reference_is_substituted(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+def test_parameter_reference_is_substituted() -> None:
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "12.5")), story=story_xml(speed="$Speed"))
     assert speed_of(load_scenario(xml)) == 12.5
     assert load_scenario(xml).parameters == {"Speed": "12.5"}
 
 
 @pytest.mark.element("${expression}")
-def test_assigned_value_takes_precedence_over_default(
-    scenario_xml: Build, story_xml: Text, parameters_xml: Text
-) -> None:
+def test_assigned_value_takes_precedence_over_default() -> None:
     declared = parameters_xml(Kmh=("double", "36"), Speed=("double", "${$Kmh / 3.6}"))
     xml = scenario_xml(declarations=declared, story=story_xml(speed="${$Speed + 1}"))
     assert speed_of(load_scenario(xml)) == pytest.approx(11)
@@ -33,7 +28,7 @@ def test_assigned_value_takes_precedence_over_default(
     assert load_scenario(xml, {"Kmh": "72"}).parameters["Kmh"] == "72"
 
 
-def test_invalid_assignments_are_errors(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_invalid_assignments_are_errors() -> None:
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "10")))
     with pytest.raises(ScenarioError, match=r"unknown parameter 'Sped'; did you mean 'Speed'\?"):
         load_scenario(xml, {"Sped": "3"})
@@ -44,7 +39,7 @@ def test_invalid_assignments_are_errors(scenario_xml: Build, parameters_xml: Tex
 
 
 @pytest.mark.element("$parameter")
-def test_inner_scope_hides_outer_parameter(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+def test_inner_scope_hides_outer_parameter() -> None:
     inner = parameters_xml(Speed=("double", "${$Speed * 2}"))
     story = story_xml(speed="$Speed").replace('<Story name="story">', f'<Story name="story">{inner}')
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "4")), story=story)
@@ -62,9 +57,7 @@ def test_inner_scope_hides_outer_parameter(scenario_xml: Build, story_xml: Text,
         ("dateTime", "2026-01-31T12:00:00", "greaterThan", "2026-01-31T11:00:00Z", True),
     ],
 )
-def test_parameter_constraints_are_checked(
-    scenario_xml: Build, kind: str, value: str, rule: str, limit: str, fits: bool
-) -> None:
+def test_parameter_constraints_are_checked(kind: str, value: str, rule: str, limit: str, fits: bool) -> None:
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="{kind}" value="{value}">
     <ConstraintGroup><ValueConstraint rule="{rule}" value="{limit}"/></ConstraintGroup>
     </ParameterDeclaration></ParameterDeclarations>"""
@@ -87,7 +80,7 @@ def test_parameter_constraints_are_checked(
     ],
 )
 def test_integer_parameter_with_zero_fraction_satisfies_constraints(
-    scenario_xml: Build, value: str, rule: str, limit: str, fits: bool
+    value: str, rule: str, limit: str, fits: bool
 ) -> None:
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="{{}}">
     <ConstraintGroup><ValueConstraint rule="{rule}" value="{limit}"/></ConstraintGroup>
@@ -105,14 +98,14 @@ def test_integer_parameter_with_zero_fraction_satisfies_constraints(
                 load_scenario(text, values)
 
 
-def test_integer_parameter_with_nonzero_fraction_is_an_error(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_integer_parameter_with_nonzero_fraction_is_an_error() -> None:
     xml = scenario_xml(declarations=parameters_xml(Lane=("int", "-1")))
     with pytest.raises(ScenarioError, match=r"parameter 'Lane' is '-1\.5', which is not a whole number"):
         load_scenario(xml, {"Lane": "-1.5"})
 
 
 @pytest.mark.element("ConstraintGroup")
-def test_constraint_groups_are_alternatives(scenario_xml: Build) -> None:
+def test_constraint_groups_are_alternatives() -> None:
     group = '<ConstraintGroup><ValueConstraint rule="equalTo" value="{}"/></ConstraintGroup>'
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="2">
     {group.format(1)}{group.format(2)}</ParameterDeclaration></ParameterDeclarations>"""
@@ -122,7 +115,7 @@ def test_constraint_groups_are_alternatives(scenario_xml: Build) -> None:
         load_scenario(xml, {"P": "3"})
 
 
-def test_integers_have_no_fraction_in_texts(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_integers_have_no_fraction_in_texts() -> None:
     position = '<LanePosition roadId="1" laneId="${$Lane - 1}" s="${$S * 2}"/>'
     teleport = f"<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"
     xml = scenario_xml(
@@ -133,7 +126,7 @@ def test_integers_have_no_fraction_in_texts(scenario_xml: Build, parameters_xml:
     assert (lane.lane_id, lane.s) == ("-2", 14.0)
 
 
-def test_invalid_declaration_is_reported_once(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+def test_invalid_declaration_is_reported_once() -> None:
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "${1 / 0}")), story=story_xml(speed="$Speed"))
     with pytest.raises(ScenarioError) as caught:
         load_scenario(xml)
@@ -141,7 +134,7 @@ def test_invalid_declaration_is_reported_once(scenario_xml: Build, story_xml: Te
     assert "has no value" in str(caught.value)
 
 
-def test_parameter_reference_attribute_may_be_a_parameter(scenario_xml: Build, parameters_xml: Text) -> None:
+def test_parameter_reference_attribute_may_be_a_parameter() -> None:
     condition = '<ParameterCondition parameterRef="$Speed" rule="equalTo" value="3"/>'
     stop = f"""<ConditionGroup><Condition name="c" delay="0" conditionEdge="none">
     <ByValueCondition>{condition}</ByValueCondition></Condition></ConditionGroup>"""
@@ -156,9 +149,7 @@ def test_parameter_reference_attribute_may_be_a_parameter(scenario_xml: Build, p
     value=st.text(alphabet="0123456789.+-*/%(),$abePstruefalsi {}", max_size=30),
     speed=st.text(alphabet="0123456789.+-*/%(),$aPsqrtminmax {}", max_size=30),
 )
-def test_random_references_raise_only_scenario_errors(
-    scenario_xml: Build, story_xml: Text, parameters_xml: Text, kind: str, value: str, speed: str
-) -> None:
+def test_random_references_raise_only_scenario_errors(kind: str, value: str, speed: str) -> None:
     declared = parameters_xml(P=(kind, value), a=("double", "1"))
     try:
         scenario = load_scenario(scenario_xml(declarations=declared, story=story_xml(speed=speed)))

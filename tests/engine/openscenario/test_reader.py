@@ -1,13 +1,12 @@
-from collections.abc import Callable
 from datetime import datetime
 
 import pytest
 from lxml import etree
+from openscenario_xml import catalog_xml, deterministic_xml, distribution_xml, scenario_xml, single_xml
+from storyboard_xml import story_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario, model, read_document
-
-Build = Callable[..., bytes]
 
 TRAJECTORY = """<PrivateAction><RoutingAction><FollowTrajectoryAction>{inside}
 <TimeReference><None/></TimeReference><TrajectoryFollowingMode followingMode="position"/>
@@ -28,7 +27,7 @@ def private(action: str) -> str:
     return f'<Private entityRef="Ego">{action}</Private>'
 
 
-def test_values_have_the_types_of_the_model(scenario_xml: Build, story_xml: Callable[..., str]) -> None:
+def test_values_have_the_types_of_the_model() -> None:
     scenario = load_scenario(scenario_xml(story=story_xml(speed="12")))
     header = scenario.document.file_header
     assert (header.rev_major, header.rev_minor, header.date) == (1, 3, datetime(2026, 1, 31, 12))
@@ -42,30 +41,30 @@ def test_values_have_the_types_of_the_model(scenario_xml: Build, story_xml: Call
     assert speed.speed_action_target.chosen() == model.AbsoluteTargetSpeed(value=12.0)
 
 
-def test_elements_have_lines(scenario_xml: Build) -> None:
+def test_elements_have_lines() -> None:
     xml = scenario_xml()
     before, _, _ = xml.partition(b"<Vehicle name")
     ego = load_scenario(xml).entities["Ego"]
     assert (ego.source, ego.line) == ("<bytes>", 1 + before.count(b"\n"))
 
 
-def test_element_text_is_read(scenario_xml: Build) -> None:
+def test_element_text_is_read() -> None:
     command = '<CustomCommandAction type="x">{a: <!-- no --> 1}\n</CustomCommandAction>'
     xml = scenario_xml(init=f"<UserDefinedAction>{command}</UserDefinedAction>")
     action = load_scenario(xml).storyboard.init.actions.user_defined_action[0]
     assert action.custom_command_action.content == "{a:  1}\n"
 
 
-def test_text_between_elements_is_an_error(scenario_xml: Build) -> None:
+def test_text_between_elements_is_an_error() -> None:
     assert diagnostics_of(scenario_xml(init="stray")) == ["Actions contains text; only elements are allowed"]
 
 
-def test_optional_attribute_is_required_in_older_version(scenario_xml: Build) -> None:
+def test_optional_attribute_is_required_in_older_version() -> None:
     assert diagnostics_of(scenario_xml(minor=1)) == ["Storyboard lacks the element Story"]
     assert load_scenario(scenario_xml(minor=2)).version == (1, 2)
 
 
-def test_literals_are_valid_only_in_their_versions(scenario_xml: Build, story_xml: Callable[..., str]) -> None:
+def test_literals_are_valid_only_in_their_versions() -> None:
     story = story_xml()
     old = story.replace('priority="parallel"', 'priority="overwrite"')
     assert load_scenario(scenario_xml(minor=1, story=old)).warnings == ()
@@ -75,7 +74,7 @@ def test_literals_are_valid_only_in_their_versions(scenario_xml: Build, story_xm
         load_scenario(scenario_xml(minor=1, story=new))
 
 
-def test_deprecated_use_is_a_warning(scenario_xml: Build) -> None:
+def test_deprecated_use_is_a_warning() -> None:
     scenario = load_scenario(scenario_xml(init=private(TRAJECTORY.format(inside=CURVE))))
     assert [warning.message for warning in scenario.warnings] == [
         "Trajectory in FollowTrajectoryAction is deprecated since OpenSCENARIO 1.1"
@@ -93,18 +92,18 @@ def test_deprecated_use_is_a_warning(scenario_xml: Build) -> None:
         ("<TeleportAction/>", "TeleportAction lacks the element Position"),
     ],
 )
-def test_invalid_structure_is_an_error(scenario_xml: Build, action: str, message: str) -> None:
+def test_invalid_structure_is_an_error(action: str, message: str) -> None:
     found = diagnostics_of(scenario_xml(init=private(f"<PrivateAction>{action}</PrivateAction>")))
     assert any(one.startswith(message) for one in found)
 
 
-def test_missing_second_vertex_is_an_error(scenario_xml: Build) -> None:
+def test_missing_second_vertex_is_an_error() -> None:
     first, _, _ = CURVE.partition('<Vertex time="1">')
     xml = scenario_xml(init=private(TRAJECTORY.format(inside=f"{first}</Polyline></Shape></Trajectory>")))
     assert diagnostics_of(xml) == ["Polyline lacks another Vertex"]
 
 
-def test_attribute_of_newer_version_error_has_version(scenario_xml: Build) -> None:
+def test_attribute_of_newer_version_error_has_version() -> None:
     entity = '<ScenarioObject name="Ego"><Pedestrian name="p" mass="80" pedestrianCategory="pedestrian" role="police">'
     box = '<BoundingBox><Center x="0" y="0" z="1"/><Dimensions length="1" width="1" height="2"/></BoundingBox>'
     xml = scenario_xml(minor=2, entities=f"{entity}{box}<Properties/></Pedestrian></ScenarioObject>")
@@ -112,9 +111,7 @@ def test_attribute_of_newer_version_error_has_version(scenario_xml: Build) -> No
         load_scenario(xml)
 
 
-def test_an_empty_action_is_a_warning_and_an_empty_position_is_not(
-    scenario_xml: Build, story_xml: Callable[..., str]
-) -> None:
+def test_an_empty_action_is_a_warning_and_an_empty_position_is_not() -> None:
     empty = story_xml().replace("<PrivateAction>", "<!--").replace("</PrivateAction>", "-->")
     assert [warning.message for warning in load_scenario(scenario_xml(minor=2, story=empty)).warnings] == [
         "Action is empty"
@@ -123,13 +120,13 @@ def test_an_empty_action_is_a_warning_and_an_empty_position_is_not(
     assert diagnostics_of(scenario_xml(minor=2, init=teleport)) == ["Position is empty"]
 
 
-def test_schema_location_is_ignored(scenario_xml: Build) -> None:
+def test_schema_location_is_ignored() -> None:
     root = etree.fromstring(scenario_xml())
     root.set("{http://www.w3.org/2001/XMLSchema-instance}noNamespaceSchemaLocation", "OpenSCENARIO.xsd")
     assert load_scenario(root).version == (1, 3)
 
 
-def test_byte_order_mark_and_other_encodings_are_read(scenario_xml: Build) -> None:
+def test_byte_order_mark_and_other_encodings_are_read() -> None:
     text = scenario_xml().decode()
     assert load_scenario(b"\xef\xbb\xbf" + text.encode()).version == (1, 3)
     assert load_scenario(('<?xml version="1.0" encoding="UTF-16"?>' + text).encode("utf-16")).version == (1, 3)
@@ -152,8 +149,7 @@ def test_other_file_kinds_are_errors(xml: bytes, message: str) -> None:
 
 
 def test_read_document_accepts_catalogs() -> None:
-    xml = b"""<OpenSCENARIO><FileHeader revMajor="1" revMinor="0" date="2026-01-31T12:00:00" description="" author=""/>
-    <Catalog name="Routes"/></OpenSCENARIO>"""
+    xml = catalog_xml("Routes", "", minor=0)
     document = read_document(xml)
     assert document.catalog is not None
     assert document.catalog.name == "Routes"
@@ -161,11 +157,8 @@ def test_read_document_accepts_catalogs() -> None:
 
 
 def test_read_document_accepts_distributions() -> None:
-    xml = b"""<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-31T12:00:00" description="" author=""/>
-    <ParameterValueDistribution><ScenarioFile filepath="cut_in.xosc"/><Deterministic>
-    <DeterministicSingleParameterDistribution parameterName="Speed"><DistributionRange stepWidth="5">
-    <Range lowerLimit="10" upperLimit="30"/></DistributionRange></DeterministicSingleParameterDistribution>
-    </Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
+    steps = '<DistributionRange stepWidth="5"><Range lowerLimit="10" upperLimit="30"/></DistributionRange>'
+    xml = distribution_xml(deterministic_xml(single_xml("Speed", steps)), scenario="cut_in.xosc", minor=2)
     distribution = read_document(xml).parameter_value_distribution
     assert distribution is not None
     assert distribution.deterministic is not None

@@ -1,13 +1,11 @@
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from openscenario_xml import scenario_xml
+from storyboard_xml import story_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario, model, text_of
-
-Build = Callable[..., bytes]
-Text = Callable[..., str]
 
 CONTROLLER = """<ObjectController><Controller name="driver"><Properties>
 <Property name="module" value="eidrive"/></Properties></Controller></ObjectController>"""
@@ -21,7 +19,7 @@ def state_condition(reference: str, kind: str = "event") -> str:
     )
 
 
-def test_load_scenario_accepts_path_bytes_and_tree(tmp_path: Path, scenario_xml: Build) -> None:
+def test_load_scenario_accepts_path_bytes_and_tree(tmp_path: Path) -> None:
     path = tmp_path / "crossing.xosc"
     path.write_bytes(scenario_xml())
     scenario = load_scenario(path)
@@ -36,7 +34,7 @@ def test_load_scenario_missing_file_is_an_error(tmp_path: Path) -> None:
         load_scenario(tmp_path / "nowhere.xosc")
 
 
-def test_scenario_has_entities_and_controllers(scenario_xml: Build) -> None:
+def test_scenario_has_entities_and_controllers() -> None:
     walker = f"""<ScenarioObject name="Walker"><Pedestrian name="p" mass="80" pedestrianCategory="pedestrian">{BOX}
     </Pedestrian></ScenarioObject>"""
     mast = f"""<ScenarioObject name="RSU"><MiscObject name="mast" mass="99" miscObjectCategory="pole">{BOX}</MiscObject>
@@ -53,7 +51,7 @@ def test_scenario_has_entities_and_controllers(scenario_xml: Build) -> None:
     assert driver.properties.property[0].line > driver.line
 
 
-def test_trailers_are_entities(scenario_xml: Build) -> None:
+def test_trailers_are_entities() -> None:
     xml = scenario_xml().decode()
     start, end = xml.index("<Vehicle"), xml.index("</Vehicle>")
     trailer = f'<Trailer><Trailer name="Trailer">{xml[start:end]}</Vehicle></Trailer></Trailer>'
@@ -73,9 +71,7 @@ def test_trailers_are_entities(scenario_xml: Build) -> None:
         ("story", "story"),
     ],
 )
-def test_storyboard_elements_are_found_by_name_and_by_path(
-    scenario_xml: Build, story_xml: Text, reference: str, kind: str
-) -> None:
+def test_storyboard_elements_are_found_by_name_and_by_path(reference: str, kind: str) -> None:
     story = story_xml(condition=state_condition(reference, kind))
     assert load_scenario(scenario_xml(story=story)).warnings == ()
 
@@ -88,9 +84,7 @@ def test_storyboard_elements_are_found_by_name_and_by_path(
         ("act", "event", r"'act' is of the kind act, not event; write storyboardElementType='act'"),
     ],
 )
-def test_unknown_storyboard_references_are_errors(
-    scenario_xml: Build, story_xml: Text, reference: str, kind: str, message: str
-) -> None:
+def test_unknown_storyboard_references_are_errors(reference: str, kind: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load_scenario(scenario_xml(story=story_xml(condition=state_condition(reference, kind))))
 
@@ -106,26 +100,26 @@ def test_unknown_storyboard_references_are_errors(
         ),
     ],
 )
-def test_unknown_references_are_errors(scenario_xml: Build, story_xml: Text, condition: str, message: str) -> None:
+def test_unknown_references_are_errors(condition: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load_scenario(scenario_xml(story=story_xml(condition=condition)))
 
 
-def test_scenario_runner_criteria_need_no_parameter(scenario_xml: Build) -> None:
+def test_scenario_runner_criteria_need_no_parameter() -> None:
     stop = """<ConditionGroup><Condition name="criteria_CollisionTest" delay="0" conditionEdge="rising">
     <ByValueCondition><ParameterCondition parameterRef="" value="" rule="lessThan"/></ByValueCondition>
     </Condition></ConditionGroup>"""
     assert load_scenario(scenario_xml(stop=stop)).warnings == ()
 
 
-def test_contradictory_values_are_errors(scenario_xml: Build, story_xml: Text) -> None:
+def test_contradictory_values_are_errors() -> None:
     keep = """<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" freespace="true" continuous="true"
     distance="10" timeGap="2"/></LongitudinalAction>"""
     with pytest.raises(ScenarioError, match="either distance or timeGap"):
         load_scenario(scenario_xml(story=story_xml(action=keep)))
 
 
-def test_duplicate_sibling_names_are_a_warning(scenario_xml: Build, story_xml: Text) -> None:
+def test_duplicate_sibling_names_are_a_warning() -> None:
     scenario = load_scenario(scenario_xml(story=story_xml() + story_xml()))
     assert scenario.warnings[0].message == "two elements of the kind story are named 'story'"
 
@@ -133,7 +127,7 @@ def test_duplicate_sibling_names_are_a_warning(scenario_xml: Build, story_xml: T
 class TestRoadFile:
     LOGIC = '<LogicFile filepath="{}"/>'
 
-    def test_road_file_is_found_in_scenario_folder(self, tmp_path: Path, scenario_xml: Build) -> None:
+    def test_road_file_is_found_in_scenario_folder(self, tmp_path: Path) -> None:
         (tmp_path / "roads").mkdir()
         (tmp_path / "roads" / "town.xodr").touch()
         path = tmp_path / "scene.xosc"
@@ -142,14 +136,14 @@ class TestRoadFile:
 
     @pytest.mark.parametrize("name", ["Town01", "Town01.xodr", "../elsewhere/Town01.xodr", "C:\\maps\\Town01.xodr"])
     def test_road_file_is_found_in_map_folders(
-        self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch, name: str
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
     ) -> None:
         (tmp_path / "Town01.xodr").touch()
         monkeypatch.setenv("EIDRIVE_MAPS", f"/nonexistent:{tmp_path}")
         assert load_scenario(scenario_xml(road=self.LOGIC.format(name))).road_file == tmp_path / "Town01.xodr"
 
     def test_missing_road_file_error_suggests_similar_name(
-        self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         (tmp_path / "Town01.xodr").touch()
         monkeypatch.setenv("EIDRIVE_MAPS", str(tmp_path))
@@ -157,14 +151,14 @@ class TestRoadFile:
             load_scenario(scenario_xml(road=self.LOGIC.format("Twon01.xodr")))
 
     def test_missing_road_file_suggestion_ignores_the_suffix(
-        self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         (tmp_path / "offset.xodr").touch()
         monkeypatch.setenv("EIDRIVE_MAPS", str(tmp_path))
         with pytest.raises(ScenarioError, match=r"road file 'maps\\nowhere\.xodr' is neither .* known: offset$"):
             load_scenario(scenario_xml(road=self.LOGIC.format("maps\\nowhere.xodr")))
 
-    def test_scenario_without_road_file_has_none(self, scenario_xml: Build) -> None:
+    def test_scenario_without_road_file_has_none(self) -> None:
         assert load_scenario(scenario_xml()).road_file is None
 
 

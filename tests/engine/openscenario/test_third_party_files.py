@@ -1,16 +1,14 @@
 """Files of third-party editors and tools: encodings, names, numbers and typical errors."""
 
 import codecs
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from openscenario_xml import scenario_xml
+from storyboard_xml import story_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
-
-Build = Callable[..., bytes]
-Text = Callable[..., str]
 
 PROFILE = """<LongitudinalAction><SpeedAction>
 <SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="{dimension}" value="{extent}"/>
@@ -61,13 +59,13 @@ def curve(order: int, points: int, knots: str, more: str = "") -> str:
         ("windows-1252", "cp1252", b""),
     ],
 )
-def test_document_encodings_are_read(scenario_xml: Build, declared: str, encoding: str, mark: bytes) -> None:
+def test_document_encodings_are_read(declared: str, encoding: str, mark: bytes) -> None:
     text = scenario_xml().decode().replace('name="Ego"', 'name="Mäuschen"')
     head = f'<?xml version="1.0" encoding="{declared}"?>\n' if declared else ""
     assert list(load_scenario(mark + (head + text).encode(encoding)).entities) == ["Mäuschen"]
 
 
-def test_comments_and_processing_instructions_have_no_effect(scenario_xml: Build, story_xml: Text) -> None:
+def test_comments_and_processing_instructions_have_no_effect() -> None:
     plain = scenario_xml(story=story_xml())
     dressed = plain.replace(
         b"<OpenSCENARIO>",
@@ -78,13 +76,13 @@ def test_comments_and_processing_instructions_have_no_effect(scenario_xml: Build
     assert load_scenario(dressed).storyboard == load_scenario(plain).storyboard
 
 
-def test_document_namespace_is_an_error(scenario_xml: Build) -> None:
+def test_document_namespace_is_an_error() -> None:
     xml = scenario_xml().replace(b"<OpenSCENARIO>", b'<OpenSCENARIO xmlns="urn:x">')
     with pytest.raises(ScenarioError, match=r"remove xmlns='urn:x'"):
         load_scenario(xml)
 
 
-def test_names_in_any_script_are_read(scenario_xml: Build, story_xml: Text) -> None:
+def test_names_in_any_script_are_read() -> None:
     xml = (
         scenario_xml(story=story_xml()).decode().replace("Ego", "車 ①").replace('"event"', '"&lt;ブレーキ &amp; 2&gt;"')
     )
@@ -94,7 +92,7 @@ def test_names_in_any_script_are_read(scenario_xml: Build, story_xml: Text) -> N
 
 
 @pytest.mark.parametrize(("written", "value"), [("1e1", 10.0), ("+5", 5.0), (" 2 ", 2.0), (".5", 0.5), ("1.E0", 1.0)])
-def test_numbers_in_schema_notation_are_read(scenario_xml: Build, story_xml: Text, written: str, value: float) -> None:
+def test_numbers_in_schema_notation_are_read(written: str, value: float) -> None:
     action = load_scenario(scenario_xml(story=story_xml(speed=written))).storyboard.story[0].act[0].maneuver_group[0]
     private = action.maneuver[0].event[0].action[0].private_action
     assert private is not None
@@ -144,20 +142,18 @@ def test_numbers_in_schema_notation_are_read(scenario_xml: Build, story_xml: Tex
         ),
     ],
 )
-def test_unusable_numbers_are_errors(
-    tmp_path: Path, scenario_xml: Build, story_xml: Text, action: str, message: str
-) -> None:
+def test_unusable_numbers_are_errors(tmp_path: Path, action: str, message: str) -> None:
     path = tmp_path / "scene.xosc"
     path.write_bytes(scenario_xml(story=story_xml(action=action)))
     with pytest.raises(ScenarioError, match=rf"scene\.xosc:\d+: {message}"):
         load_scenario(path)
 
 
-def test_infinite_rates_and_limits_are_accepted(scenario_xml: Build, story_xml: Text) -> None:
+def test_infinite_rates_and_limits_are_accepted() -> None:
     for action in (PROFILE.format(dimension="rate", extent="INF", speed=5), LIMITED.format(limit="INF")):
         load_scenario(scenario_xml(story=story_xml(action=action)))
     load_scenario(scenario_xml(story=story_xml(condition=ENDLESS)))
 
 
-def test_negative_rates_are_accepted(scenario_xml: Build, story_xml: Text) -> None:
+def test_negative_rates_are_accepted() -> None:
     load_scenario(scenario_xml(story=story_xml(action=PROFILE.format(dimension="rate", extent="-4", speed=5))))

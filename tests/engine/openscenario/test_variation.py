@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable
 
 import pytest
+from openscenario_xml import parameters_xml, scenario_xml
+from storyboard_xml import story_xml
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.openscenario import Scenario, load_scenario
@@ -22,9 +24,7 @@ def command(content: str) -> str:
 
 
 @pytest.fixture
-def build(
-    scenario_xml: Callable[..., bytes], story_xml: Callable[..., str], parameters_xml: Callable[..., str]
-) -> Build:
+def build() -> Build:
     """Return a function that loads a scenario with the parameters Start and Speed."""
 
     def loaded(init: str, action: str = "") -> Scenario:

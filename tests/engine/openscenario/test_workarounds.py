@@ -1,12 +1,12 @@
 """Workarounds for schema deviations of authoring tools, which are read with a warning."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
 import pytest
 from lxml import etree
+from openscenario_xml import catalog_xml, scenario_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import Scenario, load_scenario
@@ -22,7 +22,6 @@ from eidrive_scenario.openscenario.model import (
     Sun,
 )
 
-Build = Callable[..., bytes]
 Kind = TypeVar("Kind")
 
 LIGHT = """<Private entityRef="Ego"><PrivateAction><AppearanceAction><LightStateAction transitionTime="0">
@@ -42,10 +41,8 @@ MIXED = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutio
 <Actors selectTriggeringEntities="false"/><Maneuver name="m"><Event name="e" priority="parallel">
 <Action name="x"><UserDefinedAction><CustomCommandAction type="x"/></UserDefinedAction></Action></Event></Maneuver>
 <CatalogReference catalogName="ways" entryName="from the shelf"/></ManeuverGroup></Act></Story>"""
-SHELF = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="" author=""/>
-<Catalog name="ways"><Maneuver name="from the shelf"><Event name="e2" priority="parallel"><Action name="x">
-<UserDefinedAction><CustomCommandAction type="x"/></UserDefinedAction></Action></Event></Maneuver></Catalog>
-</OpenSCENARIO>"""
+SHELF = """<Maneuver name="from the shelf"><Event name="e2" priority="parallel"><Action name="x">
+<UserDefinedAction><CustomCommandAction type="x"/></UserDefinedAction></Action></Event></Maneuver>"""
 BARE = """<GlobalAction><Environment name="e"/></GlobalAction>"""
 
 
@@ -53,7 +50,7 @@ def only(scenario: Scenario, kind: type[Kind]) -> Kind:
     return next(one for one in scenario.document.walk() if isinstance(one, kind))
 
 
-def test_light_type_after_light_state_is_a_warning(scenario_xml: Build) -> None:
+def test_light_type_after_light_state_is_a_warning() -> None:
     scenario = load_scenario(scenario_xml(init=LIGHT))
     action = only(scenario, LightStateAction)
     assert action.light_state.mode is LightMode.ON
@@ -63,21 +60,21 @@ def test_light_type_after_light_state_is_a_warning(scenario_xml: Build) -> None:
     assert action.line == warning.line
 
 
-def test_workarounds_do_not_change_the_given_tree(scenario_xml: Build) -> None:
+def test_workarounds_do_not_change_the_given_tree() -> None:
     root = etree.fromstring(scenario_xml(init=LIGHT))
     before = etree.tostring(root)
     load_scenario(root)
     assert etree.tostring(root) == before
 
 
-def test_misspelled_signal_group_state_is_a_warning(scenario_xml: Build) -> None:
+def test_misspelled_signal_group_state_is_a_warning() -> None:
     scenario = load_scenario(scenario_xml(road=CONTROLLER))
     assert only(scenario, Phase).traffic_signal_group_state is not None
     assert "write TrafficSignalGroupState" in str(scenario.warnings[0])
     assert load_scenario(scenario_xml(minor=2, road=CONTROLLER)).warnings == ()
 
 
-def test_illuminance_before_1_3_is_a_warning(scenario_xml: Build) -> None:
+def test_illuminance_before_1_3_is_a_warning() -> None:
     scenario = load_scenario(scenario_xml(minor=2, init=SUNNY.format(word="illuminance")))
     assert only(scenario, Sun).intensity == 1000.0
     assert "increase revMinor to 3" in str(scenario.warnings[0])
@@ -86,11 +83,8 @@ def test_illuminance_before_1_3_is_a_warning(scenario_xml: Build) -> None:
         load_scenario(scenario_xml(minor=2, init=both))
 
 
-def test_workarounds_apply_to_catalogs(scenario_xml: Build, tmp_path: Path) -> None:
-    (tmp_path / "skies.xosc").write_text(
-        '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-31T12:00:00" description="" author=""/>\n'
-        f'<Catalog name="skies">{ENVIRONMENT.format(word="illuminance")}</Catalog></OpenSCENARIO>'
-    )
+def test_workarounds_apply_to_catalogs(tmp_path: Path) -> None:
+    (tmp_path / "skies.xosc").write_bytes(catalog_xml("skies", ENVIRONMENT.format(word="illuminance"), minor=2))
     place = f'<EnvironmentCatalog><Directory path="{tmp_path}"/></EnvironmentCatalog>'
     reference = '<CatalogReference catalogName="skies" entryName="e"/>'
     action = f"<GlobalAction><EnvironmentAction>{reference}</EnvironmentAction></GlobalAction>"
@@ -98,11 +92,11 @@ def test_workarounds_apply_to_catalogs(scenario_xml: Build, tmp_path: Path) -> N
     (entry,) = scenario.entries.values()
     assert next(one.intensity for one in entry.walk() if isinstance(one, Sun)) == 1000.0
     (warning,) = [one for one in scenario.warnings if "illuminance" in one.message]
-    assert (warning.source, warning.line) == (str(tmp_path / "skies.xosc"), 3)
+    assert (warning.source, warning.line) == (str(tmp_path / "skies.xosc"), 4)
 
 
-def test_maneuver_before_catalog_reference_is_a_warning(scenario_xml: Build, tmp_path: Path) -> None:
-    (tmp_path / "ways.xosc").write_text(SHELF)
+def test_maneuver_before_catalog_reference_is_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "ways.xosc").write_bytes(catalog_xml("ways", SHELF))
     place = f'<ManeuverCatalog><Directory path="{tmp_path}"/></ManeuverCatalog>'
     scenario = load_scenario(scenario_xml(catalogs=place, story=MIXED))
     group = only(scenario, ManeuverGroup)
@@ -110,7 +104,7 @@ def test_maneuver_before_catalog_reference_is_a_warning(scenario_xml: Build, tmp
     assert "put CatalogReferences first" in str(scenario.warnings[0])
 
 
-def test_command_without_user_defined_action_is_a_warning(scenario_xml: Build) -> None:
+def test_command_without_user_defined_action_is_a_warning() -> None:
     """scenariogeneration writes user-defined actions of Init in this form, and accepts them in events."""
     command = '<CustomCommandAction type="eidrive.channel">none</CustomCommandAction>'
     event = MIXED.replace("<UserDefinedAction>", "").replace("</UserDefinedAction>", "")
@@ -125,7 +119,7 @@ def test_command_without_user_defined_action_is_a_warning(scenario_xml: Build) -
     assert [str(one).count("put it into a UserDefinedAction") for one in scenario.warnings] == [1, 1]
 
 
-def test_misspelled_traffic_island_is_a_warning(scenario_xml: Build) -> None:
+def test_misspelled_traffic_island_is_a_warning() -> None:
     island = """<ScenarioObject name="Island"><MiscObject name="i" mass="1" miscObjectCategory="grafficIsland">
     <BoundingBox><Center x="0" y="0" z="0"/><Dimensions length="1" width="1" height="1"/></BoundingBox>
     <Properties/></MiscObject></ScenarioObject>"""
@@ -134,13 +128,13 @@ def test_misspelled_traffic_island_is_a_warning(scenario_xml: Build) -> None:
     assert "write trafficIsland" in str(scenario.warnings[0])
 
 
-def test_python_infinity_is_a_warning(scenario_xml: Build) -> None:
+def test_python_infinity_is_a_warning() -> None:
     scenario = load_scenario(scenario_xml(init=OFFSET.format(continuous="true", shape="step").replace("None", "inf")))
     assert only(scenario, LaneOffsetActionDynamics).max_lateral_acc == math.inf
     assert "is 'inf', which is read as infinity; write INF" in str(scenario.warnings[0])
 
 
-def test_empty_orientation_is_a_warning(scenario_xml: Build) -> None:
+def test_empty_orientation_is_a_warning() -> None:
     """By the standard the type is absolute and the heading 0; scenariogeneration writes it by default."""
     relative = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation {}/></RelativeObjectPosition>'
     action = '<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>{}</Position></TeleportAction>{}'
@@ -150,7 +144,7 @@ def test_empty_orientation_is_a_warning(scenario_xml: Build) -> None:
     assert load_scenario(scenario_xml(init=action.format(relative.format('type="relative"'), end))).warnings == ()
 
 
-def test_none_in_optional_attribute_is_a_warning(scenario_xml: Build) -> None:
+def test_none_in_optional_attribute_is_a_warning() -> None:
     scenario = load_scenario(scenario_xml(init=OFFSET.format(continuous="true", shape="linear")))
     (warning,) = scenario.warnings
     assert warning.message == (
@@ -160,6 +154,6 @@ def test_none_in_optional_attribute_is_a_warning(scenario_xml: Build) -> None:
         load_scenario(scenario_xml(init=OFFSET.format(continuous="None", shape="linear")))
 
 
-def test_element_one_level_too_high_error_has_correct_parent(scenario_xml: Build) -> None:
+def test_element_one_level_too_high_error_has_correct_parent() -> None:
     with pytest.raises(ScenarioError, match="Environment in GlobalAction; Environment belongs into EnvironmentAction"):
         load_scenario(scenario_xml(init=BARE))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from opendrive_xml import map_xml, road_xml
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import iou_bev
@@ -168,12 +169,7 @@ def test_detect_mirrored_scene_returns_mirrored_boxes(street: Any, detector: Any
     assert sorted(after.classes) == sorted(before.classes)
 
 
-ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="100" id="1" junction="-1">
-<planView><geometry s="0" x="-50" y="0" hdg="0" length="100"><line/></geometry></planView>
-<lanes><laneSection s="0"><left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></left>
-<center><lane id="0" type="none"/></center>
-<right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
-</road></OpenDRIVE>"""
+ROAD = map_xml(road_xml(x=-50.0))
 
 
 def test_detect_with_map_uses_roads_and_lane_directions(street: Any) -> None:

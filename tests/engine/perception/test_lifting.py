@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from opendrive_xml import elevation_xml, map_xml, road_xml
 
 from eidrive_scenario.geometry import iou_bev, rotation_matrix
 from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
@@ -219,21 +220,18 @@ def test_lift_in_rotated_or_mirrored_view_returns_rotated_or_mirrored_boxes() ->
     np.testing.assert_allclose(other[:2], one[:2] * (1, -1), atol=1e-6)
 
 
-ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="120" id="1" junction="-1">
-<planView><geometry s="0" x="-20" y="0" hdg="0" length="120"><line/></geometry></planView>
-<elevationProfile><elevation s="0" a="{a}" b="{b}" c="0" d="0"/></elevationProfile>
-<lanes><laneSection s="0"><left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></left>
-<center><lane id="0" type="none"/></center>
-<right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
-</road></OpenDRIVE>"""
+def road(height: float = 0.0, slope: float = 0.0) -> MapContext:
+    """Return a road along x from -20 m with a lane in each direction."""
+    return MapContext(
+        RoadNetwork.parse(map_xml(road_xml(length=120.0, x=-20.0, profiles=elevation_xml(height, slope))))
+    )
 
 
 def test_lift_with_map_uses_lane_direction() -> None:
     view = camera(y=-1.75)
     oncoming = box("car", 25, 1.75, math.pi)
     edges = np.array([outline(oncoming, view)])
-    roads = MapContext(RoadNetwork.parse(ROAD.format(a=0.0, b=0.0)))
-    found = lift(edges, ["car"], [1.0], view, time=0.0, surroundings=roads)
+    found = lift(edges, ["car"], [1.0], view, time=0.0, surroundings=road())
     assert math.cos(found.boxes[0, 6]) == pytest.approx(-1.0, abs=1e-6)
     assert math.cos(lift(edges, ["car"], [1.0], view, time=0.0).boxes[0, 6]) > 0.5
 
@@ -243,8 +241,7 @@ def test_lift_with_map_uses_road_height() -> None:
     view = camera(y=-1.75)
     target = box("car", 30, -1.75, 0.0, ground=1.5)
     edges = np.array([outline(target, view)])
-    roads = MapContext(RoadNetwork.parse(ROAD.format(a=-1.0, b=0.05)))
-    found = lift(edges, ["car"], [1.0], view, time=0.0, surroundings=roads)
+    found = lift(edges, ["car"], [1.0], view, time=0.0, surroundings=road(-1.0, 0.05))
     assert math.dist(found.boxes[0, :2], target[:2]) < 1.0
     assert found.boxes[0, 2] == pytest.approx(target[2], abs=0.15)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from scenario_1 import FrameCollector, with_properties
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -15,7 +16,6 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, load_for_seed
 
 Write = Callable[..., Path]
-MODULE = '<Property name="module" value="eidrive"/>'
 
 
 @pytest.fixture
@@ -23,14 +23,7 @@ def write(tmp_path: Path) -> Write:
     """Write scenario 1 with further properties of the ego (or the roadside unit), each on a separate line."""
 
     def write(rsu: bool = False, **properties: str) -> Path:
-        original = resolve_scenario("coop/scenario_1")
-        folder = original.parent.parent
-        head, ego, mast = original.read_text().replace('"../', f'"{folder}/').split(MODULE)
-        more = "".join(f'\n<Property name="{name}" value="{value}"/>' for name, value in properties.items())
-        text = MODULE.join([head, ego, more + mast] if rsu else [head, more + ego, mast])
-        path = tmp_path / "scenario.xosc"
-        path.write_text(text)
-        return path
+        return with_properties(tmp_path, "RsuStack" if rsu else "EgoStack", *properties.items())
 
     return write
 
@@ -150,21 +143,8 @@ def test_unknown_detector_option_is_error_with_suggestion(write: Write) -> None:
     assert "did you mean 'lidar'?" in diagnostic
 
 
-class Collector:
-    """Observer that stores the frames of a run."""
-
-    def __init__(self) -> None:
-        self.frames: list[Frame] = []
-
-    def observe(self, frame: Frame) -> None:
-        self.frames.append(frame)
-
-    def close(self) -> None:
-        pass
-
-
 def run(path: Path, **options: object) -> tuple[RunResult, list[Frame]]:
-    collector = Collector()
+    collector = FrameCollector()
     settings = RunSettings(**options)  # type: ignore[arg-type]
     simulation = Simulation(load_for_seed(path, 1, {}), seed=1, settings=settings, observers=[collector])
     return simulation.run(), collector.frames

@@ -6,11 +6,11 @@ import shutil
 from pathlib import Path
 
 import pytest
+from openscenario_xml import catalog_xml
 
 pytest_plugins = ["pytester"]
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
-CATALOG = '<OpenSCENARIO><FileHeader/><Catalog name="cars"/></OpenSCENARIO>'
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
     data = pytester.mkdir("data")
     for name in ("first", "second"):
         shutil.copy(PASSING_BY, data / f"{name}.xosc")
-    (data / "cars.xosc").write_text(CATALOG)
+    (data / "cars.xosc").write_bytes(catalog_xml("cars", ""))
     (data / "other.xosc").write_text("<somethingElse/>")
     return pytester
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from openscenario_xml import deterministic_xml, distribution_xml, single_xml, values_xml
 
 # Imported here because pytester unloads modules after an in-process run, and numpy can be loaded only once.
 from eidrive_scenario.openscenario import load_distribution
@@ -16,18 +17,7 @@ from eidrive_scenario.openscenario import load_distribution
 pytest_plugins = ["pytester"]
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
-DISTRIBUTION = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="a test" author="test"/>
-<ParameterValueDistribution><ScenarioFile filepath="passing_by.xosc"/><Deterministic>
-<DeterministicSingleParameterDistribution parameterName="OtherY">
-{}
-</DeterministicSingleParameterDistribution>
-</Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
 CONSTRAINT = '<ConstraintGroup><ValueConstraint rule="lessThan" value="9"/></ConstraintGroup></ParameterDeclaration>'
-
-
-def values(*texts: str) -> str:
-    return f"<DistributionSet>{''.join(f'<Element value={text!r}/>' for text in texts)}</DistributionSet>"
 
 
 @pytest.fixture
@@ -39,7 +29,7 @@ def vary(pytester: pytest.Pytester) -> Callable[[str], Path]:
         text = text.replace('parameterType="double" value="5.0"/>', f'parameterType="double" value="5.0">{CONSTRAINT}')
         (pytester.path / "passing_by.xosc").write_text(text, encoding="utf-8")
         path = pytester.path / "vary.xosc"
-        path.write_text(DISTRIBUTION.format(distribution), encoding="utf-8")
+        path.write_bytes(distribution_xml(deterministic_xml(distribution), scenario="passing_by.xosc"))
         return path
 
     return write
@@ -51,7 +41,7 @@ def collected(pytester: pytest.Pytester, *arguments: str) -> list[str]:
 
 
 def test_distribution_yields_one_item_per_run(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
-    vary(values("5", "4.5", "roads/[town]::1.xodr"))
+    vary(values_xml("OtherY", "5", "4.5", "roads/[town]::1.xodr"))
     items = ["run0-OtherY=5-seed1", "run1-OtherY=4.5-seed1", "run2-OtherY=_town_1.xodr-seed1"]
     assert collected(pytester, "vary.xosc") == [f"vary.xosc::vary[{item}]" for item in items]
     one = "vary.xosc::vary[run1-OtherY=4.5-ideal-seed2]"
@@ -64,7 +54,11 @@ def test_distribution_yields_one_item_per_run(pytester: pytest.Pytester, vary: C
 
 
 def test_omitted_runs_are_reported(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
-    path = vary('<DistributionRange stepWidth="0.01"><Range lowerLimit="0" upperLimit="8"/></DistributionRange>')
+    path = vary(
+        single_xml(
+            "OtherY", '<DistributionRange stepWidth="0.01"><Range lowerLimit="0" upperLimit="8"/></DistributionRange>'
+        )
+    )
     assert len(load_distribution(path)) == 801
     result = pytester.runpytest_inprocess("--collect-only", "-q", "-p", "no:cacheprovider", "vary.xosc")
     assert len([line for line in result.outlines if "::" in line]) == 100
@@ -80,13 +74,13 @@ def test_omitted_runs_are_reported(pytester: pytest.Pytester, vary: Callable[[st
 def test_distribution_without_omitted_runs_prints_no_report(
     pytester: pytest.Pytester, vary: Callable[[str], Path]
 ) -> None:
-    vary(values("5", "4"))
+    vary(values_xml("OtherY", "5", "4"))
     result = pytester.runpytest_inprocess("--collect-only", "-q", "-p", "no:cacheprovider", "vary.xosc")
     result.stdout.no_fnmatch_line("*omitted*")
 
 
 def test_omitted_runs_of_xdist_workers_are_reported(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
-    vary(values("5", "4.5", "4"))
+    vary(values_xml("OtherY", "5", "4.5", "4"))
     arguments = ("vary.xosc", "--eidrive-max-runs", "2", "-n", "2", "-p", "no:cacheprovider")
     result = pytester.runpytest_subprocess(*arguments)
     result.assert_outcomes(passed=2)
@@ -96,7 +90,7 @@ def test_omitted_runs_of_xdist_workers_are_reported(pytester: pytest.Pytester, v
 def test_distribution_items_have_outcomes_and_properties(
     pytester: pytest.Pytester, vary: Callable[[str], Path]
 ) -> None:
-    path = vary(values("5", "0", "9"))
+    path = vary(values_xml("OtherY", "5", "0", "9"))
     arguments = ("vary.xosc", "--junitxml", "junit.xml", "--eidrive-out", "runs", "-rs", "-p", "no:cacheprovider")
     result = pytester.runpytest_subprocess(*arguments)
     result.assert_outcomes(passed=1, failed=1, skipped=1)
@@ -104,7 +98,7 @@ def test_distribution_items_have_outcomes_and_properties(
         [
             "run 1 of passing_by failed with channel *, seed 1",
             "collision: Ego and Parked hit each other at 1.6* s at *",
-            f"SKIPPED * excluded by constraints: {path}:5: parameter 'OtherY' is '9', outside its constraints;*",
+            f"SKIPPED * excluded by constraints: {path}:6: parameter 'OtherY' is '9', outside its constraints;*",
         ]
     )
     result.stdout.no_fnmatch_line("*Traceback*")
@@ -120,15 +114,19 @@ def test_distribution_items_have_outcomes_and_properties(
 
 
 def test_invalid_distribution_is_reported_with_its_line(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
-    path = vary('<DistributionRange stepWidth="0"><Range lowerLimit="0" upperLimit="8"/></DistributionRange>')
+    path = vary(
+        single_xml(
+            "OtherY", '<DistributionRange stepWidth="0"><Range lowerLimit="0" upperLimit="8"/></DistributionRange>'
+        )
+    )
     result = pytester.runpytest_inprocess("vary.xosc", "-p", "no:cacheprovider")
     result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines([f"{path}:5: stepWidth is 0; specify a number above zero"])
+    result.stdout.fnmatch_lines([f"{path}:6: stepWidth is 0; specify a number above zero"])
     result.stdout.no_fnmatch_line("*Traceback*")
 
 
 def test_max_runs_option_of_text_is_usage_error(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
-    vary(values("5"))
+    vary(values_xml("OtherY", "5"))
     result = pytester.runpytest_inprocess("vary.xosc", "--eidrive-max-runs", "some")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["*--eidrive-max-runs: not a positive integer (got 'some')"])

@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from openscenario_xml import catalog_xml
 
 pytest_plugins = ["pytester"]
 
@@ -18,7 +19,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
     folder = pytester.mkdir("drives")
     for name in ("first", "second"):
         shutil.copy(PASSING_BY, folder / f"{name}.xosc")
-    (folder / "cars.xosc").write_text('<OpenSCENARIO><FileHeader/><Catalog name="cars"/></OpenSCENARIO>')
+    (folder / "cars.xosc").write_bytes(catalog_xml("cars", ""))
     return pytester
 
 

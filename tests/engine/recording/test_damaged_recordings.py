@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -248,14 +249,8 @@ def test_view_of_many_decompression_bombs_is_bounded_in_memory(originals: list[P
 
 
 def test_view_of_huge_road_network_omits_roads(originals: list[Path], tmp_path: Path) -> None:
-    road = (
-        '<road id="{0}" length="1e6" junction="-1"><planView><geometry s="0" x="0" y="{0}" hdg="0" length="1e6"><line/>'
-        '</geometry></planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>'
-        '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right></laneSection></lanes>'
-        "</road>"
-    )
-    header = '<OpenDRIVE><header revMajor="1" revMinor="7"/>'
-    huge = (header + "".join(road.format(number) for number in range(200)) + "</OpenDRIVE>").encode()
+    roads = (road_xml(str(number), length=1e6, y=float(number), lanes=lanes_xml(0, 1, 3)) for number in range(200))
+    huge = map_xml(*roads).encode()
     path = tmp_path / "huge.mcap"
     path.write_bytes(_with_road(originals[1].read_bytes(), huge))
     started = time.perf_counter()

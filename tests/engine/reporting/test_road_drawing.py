@@ -4,50 +4,38 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing, simplify_line
 from eidrive_scenario.reporting.drawing.top_view import Window
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.reading.document import parse_road_map
 
-ROAD = b"""<?xml version="1.0"?>
-<OpenDRIVE>
-  <header revMajor="1" revMinor="6" name="street"/>
-  <road id="1" length="50" junction="-1">
-    <planView>
-      <geometry s="0" x="10" y="5" hdg="0" length="50">{shape}</geometry>
-    </planView>
-    <lanes>
-      <laneSection s="0">
-        <left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>
-          <roadMark sOffset="0" type="solid" width="0.12"/></lane></left>
-        <center><lane id="0" type="none"><roadMark sOffset="0" type="broken" width="0.12"/>
-          <roadMark sOffset="30" type="none" width="0.12"/></lane></center>
-        <right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
-          <lane id="-2" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane></right>
-      </laneSection>
-    </lanes>
-  </road>
-</OpenDRIVE>
-"""
+MARK = '<roadMark sOffset="{}" type="{}" width="0.12"/>'
+LANES = section_xml(
+    lane_xml(1, more=MARK.format(0, "solid")),
+    lane_xml(-1) + lane_xml(-2, 2, kind="sidewalk"),
+    center=MARK.format(0, "broken") + MARK.format(30, "none"),
+)
 
 
-def roads(shape: bytes) -> list[Road]:
-    return list(parse_road_map(ROAD.replace(b"{shape}", shape), "street.xodr").roads.values())
+def roads(curvature: float = 0.0) -> list[Road]:
+    text = map_xml(road_xml(length=50.0, x=10.0, y=5.0, curvature=curvature, lanes=LANES))
+    return list(parse_road_map(text.encode(), "street.xodr").roads.values())
 
 
 def test_road_drawing_of_straight_lane_is_a_rectangle() -> None:
-    drawing = road_drawing(roads(b"<line/>"))
+    drawing = road_drawing(roads())
     by_type = {kind: polygon for kind, polygon in drawing.lanes if kind == "sidewalk"}
     assert by_type["sidewalk"] == pytest.approx(np.array([[10, 1.5], [60, 1.5], [60, -0.5], [10, -0.5]]))
 
 
 def test_road_drawing_orders_driving_lanes_after_sidewalks() -> None:
-    assert [kind for kind, _ in road_drawing(roads(b"<line/>")).lanes] == ["sidewalk", "driving", "driving"]
+    assert [kind for kind, _ in road_drawing(roads()).lanes] == ["sidewalk", "driving", "driving"]
 
 
 def test_road_drawing_of_marks_ends_at_their_length() -> None:
-    markings = {kind: line for kind, _, line in road_drawing(roads(b"<line/>")).markings}
+    markings = {kind: line for kind, _, line in road_drawing(roads()).markings}
     assert set(markings) == {"solid", "broken"}
     assert markings["broken"] == pytest.approx(np.array([[10, 5], [40, 5]]))
     assert markings["solid"] == pytest.approx(np.array([[10, 8.5], [60, 8.5]]))
@@ -55,7 +43,7 @@ def test_road_drawing_of_marks_ends_at_their_length() -> None:
 
 def test_road_drawing_of_curved_edge_is_within_tolerance() -> None:
     """Curvature 0.02: the left lane's outer edge is a circle of radius 46.5 m about (10, 55)."""
-    drawing = road_drawing(roads(b'<arc curvature="0.02"/>'))
+    drawing = road_drawing(roads(0.02))
     solid = next(line for kind, _, line in drawing.markings if kind == "solid")
     ends = np.hypot(solid[:, 0] - 10.0, solid[:, 1] - 55.0)
     middles = np.hypot(*((solid[1:] + solid[:-1]) / 2 - (10.0, 55.0)).T)
@@ -65,9 +53,9 @@ def test_road_drawing_of_curved_edge_is_within_tolerance() -> None:
 
 
 def test_road_drawing_with_window_omits_lanes_outside() -> None:
-    drawing = road_drawing(roads(b"<line/>"), Window(0, 20, 6.0, 20))
+    drawing = road_drawing(roads(), Window(0, 20, 6.0, 20))
     assert [kind for kind, _ in drawing.lanes] == ["driving"]
-    assert not road_drawing(roads(b"<line/>"), Window(100, 120, 0, 20)).lanes
+    assert not road_drawing(roads(), Window(100, 120, 0, 20)).lanes
 
 
 def test_simplify_line_keeps_corners_only() -> None:

@@ -6,6 +6,19 @@ from pathlib import Path
 import pytest
 from lxml import etree
 from matplotlib.font_manager import findfont, get_font
+from openscenario_xml import scenario_xml, variables_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    element_state_xml,
+    event_xml,
+    group_xml,
+    groups_xml,
+    maneuver_xml,
+    time_xml,
+    trigger_xml,
+)
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.reporting.storyboard_diagram.boxes import BoxLine, Role, init_boxes, stop_lines, story_boxes
@@ -14,47 +27,27 @@ from eidrive_scenario.reporting.storyboard_diagram.layout import DiagramLayout, 
 from eidrive_scenario.reporting.storyboard_diagram.text_width import width_of, wrap_text
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
-HEAD = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="3" date="2025-01-01T00:00:00" description="tree" author="test"/>
-<VariableDeclarations><VariableDeclaration name="v" variableType="integer" value="0"/></VariableDeclarations>
-<CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions/></Init><Story name="story &lt;1&gt;">"""
-TAIL = "</Story>{stop}</Storyboard></OpenSCENARIO>"
-ACTION = """<Action name="{}"><GlobalAction><VariableAction variableRef="v"><SetAction value="1"/></VariableAction>
-</GlobalAction></Action>"""
-
-
-def condition(inside: str, edge: str = "none") -> str:
-    value = f"<ByValueCondition>{inside}</ByValueCondition>"
-    return f'<Condition name="c" delay="0" conditionEdge="{edge}">{value}</Condition>'
+SET = '<GlobalAction><VariableAction variableRef="v"><SetAction value="1"/></VariableAction></GlobalAction>'
+TIME = condition_xml(time_xml(3), "rising")
 
 
 def after(name: str, kind: str = "event") -> str:
-    return condition(
-        f'<StoryboardElementStateCondition storyboardElementType="{kind}" storyboardElementRef="{name}" '
-        'state="endTransition"/>'
-    )
-
-
-TIME = condition('<SimulationTimeCondition rule="greaterThan" value="3"/>', "rising")
+    return condition_xml(element_state_xml(kind, name, "endTransition"))
 
 
 def event(name: str, *groups: str, count: int = 1) -> str:
-    trigger = "".join(f"<ConditionGroup>{group}</ConditionGroup>" for group in groups)
-    start = f"<StartTrigger>{trigger}</StartTrigger>" if groups else ""
-    action = ACTION.format(f"{name} action")
-    return f'<Event name="{name}" priority="parallel" maximumExecutionCount="{count}">{action}{start}</Event>'
+    return event_xml(name, SET, trigger_xml(*groups), count=count)
 
 
 def act(name: str, *maneuvers: str) -> str:
-    inside = "".join(f'<Maneuver name="{name} m{n}">{events}</Maneuver>' for n, events in enumerate(maneuvers))
-    return (
-        f'<Act name="{name}"><ManeuverGroup name="{name} group" maximumExecutionCount="1">'
-        f'<Actors selectTriggeringEntities="false"/>{inside}</ManeuverGroup></Act>'
-    )
+    inside = "".join(maneuver_xml(events, f"{name} m{n}") for n, events in enumerate(maneuvers))
+    return act_xml(group_xml(inside, "", name=f"{name} group"), name=name)
 
 
 def storyboard(*acts: str, stop: str = "") -> Storyboard:
-    return Storyboard(load_scenario((HEAD + "".join(acts) + TAIL.format(stop=stop)).encode()), None, dt=0.1)
+    story = acts_xml(*acts, name="story &lt;1&gt;")
+    text = scenario_xml(declarations=variables_xml(v=("integer", "0")), entities="", story=story, stop=stop)
+    return Storyboard(load_scenario(text), None, dt=0.1)
 
 
 CHAIN = act(
@@ -134,7 +127,7 @@ def test_layout_lines_fit_into_boxes(layout: DiagramLayout) -> None:
 
 
 def test_storyboard_diagram_is_well_formed_and_complete(tmp_path: Path) -> None:
-    made = storyboard(CHAIN, stop=f"<StopTrigger><ConditionGroup>{TIME}</ConditionGroup></StopTrigger>")
+    made = storyboard(CHAIN, stop=groups_xml(TIME))
     path = write_storyboard_diagram(made, tmp_path / "new" / "tree.svg")
     root = etree.parse(path).getroot()
     texts = [str(node.xpath("string()")) for node in root.iter("{*}text")]

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
 from scipy.spatial.transform import Rotation
 
 from eidrive_scenario.roads import RoadNetwork
 
-Text = Callable[..., str]
-
 
 def lane(width: float, offset: float = 0.0) -> str:
-    return (
-        f'<laneOffset s="0" a="{offset}" b="0" c="0" d="0"/><laneSection s="0"><center><lane id="0"/></center>'
-        f'<right><lane id="-1" type="driving"><width sOffset="0" a="{width}" b="0" c="0" d="0"/></lane></right>'
-        "</laneSection>"
-    )
+    return f'<laneOffset s="0" a="{offset}" b="0" c="0" d="0"/>{lanes_xml(0, 1, width)}'
 
 
 def profiles(elevation: str, bank: float, twist: float = 0.0) -> str:
@@ -34,16 +28,16 @@ CREST = 'a="0" b="0" c="0.15" d="-0.005"'
 
 
 @pytest.fixture
-def climbing(road: Text, map_of: Text) -> RoadNetwork:
+def climbing() -> RoadNetwork:
     """Slope of 10 % with a bank of 0.4 rad and one lane of 6 m, as slope_up_leaning_right of esmini."""
-    return RoadNetwork.parse(map_of(road(length=50.0, lanes=lane(6.0), extra=profiles(CLIMB, 0.4))))
+    return RoadNetwork.parse(map_xml(road_xml(length=50.0, lanes=lane(6.0), profiles=profiles(CLIMB, 0.4))))
 
 
 @pytest.fixture
-def crest(road: Text, map_of: Text) -> RoadNetwork:
+def crest() -> RoadNetwork:
     """Crest to the north with a bank of 45° and one lane centered at t = -2.5, as tilted_crest of esmini."""
-    lanes, extra = lane(3.0, -1.0), profiles(CREST, math.pi / 4)
-    return RoadNetwork.parse(map_of(road(length=20.0, hdg=math.pi / 2, lanes=lanes, extra=extra)))
+    lanes, tilted = lane(3.0, -1.0), profiles(CREST, math.pi / 4)
+    return RoadNetwork.parse(map_xml(road_xml(length=20.0, hdg=math.pi / 2, lanes=lanes, profiles=tilted)))
 
 
 def test_lane_pose_on_banked_slope_leans_as_in_esmini(climbing: RoadNetwork, crest: RoadNetwork) -> None:
@@ -74,10 +68,10 @@ def surface_frame(network: RoadNetwork, s: float, offset: float) -> np.ndarray:
 
 @pytest.mark.parametrize("offset", [-1.0, 0.0, 1.2])
 @pytest.mark.parametrize("twist", [0.0, 0.02])
-def test_lane_pose_lies_in_the_surface(road: Text, map_of: Text, twist: float, offset: float) -> None:
+def test_lane_pose_lies_in_the_surface(twist: float, offset: float) -> None:
     bend = '<geometry s="0" x="3" y="4" hdg="0.7" length="20"><arc curvature="0.03"/></geometry>'
-    text = road(length=20.0, geometry=bend, lanes=lane(3.0, -1.0), extra=profiles(CREST, 0.5, twist))
-    network = RoadNetwork.parse(map_of(text))
+    text = road_xml(length=20.0, geometry=bend, lanes=lane(3.0, -1.0), profiles=profiles(CREST, 0.5, twist))
+    network = RoadNetwork.parse(map_xml(text))
     for s in (2.0, 9.0, 16.0):
         pose = network.lane_pose_at("1", -1, s, offset)
         body = Rotation.from_euler("ZYX", pose[3:]).as_matrix()

@@ -10,12 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from opendrive_xml import map_xml, road_xml
 
 from eidrive_scenario.roads import PositionError, RoadNetwork
 from eidrive_scenario.roads.georeference import parse_geo_reference
 
 RoadText = Callable[..., str]
-MAP = '<OpenDRIVE>\n<header revMajor="1" revMinor="6">\n{inside}</header>{road}</OpenDRIVE>'
 
 
 def plane(text: str, latitude: float, longitude: float) -> tuple[float, float]:
@@ -170,34 +170,34 @@ def test_import_of_roads_does_not_import_pyproj() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_offset_shifts_and_rotates_the_plane(road: RoadText) -> None:
+def test_offset_shifts_and_rotates_the_plane() -> None:
     """The origin is 20 km east of the central meridian at 48°N, and the file is rotated by a right angle."""
     text = "<geoReference><![CDATA[ +proj=utm +zone=32 +datum=WGS84 ]]></geoReference>"
     place = plane("+proj=utm +zone=32 +datum=WGS84", 48.0, 9.25)
     shifted = text + f'<offset x="{place[0]!r}" y="{place[1]!r}" z="100" hdg="{math.pi / 2!r}"/>'
-    network = RoadNetwork.parse(MAP.format(inside=shifted, road=road()))
+    network = RoadNetwork.parse(map_xml(road_xml(), header=shifted))
     angles = math.radians(48.0), math.radians(9.25)
     assert network.geographic(*angles) == pytest.approx((0.0, 0.0), abs=1e-6)
     east = network.geographic(angles[0], angles[1] + 1e-6)
     assert east[0] == pytest.approx(0.0, abs=0.02)
     assert east[1] < -4.0
-    plain = RoadNetwork.parse(MAP.format(inside=text, road=road()))
+    plain = RoadNetwork.parse(map_xml(road_xml(), header=text))
     assert plain.geographic(*angles) == pytest.approx(place)
 
 
-def test_map_without_valid_geo_reference_has_no_geographic_positions(road: RoadText) -> None:
-    network = RoadNetwork.parse(MAP.format(inside="", road=road()))
+def test_map_without_valid_geo_reference_has_no_geographic_positions() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml()))
     with pytest.raises(PositionError, match="add <geoReference>"):
         network.geographic(0.8, 0.1)
     invalid = "<geoReference>+proj=mars</geoReference>"
-    network = RoadNetwork.parse(MAP.format(inside=invalid, road=road()), "mars.xodr")
-    with pytest.raises(PositionError, match=r"mars.xodr:3: <geoReference>: .*'mars'.*\+proj=utm \+zone=32"):
+    network = RoadNetwork.parse(map_xml(road_xml(), header=f"\n{invalid}"), "mars.xodr")
+    with pytest.raises(PositionError, match=r"mars.xodr:2: <geoReference>: .*'mars'.*\+proj=utm \+zone=32"):
         network.geographic(0.8, 0.1)
 
 
-def test_point_outside_the_projection_is_an_error(road: RoadText) -> None:
+def test_point_outside_the_projection_is_an_error() -> None:
     """UTM is undefined 92° from its central meridian at the equator."""
     text = "<geoReference>+proj=utm +zone=32</geoReference>"
-    network = RoadNetwork.parse(MAP.format(inside=text, road=road()))
+    network = RoadNetwork.parse(map_xml(road_xml(), header=text))
     with pytest.raises(PositionError, match="the projection is undefined at latitude and longitude 0°, 101°"):
         network.geographic(0.0, math.radians(101.0))

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from opendrive_xml import map_xml, road_xml, section_xml
+from road_errors import road_diagnostics
 
 from eidrive_scenario.errors import RoadError
 from eidrive_scenario.roads import RoadNetwork, placed_objects, surface_meshes
 
-Text = Callable[..., str]
-
 LANE = '<lane id="{0}" type="driving"><width sOffset="0" a="4" b="{1}" c="0" d="0"/></lane>'
 
 
-def section(narrowing: float = 0.0, before: str = "") -> str:
-    left, right = LANE.format(1, narrowing), LANE.format(-1, narrowing)
-    return (
-        f'{before}<laneSection s="0"><left>{left}</left><center><lane id="0"/></center><right>{right}</right>'
-        "</laneSection>"
-    )
+def section(narrowing: float = 0.0, before: str = "", *, s: float = 0, center: str = "") -> str:
+    return before + section_xml(LANE.format(1, narrowing), LANE.format(-1, narrowing), s=s, center=center)
 
 
 def geometry(s: float, x: float, length: float, shape: str = "<line/>", y: float = 0.0) -> str:
@@ -50,12 +45,12 @@ def same_one_at_a_time(network: RoadNetwork, road: str) -> None:
     ],
     ids=["before the road", "behind the road", "begins late", "two before the road"],
 )
-def test_geometry_outside_its_road_does_not_affect_other_roads(road: Text, map_of: Text, broken: str) -> None:
+def test_geometry_outside_its_road_does_not_affect_other_roads(broken: str) -> None:
     network = RoadNetwork.parse(
-        map_of(
-            road("before", lanes=section(), y=50.0),
-            road("broken", lanes=section(), geometry=broken, length=500.0 if 'length="500.0"' in broken else 100.0),
-            road("behind", lanes=section(), y=-50.0),
+        map_xml(
+            road_xml("before", lanes=section(), y=50.0),
+            road_xml("broken", lanes=section(), geometry=broken, length=500.0 if 'length="500.0"' in broken else 100.0),
+            road_xml("behind", lanes=section(), y=-50.0),
         )
     )
     for number in network.roads:
@@ -64,10 +59,10 @@ def test_geometry_outside_its_road_does_not_affect_other_roads(road: Text, map_o
     assert network.lane_pose("behind", -1, [0.1]).y == pytest.approx([-52.0])
 
 
-def test_lane_offset_before_its_road_does_not_affect_other_roads(road: Text, map_of: Text) -> None:
+def test_lane_offset_before_its_road_does_not_affect_other_roads() -> None:
     offset = '<laneOffset s="-4" a="1" b="0.1" c="0" d="0"/><laneOffset s="50" a="0" b="0" c="0" d="0"/>'
     network = RoadNetwork.parse(
-        map_of(road("before", lanes=section(), y=50.0), road("broken", lanes=section(before=offset)))
+        map_xml(road_xml("before", lanes=section(), y=50.0), road_xml("broken", lanes=section(before=offset)))
     )
     for number in network.roads:
         same_one_at_a_time(network, number)
@@ -75,93 +70,87 @@ def test_lane_offset_before_its_road_does_not_affect_other_roads(road: Text, map
 
 
 @pytest.mark.parametrize("narrowing", [0.0, -0.01])
-def test_lane_inside_the_center_of_its_bend_keeps_its_heading(road: Text, map_of: Text, narrowing: float) -> None:
+def test_lane_inside_the_center_of_its_bend_keeps_its_heading(narrowing: float) -> None:
     """A half circle with a radius of 1.5 m, as at the ends of dead-end streets, contains lane 1."""
     turn = geometry(0.0, 0.0, 1.5 * math.pi, f'<arc curvature="{1 / 1.5!r}"/>')
-    network = RoadNetwork.parse(map_of(road(length=1.5 * math.pi, lanes=section(narrowing), geometry=turn)))
+    network = RoadNetwork.parse(map_xml(road_xml(length=1.5 * math.pi, lanes=section(narrowing), geometry=turn)))
     same_one_at_a_time(network, "1")
     for lane in (1, -1):
         turned = network.lane_pose_at("1", lane, 1.0).h - network.road_pose_at("1", 1.0).h
         assert abs(turned) < math.radians(15.0)
 
 
-def test_implausible_number_is_an_error(road: Text, map_of: Text) -> None:
+def test_implausible_number_is_an_error() -> None:
     with pytest.raises(RoadError) as caught:
-        RoadNetwork.parse(map_of(road(geometry=geometry(0.0, 1e12, 100.0))), "town.xodr")
+        RoadNetwork.parse(map_xml(road_xml(geometry=geometry(0.0, 1e12, 100.0))), "town.xodr")
     assert [str(diagnostic) for diagnostic in caught.value.diagnostics] == [
         "town.xodr:1: <geometry> has x='1000000000000.0'; give a number of at most 1e+09"
     ]
 
 
-def test_route_over_a_geometry_gap_adds_no_points(road: Text, map_of: Text) -> None:
+def test_route_over_a_geometry_gap_adds_no_points() -> None:
     far = geometry(0.0, 0.0, 50.0) + geometry(50.0, 9e8, 50.0)
-    network = RoadNetwork.parse(map_of(road(lanes=section(), geometry=far)))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), geometry=far)))
     route = network.route(network.location("1", -1, 10.0), network.location("1", -1, 90.0))
     line = route.polyline(1.0)
     assert len(line) < 1000
     assert line[[0, -1], 0] == pytest.approx([10.0, 9e8 + 40.0])
 
 
-def diagnostics(text: str) -> list[str]:
-    with pytest.raises(RoadError) as caught:
-        RoadNetwork.parse(text, "town.xodr")
-    return [str(diagnostic) for diagnostic in caught.value.diagnostics]
-
-
 @pytest.mark.parametrize("text", ["1_0", "\u0663", "nan", "1,5"])
-def test_number_in_python_notation_is_an_error(road: Text, map_of: Text, text: str) -> None:
+def test_number_in_python_notation_is_an_error(text: str) -> None:
     lanes = section().replace('a="4"', f'a="{text}"', 1).replace('id="-1"', f'id="-{text}"', 1)
-    found = diagnostics(map_of(road(lanes=lanes)))
+    found = road_diagnostics(map_xml(road_xml(lanes=lanes)))
     assert f"town.xodr:1: <width> has a={text!r}; give a finite number" in found
     assert f"town.xodr:1: <lane> has id={'-' + text!r}; give a whole number" in found
 
 
-def test_object_with_too_many_repetitions_is_an_error(road: Text, map_of: Text) -> None:
+def test_object_with_too_many_repetitions_is_an_error() -> None:
     repeat = '<repeat s="0" length="50" distance="1e-9" tStart="3" tEnd="3"/>'
     objects = f'<objects><object id="1" type="pole" s="0" t="3" radius="0.1" height="1">{repeat}</object></objects>'
-    assert diagnostics(map_of(road(extra=objects))) == [
+    assert road_diagnostics(map_xml(road_xml(extra=objects))) == [
         "town.xodr:1: <repeat> has length=50 and distance=1e-09: too many repetitions; "
         "at most 100000 repetitions are read"
     ]
     nowhere = objects.replace('length="50" distance="1e-9"', 'length="0" distance="0"')
-    assert list(placed_objects(RoadNetwork.parse(map_of(road(extra=nowhere))))) == []
+    assert list(placed_objects(RoadNetwork.parse(map_xml(road_xml(extra=nowhere))))) == []
 
 
 @pytest.mark.parametrize("line", ['length="3" space="6" sOffset="-1.4"', 'length="1e-9" space="1e-9" sOffset="0"'])
-def test_dashes_start_and_end_on_their_road(road: Text, map_of: Text, line: str) -> None:
+def test_dashes_start_and_end_on_their_road(line: str) -> None:
     mark = (
         f'<roadMark sOffset="0" type="broken"><type name="b"><line {line} tOffset="0" width="0.1"/></type></roadMark>'
     )
-    marked = section().replace('<lane id="0"/>', f'<lane id="0">{mark}</lane>')
-    meshes = {mesh.kind: mesh for mesh in surface_meshes(RoadNetwork.parse(map_of(road(lanes=marked))))}
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(center=mark))))
+    meshes = {mesh.kind: mesh for mesh in surface_meshes(network)}
     along = meshes["marking_white"].vertices[:, 0]
     assert along.min() >= 0.0
     assert 95.0 < along.max() <= 100.0
 
 
-def test_crosswalk_has_a_bounded_number_of_stripes(road: Text, map_of: Text) -> None:
+def test_crosswalk_has_a_bounded_number_of_stripes() -> None:
     corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0"/>' for u, v in ((0, 0), (4, 0), (4, 9e5), (0, 9e5)))
     crosswalk = f'<object id="1" type="crosswalk" s="50" t="0"><outline>{corners}</outline></object>'
-    network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<objects>{crosswalk}</objects>")))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), extra=f"<objects>{crosswalk}</objects>")))
     (paint,) = (mesh for mesh in surface_meshes(network) if mesh.kind == "marking_white")
     assert len(paint.faces) == 1000
 
 
-def test_advance_passes_duplicate_geometry_in_both_directions(road: Text, map_of: Text) -> None:
+def test_advance_passes_duplicate_geometry_in_both_directions() -> None:
     twice = geometry(0.0, 0.0, 60.0) + 2 * geometry(60.0, 60.0, 40.0)
-    network = RoadNetwork.parse(map_of(road(lanes=section(), geometry=twice)))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), geometry=twice)))
     for lane, start, end in ((1, 80.0, 30.0), (-1, 30.0, 80.0)):
         moved = network.advance(network.location("1", lane, start), 50.0)
         assert moved is not None
         assert moved.s == pytest.approx(end)
 
 
-def test_signal_beyond_its_road_is_moved_to_its_end(road: Text, map_of: Text) -> None:
+def test_signal_beyond_its_road_is_moved_to_its_end() -> None:
     signals = "".join(
         f'<signal id="{n}" s="{s}" t="-5" dynamic="yes" orientation="+" zOffset="2" type="1000001"/>'
         for n, s in enumerate((-3.0, 100.02, 140.0))
     )
-    network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<signals>{signals}</signals>")), "town.xodr")
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), extra=f"<signals>{signals}</signals>")), "town.xodr")
     assert [network.signal_pose(signal).x for signal in network.signals.values()] == [0.0, 100.0, 100.0]
     (doubt,) = network.map_warnings
     assert doubt.rule == "signal-off-road"
@@ -171,26 +160,24 @@ def test_signal_beyond_its_road_is_moved_to_its_end(road: Text, map_of: Text) ->
     )
 
 
-@pytest.mark.parametrize("s", ["10", "100000"])
-def test_first_lane_section_starts_at_zero(road: Text, map_of: Text, s: str) -> None:
-    late = section().replace('s="0"', f's="{s}"')
-    network = RoadNetwork.parse(map_of(road(lanes=late)))
+@pytest.mark.parametrize("s", [10, 100_000])
+def test_first_lane_section_starts_at_zero(s: int) -> None:
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(s=s))))
     (only,) = network.roads["1"].sections
     assert (only.s, only.end) == (0.0, 100.0)
     assert network.lane_width("1", -1, 1.0) == 4.0
 
 
-def test_late_first_lane_section_extends_to_the_second(road: Text, map_of: Text) -> None:
-    lanes = section().replace('s="0"', 's="10"') + section().replace('s="0"', 's="60"')
-    network = RoadNetwork.parse(map_of(road(lanes=lanes)))
+def test_late_first_lane_section_extends_to_the_second() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(s=10) + section(s=60))))
     assert [(part.s, part.end) for part in network.roads["1"].sections] == [(0.0, 60.0), (60.0, 100.0)]
 
 
-def test_advance_exactly_to_the_end_of_a_lane(road: Text, map_of: Text) -> None:
+def test_advance_exactly_to_the_end_of_a_lane() -> None:
     """The next section, which starts at the end position, has no such lane."""
     wide = section().replace("</right>", LANE.format(-2, 0.0) + "</right>")
     only_left = f'<laneSection s="50"><left>{LANE.format(1, 0.0)}</left><center><lane id="0"/></center></laneSection>'
-    network = RoadNetwork.parse(map_of(road(lanes=wide + only_left)))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=wide + only_left)))
     place = network.advance(network.location("1", -2, 20.0), 30.0)
     assert place is not None
     assert place.lane == -2

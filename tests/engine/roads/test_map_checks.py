@@ -1,14 +1,12 @@
 """Tests of the warnings of readable road files."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from opendrive_xml import map_xml, road_xml, section_xml
 
 from eidrive_scenario.roads import RoadNetwork
-
-Text = Callable[..., str]
 
 LINE = '<geometry s="{s}" x="{x}" y="{y}" hdg="{h}" length="50"><line/></geometry>'
 WIDTH = '<width sOffset="{0}" a="{1}" b="{2}" c="{3}" d="{4}"/>'
@@ -19,9 +17,7 @@ def lane(number: int, link: str = "", width: str = WIDTH.format(0, 3.5, 0, 0, 0)
 
 
 def section(s: float, *right: str) -> str:
-    return (
-        f'<laneSection s="{s}"><center><lane id="0" type="none"/></center><right>{"".join(right)}</right></laneSection>'
-    )
+    return section_xml(right="".join(right), s=s)
 
 
 def map_warnings(text: str) -> list[tuple[str, str]]:
@@ -43,26 +39,24 @@ def two_lines(s: float = 50.0, x: float = 50.0, y: float = 0.0, h: float = 0.0) 
         ({"h": 2 * math.pi - 0.02}, "heading-discontinuity", "road '1' has a kink of 0.02 rad at s = 50 m"),
     ],
 )
-def test_disconnected_geometries_are_a_warning(
-    road: Text, map_of: Text, second: dict[str, float], rule: str, message: str
-) -> None:
-    assert map_warnings(map_of(road(geometry=two_lines(**second))))[0] == (rule, message)
+def test_disconnected_geometries_are_a_warning(second: dict[str, float], rule: str, message: str) -> None:
+    assert map_warnings(map_xml(road_xml(geometry=two_lines(**second))))[0] == (rule, message)
 
 
 @pytest.mark.parametrize("second", [{"y": 0.008}, {"h": 0.0008}, {"h": 2 * math.pi}, {"h": 0.5}, {"s": 50.004}])
-def test_rounding_and_corners_give_no_warning(road: Text, map_of: Text, second: dict[str, float]) -> None:
-    assert map_warnings(map_of(road(geometry=two_lines(**second)))) == []
+def test_rounding_and_corners_give_no_warning(second: dict[str, float]) -> None:
+    assert map_warnings(map_xml(road_xml(geometry=two_lines(**second)))) == []
 
 
-def test_length_that_differs_from_geometry_is_a_warning(road: Text, map_of: Text) -> None:
-    text = map_of(road(length=100.05, geometry=two_lines()))
+def test_length_that_differs_from_geometry_is_a_warning() -> None:
+    text = map_xml(road_xml(length=100.05, geometry=two_lines()))
     assert map_warnings(text) == [
         ("geometry-gap", "road '1' has length 100.05 m, but its geometry ends 0.05 m before that")
     ]
 
 
-def test_warnings_of_one_kind_are_grouped_with_their_lines(road: Text, map_of: Text) -> None:
-    text = map_of(*("\n" + road(str(n), geometry=two_lines(y=1.0)) for n in range(8)))
+def test_warnings_of_one_kind_are_grouped_with_their_lines() -> None:
+    text = map_xml(*("\n" + road_xml(str(n), geometry=two_lines(y=1.0)) for n in range(8)))
     (diagnostic,) = RoadNetwork.parse(text, "town.xodr").map_warnings
     assert str(diagnostic) == (
         "town.xodr:3: road '0' jumps by 1 m at s = 50 m; 7 more of such jumps: line 5, 7, 9, 11, …; "
@@ -82,27 +76,21 @@ def test_warnings_of_one_kind_are_grouped_with_their_lines(road: Text, map_of: T
         (WIDTH.format(0, 3.5, 0, 0, 1), "becomes 1e+06 m wide"),
     ],
 )
-def test_missing_negative_and_implausible_widths_are_warnings(
-    road: Text, map_of: Text, width: str, message: str
-) -> None:
-    text = map_of(road(lanes=section(0, lane(-1), lane(-2, width=width, kind="shoulder"))))
+def test_missing_negative_and_implausible_widths_are_warnings(width: str, message: str) -> None:
+    text = map_xml(road_xml(lanes=section(0, lane(-1), lane(-2, width=width, kind="shoulder"))))
     assert map_warnings(text) == [("lane-width", f"lane -2 of road '1' (section at s = 0 m) {message}")]
 
 
-def test_lanes_of_zero_and_vanishing_width_give_no_warning(road: Text, map_of: Text) -> None:
+def test_lanes_of_zero_and_vanishing_width_give_no_warning() -> None:
     tapering = WIDTH.format(0, 3.5, -0.035, 0, 0)
-    assert (
-        map_warnings(
-            map_of(road(lanes=section(0, lane(-1), lane(-2, width=tapering), lane(-3, width=WIDTH.format(0, *"0000")))))
-        )
-        == []
-    )
+    lanes = section(0, lane(-1), lane(-2, width=tapering), lane(-3, width=WIDTH.format(0, *"0000")))
+    assert map_warnings(map_xml(road_xml(lanes=lanes))) == []
 
 
-def test_invalid_lane_links_within_a_road_are_warnings(road: Text, map_of: Text) -> None:
+def test_invalid_lane_links_within_a_road_are_warnings() -> None:
     link = '<successor id="{}"/>'.format
     later = section(60, lane(-1, '<predecessor id="-1"/>'))
-    broken = map_warnings(map_of(road(lanes=section(0, lane(-1), lane(-2, link(-2))) + later)))
+    broken = map_warnings(map_xml(road_xml(lanes=section(0, lane(-1), lane(-2, link(-2))) + later)))
     assert broken == [
         (
             "lane-link",
@@ -111,17 +99,17 @@ def test_invalid_lane_links_within_a_road_are_warnings(road: Text, map_of: Text)
         ("lane-link", "lane -2 of road '1' (section at s = 0 m) has no successor although the road continues"),
     ]
     merging = section(0, lane(-1), lane(-2, width=WIDTH.format(0, 3.0, -0.05, 0, 0))) + later
-    assert map_warnings(map_of(road(lanes=merging))) == []
+    assert map_warnings(map_xml(road_xml(lanes=merging))) == []
 
 
-def test_invalid_lane_links_between_roads_are_warnings(road: Text, map_of: Text) -> None:
+def test_invalid_lane_links_between_roads_are_warnings() -> None:
     onwards = '<successor elementType="road" elementId="2" contactPoint="start"/>'
     back = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
-    other = road("2", x=100.0, link=back, lanes=section(0, lane(-1, '<predecessor id="-1"/>')))
-    sound = road("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-1"/>')))
-    assert map_warnings(map_of(sound, other)) == []
-    loose = road("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-3"/>'), lane(-2)))
-    assert map_warnings(map_of(loose, other)) == [
+    other = road_xml("2", x=100.0, link=back, lanes=section(0, lane(-1, '<predecessor id="-1"/>')))
+    sound = road_xml("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-1"/>')))
+    assert map_warnings(map_xml(sound, other)) == []
+    loose = road_xml("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-3"/>'), lane(-2)))
+    assert map_warnings(map_xml(loose, other)) == [
         ("lane-link", "lane -1 of road '1' has the successor -3, which the start of road '2' does not have"),
         (
             "lane-link",
@@ -130,21 +118,21 @@ def test_invalid_lane_links_between_roads_are_warnings(road: Text, map_of: Text)
     ]
 
 
-def test_gap_between_linked_lanes_is_a_warning(road: Text, map_of: Text) -> None:
+def test_gap_between_linked_lanes_is_a_warning() -> None:
     """Reference lines need not meet: a lane of the second road, whose line is further right, continues lane -2."""
     onwards = '<successor elementType="road" elementId="2" contactPoint="start"/>'
     back = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
-    first = road("1", link=onwards, lanes=section(0, lane(-1), lane(-2, '<successor id="-1"/>')))
+    first = road_xml("1", link=onwards, lanes=section(0, lane(-1), lane(-2, '<successor id="-1"/>')))
     first = first.replace('<lane id="-1" type="driving"', '<lane id="-1" type="shoulder"')
     for y, apart in ((-3.5, ""), (-3.505, ""), (-3.1, "0.4"), (0.0, "3.5")):
-        second = road("2", x=100.0, y=y, link=back, lanes=section(0, lane(-1, '<predecessor id="-2"/>')))
+        second = road_xml("2", x=100.0, y=y, link=back, lanes=section(0, lane(-1, '<predecessor id="-2"/>')))
         what = f"lane -2 of road '1' and lane -1 of road '2' are linked but their ends are {apart} m apart"
-        assert map_warnings(map_of(first, second)) == ([("geometry-gap", what)] if apart else [])
+        assert map_warnings(map_xml(first, second)) == ([("geometry-gap", what)] if apart else [])
 
 
-def test_ignored_lateral_profiles_are_warnings(road: Text, map_of: Text) -> None:
+def test_ignored_lateral_profiles_are_warnings() -> None:
     def profile(*entries: str) -> list[tuple[str, str]]:
-        return map_warnings(map_of(road(extra=f"<lateralProfile>{''.join(entries)}</lateralProfile>")))
+        return map_warnings(map_xml(road_xml(extra=f"<lateralProfile>{''.join(entries)}</lateralProfile>")))
 
     flat, bent = '<shape s="0" t="-4" a="0" b="0" c="0" d="0"/>', '<shape s="0" t="-4" a="0" b="0.02" c="0" d="0"/>'
     assert profile(flat, '<superelevation s="0" a="1.5" b="0" c="0" d="0"/>') == []
@@ -159,38 +147,38 @@ def test_ignored_lateral_profiles_are_warnings(road: Text, map_of: Text) -> None
     ]
 
 
-def test_invalid_connections_are_warnings(road: Text, map_of: Text) -> None:
+def test_invalid_connections_are_warnings() -> None:
     into = '<successor elementType="junction" elementId="9"/>'
     through = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
-    arm = road("1", link=into, lanes=section(0, lane(-1)))
-    inner = road("2", x=100.0, junction="9", link=through, lanes=section(0, lane(-1, '<predecessor id="-1"/>')))
+    arm = road_xml("1", link=into, lanes=section(0, lane(-1)))
+    inner = road_xml("2", x=100.0, junction="9", link=through, lanes=section(0, lane(-1, '<predecessor id="-1"/>')))
 
     def junction(incoming: str, connecting: str, links: str) -> str:
         connection = f'<connection id="0" incomingRoad="{incoming}" connectingRoad="{connecting}" contactPoint="start">'
         return f'<junction id="9" name="">{connection}{links}</connection></junction>'
 
     fitting = '<laneLink from="-1" to="-1"/>'
-    assert map_warnings(map_of(arm, inner, rest=junction("1", "2", fitting))) == []
-    wrong = map_warnings(map_of(arm, inner, rest=junction("1", "2", '<laneLink from="-4" to="-1"/>')))
+    assert map_warnings(map_xml(arm, inner, rest=junction("1", "2", fitting))) == []
+    wrong = map_warnings(map_xml(arm, inner, rest=junction("1", "2", '<laneLink from="-4" to="-1"/>')))
     what = "connection '0' of junction '9' links lane -4 of road '1', which does not exist there"
     assert wrong == [("junction-connection", what)]
-    against = map_of(arm, inner, rest=junction("1", "2", fitting)).replace('rule="RHT"', 'rule="LHT"')
+    against = map_xml(arm, inner, rest=junction("1", "2", fitting)).replace('rule="RHT"', 'rule="LHT"')
     what = "connection '0' of junction '9' is opposite to the traffic of roads '1' and '2'"
     assert map_warnings(against) == [("junction-connection", what)]
-    elsewhere = road("3", y=50.0, lanes=section(0, lane(-1)))
-    outside = {message for _, message in map_warnings(map_of(arm, inner, elsewhere, rest=junction("3", "3", fitting)))}
+    elsewhere = road_xml("3", y=50.0, lanes=section(0, lane(-1)))
+    outside = {message for _, message in map_warnings(map_xml(arm, inner, elsewhere, rest=junction("3", "3", fitting)))}
     assert "connection '0' of junction '9' comes from road '3', which does not end at the junction" in outside
     assert "connection '0' of junction '9' uses road '3', which does not belong to the junction" in outside
-    closed = map_warnings(map_of(arm, road("2", x=100.0, junction="9"), rest=junction("1", "2", "")))
+    closed = map_warnings(map_xml(arm, road_xml("2", x=100.0, junction="9"), rest=junction("1", "2", "")))
     assert closed == []  # Without a <laneLink>, lanes of the same id are connected.
 
 
-def test_links_bypass_a_section_of_zero_length(road: Text, map_of: Text) -> None:
+def test_links_bypass_a_section_of_zero_length() -> None:
     """The section is omitted; Town06 has such a section, which renumbers its lanes."""
     first = section(0, lane(-1, '<successor id="-2"/>'), lane(-2, '<successor id="-3"/>'))
     none = section(60, lane(-1), lane(-2, '<successor id="-1"/>'), lane(-3, '<successor id="-2"/>'))
     last = section(60.0000004, lane(-1, '<predecessor id="-2"/>'), lane(-2, '<predecessor id="-3"/>'))
-    network = RoadNetwork.parse(map_of(road(lanes=first + none + last)), "town.xodr")
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=first + none + last)), "town.xodr")
     assert network.map_warnings == ()
     for number in (-1, -2):
         assert network.roads["1"].sections[0].lanes[number].successors == (number,)

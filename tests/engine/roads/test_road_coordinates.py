@@ -1,12 +1,12 @@
 """Tests of road and lane coordinates to world coordinates and back."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from opendrive_xml import elevation_xml, map_xml, road_xml
 
 from eidrive_scenario.roads import PositionError, RoadNetwork
 from eidrive_scenario.roads.model import curves
@@ -14,7 +14,6 @@ from eidrive_scenario.roads.model.curves import Arc, Cubic, Curve, ReferenceLine
 from eidrive_scenario.roads.model.polynomials import Polynomials, combine
 from eidrive_scenario.roads.model.road_map import Header, Lane, LaneSection, Road, RoadMap
 
-Text = Callable[..., str]
 BANKED = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
 
 
@@ -133,10 +132,10 @@ def test_lane_heading_equals_direction_of_its_points(network: RoadNetwork, data:
     assert gone / np.linalg.norm(gone) == pytest.approx(np.array(step), abs=1e-5)
 
 
-def test_road_pose_with_superelevation_and_slope(road: Text, map_of: Text) -> None:
+def test_road_pose_with_superelevation_and_slope() -> None:
     rising = '<elevationProfile><elevation s="0" a="2" b="0.05" c="0" d="0"/></elevationProfile>'
     extra = f"{rising}<lateralProfile>{BANKED}</lateralProfile>"
-    network = RoadNetwork.parse(map_of(road(extra=extra)))
+    network = RoadNetwork.parse(map_xml(road_xml(extra=extra)))
     pose, slope = network.road_pose_at("1", 20.0, 3.0), math.atan(0.05)
     leans, rises = 3 * math.sin(0.1) * math.sin(slope), 3 * math.sin(0.1) * math.cos(slope)
     assert pose == pytest.approx((20.0 - leans, 3 * math.cos(0.1), 3.0 + rises, 0.0, -slope, 0.1))
@@ -146,21 +145,21 @@ def test_road_pose_with_superelevation_and_slope(road: Text, map_of: Text) -> No
     assert math.sin(aside.p) == pytest.approx(-math.cos(math.atan(0.05)) * math.sin(0.1))
 
 
-def test_lane_height_raises_sidewalk(road: Text, map_of: Text) -> None:
+def test_lane_height_raises_sidewalk() -> None:
     lanes = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'
         '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
         '<lane id="-2" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/>'
         '<height sOffset="0" inner="0.1" outer="0.14"/></lane></right></laneSection>'
     )
-    network = RoadNetwork.parse(map_of(road(lanes=lanes)))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)))
     assert network.lane_pose_at("1", -1, 10.0).z == 0.0
     assert [network.lane_pose_at("1", -2, 10.0, d).z for d in (1.0, 0.0, -1.0)] == pytest.approx([0.10, 0.12, 0.14])
     assert network.lane_pose("1", -2, [10.0], [0.0]).z == pytest.approx(0.12)
 
 
-def test_pose_at_unknown_road_lane_or_s_is_an_error(road: Text, map_of: Text) -> None:
-    network = RoadNetwork.parse(map_of(road("10"), road("11", y=30.0)))
+def test_pose_at_unknown_road_lane_or_s_is_an_error() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml("10"), road_xml("11", y=30.0)))
     with pytest.raises(PositionError, match=r"road '12' does not exist; known: 10, 11"):
         network.lane_pose_at("12", -1, 0.0)
     with pytest.raises(PositionError, match=r"road '10' has no lane -3 at s = 5 m; its lanes are 1, 0, -1"):
@@ -173,8 +172,8 @@ def test_pose_at_unknown_road_lane_or_s_is_an_error(road: Text, map_of: Text) ->
         network.lane_pose("11", [1, 2], 3.0)
 
 
-def test_locate_points_outside_the_road(road: Text, map_of: Text) -> None:
-    network = RoadNetwork.parse(map_of(road()))
+def test_locate_points_outside_the_road() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml()))
     found = network.locate([50.0, 50.0, 103.0, 50.0], [-1.0, 6.0, 1.0, 90.0])
     assert found.found.tolist() == [True, True, True, False]
     assert found.lane.tolist() == [-1, 1, 1, 0]
@@ -188,9 +187,9 @@ def test_locate_points_outside_the_road(road: Text, map_of: Text) -> None:
     assert not network.on_road(beside)
 
 
-def test_locate_many_points_equals_single_points(road: Text, map_of: Text) -> None:
+def test_locate_many_points_equals_single_points() -> None:
     """More than a thousand points are sorted. Points far from the road have no location in both cases."""
-    network = RoadNetwork.parse(map_of(road(), road("2", y=20.0, hdg=0.4)))
+    network = RoadNetwork.parse(map_xml(road_xml(), road_xml("2", y=20.0, hdg=0.4)))
     rng = np.random.default_rng(7)
     x, y = rng.uniform(-80.0, 180.0, (2, 1500))
     many = network.locate(x, y)
@@ -200,9 +199,11 @@ def test_locate_many_points_equals_single_points(road: Text, map_of: Text) -> No
     assert 0 < np.count_nonzero(many.found) < 1500
 
 
-def test_locate_with_height_separates_bridge_from_road_below(road: Text, map_of: Text) -> None:
-    bridge = '<elevationProfile><elevation s="0" a="6" b="0" c="0" d="0"/></elevationProfile>'
-    network = RoadNetwork.parse(map_of(road("low"), road("high", x=50.0, y=-50.0, hdg=math.pi / 2, extra=bridge)))
+def test_locate_with_height_separates_bridge_from_road_below() -> None:
+    bridge = elevation_xml(6)
+    network = RoadNetwork.parse(
+        map_xml(road_xml("low"), road_xml("high", x=50.0, y=-50.0, hdg=math.pi / 2, profiles=bridge))
+    )
     found = network.locate([51.0, 51.0], [-1.0, -1.0], [0.2, 6.3])
     assert [network.tables.ids[index] for index in found.road] == ["low", "high"]
     high = network.locate_at(51.0, -1.0, z=6.0)
@@ -210,8 +211,8 @@ def test_locate_with_height_separates_bridge_from_road_below(road: Text, map_of:
     assert high.road == "high"
 
 
-def test_locate_with_hint_stays_on_the_same_road(road: Text, map_of: Text) -> None:
-    network = RoadNetwork.parse(map_of(road("a"), road("b", x=50.0, y=-50.0, hdg=math.pi / 2)))
+def test_locate_with_hint_stays_on_the_same_road() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml("a"), road_xml("b", x=50.0, y=-50.0, hdg=math.pi / 2)))
     for name, s in (("a", 49.0), ("b", 48.0)):
         found = network.locate_at(51.0, -1.0, network.location(name, -1, s))
         assert found is not None

@@ -1,45 +1,38 @@
 """Tests of motion along lanes, through links and junctions."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import pytest
+from opendrive_xml import junction_xml, lane_links_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.routing.movement import Branch
-
-Text = Callable[..., str]
 
 
 def lane(number: int, link: str = "", width: str = 'a="3" b="0" c="0" d="0"') -> str:
     return f'<lane id="{number}" type="driving"><link>{link}</link><width sOffset="0" {width}/></lane>'
 
 
-def section(s: float, right: str, left: str = "") -> str:
-    return (
-        f'<laneSection s="{s}"><left>{left}</left><center><lane id="0"/></center><right>{right}</right></laneSection>'
-    )
-
-
-def chained(road: Text, map_of: Text) -> RoadNetwork:
+def chained() -> RoadNetwork:
     """Return road a along x, and road b with opposite reference line: its lane +1 continues lane -1 of a."""
-    a = road(
+    a = road_xml(
         "a",
-        lanes=section(0, lane(-1, '<successor id="1"/>'), lane(1, '<successor id="-1"/>')),
-        link='<successor elementType="road" elementId="b" contactPoint="end"/>',
+        lanes=section_xml(lane(1, '<successor id="-1"/>'), lane(-1, '<successor id="1"/>')),
+        link=successor_xml("b", "end"),
     )
-    b = road(
+    b = road_xml(
         "b",
         x=200.0,
         hdg=math.pi,
-        lanes=section(0, lane(-1, '<successor id="1"/>'), lane(1, '<successor id="-1"/>')),
-        link='<successor elementType="road" elementId="a" contactPoint="end"/>',
+        lanes=section_xml(lane(1, '<successor id="-1"/>'), lane(-1, '<successor id="1"/>')),
+        link=successor_xml("a", "end"),
     )
-    return RoadNetwork.parse(map_of(a, b))
+    return RoadNetwork.parse(map_xml(a, b))
 
 
-def test_advance_onto_reversed_road_keeps_lateral_position(road: Text, map_of: Text) -> None:
-    network = chained(road, map_of)
+def test_advance_onto_reversed_road_keeps_lateral_position() -> None:
+    network = chained()
     start = network.location("a", -1, 90.0, 0.4)
     end = network.advance(start, 30.0)
     assert end is not None
@@ -51,8 +44,8 @@ def test_advance_onto_reversed_road_keeps_lateral_position(road: Text, map_of: T
     assert back == pytest.approx(start)
 
 
-def test_advance_beyond_end_of_road_is_none(road: Text, map_of: Text) -> None:
-    network = chained(road, map_of)
+def test_advance_beyond_end_of_road_is_none() -> None:
+    network = chained()
     assert network.advance(network.location("a", -1, 90.0), 110.5) is None
     assert network.advance(network.location("a", 1, 10.0), 10.5) is None
     left = network.advance(network.location("a", 1, 10.0), 10.0)
@@ -60,18 +53,18 @@ def test_advance_beyond_end_of_road_is_none(road: Text, map_of: Text) -> None:
     assert left.s == pytest.approx(0.0)
 
 
-def test_left_hand_traffic_advances_in_opposite_direction(road: Text, map_of: Text) -> None:
-    network = RoadNetwork.parse(map_of(road("r", rule="LHT")))
+def test_left_hand_traffic_advances_in_opposite_direction() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml("r", rule="LHT")))
     assert [network.driving_direction("r", n) for n in (1, -1)] == [1, -1]
     moved = network.advance(network.location("r", 1, 20.0), 5.0)
     assert moved is not None
     assert moved.s == pytest.approx(25.0)
 
 
-def test_advance_measures_distance_on_the_lane(road: Text, map_of: Text) -> None:
+def test_advance_measures_distance_on_the_lane() -> None:
     length = 20 * math.pi
     bend = f'<geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="0.05"/></geometry>'
-    network = RoadNetwork.parse(map_of(road("r", length=length, geometry=bend)))
+    network = RoadNetwork.parse(map_xml(road_xml("r", length=length, geometry=bend)))
     outer = network.advance(network.location("r", -1, 0.0), 10.0)
     inner = network.advance(network.location("r", 1, 30.0), 10.0)
     assert outer is not None
@@ -80,7 +73,7 @@ def test_advance_measures_distance_on_the_lane(road: Text, map_of: Text) -> None
     assert 30.0 - inner.s == pytest.approx(10.0 * 20.0 / 18.25)
 
 
-def test_advance_once_equals_advance_in_small_steps(road: Text, map_of: Text) -> None:
+def test_advance_once_equals_advance_in_small_steps() -> None:
     """Line, arc, line, spiral, arc: on lanes, beside them, on a widening lane, forwards and backwards."""
     parts = [("line", 30.0, ""), ("arc", 25.0, 'curvature="0.04"'), ("line", 10.0, ""),
              ("spiral", 20.0, 'curvStart="0" curvEnd="-0.05"'), ("arc", 35.0, 'curvature="-0.05"')]  # fmt: skip
@@ -90,10 +83,10 @@ def test_advance_once_equals_advance_in_small_steps(road: Text, map_of: Text) ->
         record = f'<geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="{heading!r}" length="{length!r}">'
         geometry += f"{record}<{kind} {numbers}/></geometry>"
         s += length
-        end = RoadNetwork.parse(map_of(road("r", length=s, geometry=geometry))).road_pose_at("r", s)
+        end = RoadNetwork.parse(map_xml(road_xml("r", length=s, geometry=geometry))).road_pose_at("r", s)
         x, y, heading = end.x, end.y, end.h
-    lanes = section(0, lane(-1) + lane(-2, width='a="2" b="0.02" c="0" d="0"'), lane(1))
-    network = RoadNetwork.parse(map_of(road("r", length=s, geometry=geometry, lanes=lanes)))
+    lanes = section_xml(lane(1), lane(-1) + lane(-2, width='a="2" b="0.02" c="0" d="0"'))
+    network = RoadNetwork.parse(map_xml(road_xml("r", length=s, geometry=geometry, lanes=lanes)))
     for number, start, offset in ((-1, 2.0, 0.0), (-1, 2.0, 1.1), (-2, 2.0, 0.0), (1, 118.0, -0.7)):
         here = network.location("r", number, start, offset)
         there = network.advance(here, 100.0)
@@ -111,9 +104,11 @@ def test_advance_once_equals_advance_in_small_steps(road: Text, map_of: Text) ->
         assert back.s == pytest.approx(start, abs=0.01)
 
 
-def test_advance_follows_links_between_sections(road: Text, map_of: Text) -> None:
-    lanes = section(0, lane(-1, '<successor id="-2"/>')) + section(40, lane(-1) + lane(-2, '<predecessor id="-1"/>'))
-    network = RoadNetwork.parse(map_of(road("r", lanes=lanes)))
+def test_advance_follows_links_between_sections() -> None:
+    lanes = section_xml(right=lane(-1, '<successor id="-2"/>')) + section_xml(
+        right=lane(-1) + lane(-2, '<predecessor id="-1"/>'), s=40.0
+    )
+    network = RoadNetwork.parse(map_xml(road_xml("r", lanes=lanes)))
     moved = network.advance(network.location("r", -1, 35.0), 10.0)
     assert moved is not None
     assert (moved.lane, moved.s, moved.offset) == pytest.approx((-2, 45.0, 0.0))
@@ -125,18 +120,20 @@ def test_advance_follows_links_between_sections(road: Text, map_of: Text) -> Non
     assert (back.lane, back.s) == pytest.approx((-1, 35.0))
 
 
-def test_advance_at_lane_end_continues_on_adjacent_lane(road: Text, map_of: Text) -> None:
-    lanes = section(0, lane(-1, '<successor id="-1"/>') + lane(-2)) + section(40, lane(-1, '<predecessor id="-1"/>'))
-    network = RoadNetwork.parse(map_of(road("r", lanes=lanes)))
+def test_advance_at_lane_end_continues_on_adjacent_lane() -> None:
+    lanes = section_xml(right=lane(-1, '<successor id="-1"/>') + lane(-2)) + section_xml(
+        right=lane(-1, '<predecessor id="-1"/>'), s=40.0
+    )
+    network = RoadNetwork.parse(map_xml(road_xml("r", lanes=lanes)))
     moved = network.advance(network.location("r", -2, 35.0), 10.0)
     assert moved is not None
     assert (moved.lane, moved.s, moved.offset, moved.t) == pytest.approx((-1, 45.0, -3.0, -4.5))
 
 
-def test_advance_to_end_of_a_lane_inside_its_road_stays_on_it(road: Text, map_of: Text) -> None:
+def test_advance_to_end_of_a_lane_inside_its_road_stays_on_it() -> None:
     """Lane -1 ends at s = 40 without a lane beside it. Lane 1 starts there, where its traffic leaves it."""
-    both = section(0, lane(-1)) + section(40, "", lane(1))
-    network = RoadNetwork.parse(map_of(road("r", lanes=both)))
+    both = section_xml(right=lane(-1)) + section_xml(lane(1), "", s=40.0)
+    network = RoadNetwork.parse(map_xml(road_xml("r", lanes=both)))
     here, there = network.location("r", -1, 35.0), network.location("r", 1, 45.0)
     assert network.advance(here, 10.0) is None
     assert network.advance(there, 10.0) is None
@@ -154,31 +151,34 @@ BENDS = {"left": 0.05, "ahead": -0.01}
 """Curvatures of a left turn and of a branch that bends slightly to the right [1/m]."""
 
 
-def fork(road: Text, map_of: Text, bends: Mapping[str, float] = BENDS, rule: str = "RHT") -> RoadNetwork:
+def fork(bends: Mapping[str, float] = BENDS, rule: str = "RHT") -> RoadNetwork:
     """Return road `a` to a junction with a branch of 20 m for each curvature [1/m]."""
     number = -1 if rule == "RHT" else 1
 
     def lanes(link: str = "") -> str:
         only = lane(number, link)
-        return section(0, only) if number < 0 else section(0, "", only)
+        return section_xml(right=only) if number < 0 else section_xml(only)
 
-    ways = []
-    rest = ['<junction id="9" name="">']
-    for i, (name, bend) in enumerate(bends.items()):
-        arc = f'<geometry s="0" x="100" y="0" hdg="0" length="20"><arc curvature="{bend}"/></geometry>'
-        link = '<predecessor elementType="road" elementId="a" contactPoint="end"/>'
-        own = lanes(f'<predecessor id="{number}"/>')
-        ways.append(road(name, length=20.0, geometry=arc, lanes=own, link=link, junction="9", rule=rule))
-        rest.append(
-            f'<connection id="{i}" incomingRoad="a" connectingRoad="{name}" contactPoint="start">'
-            f'<laneLink from="{number}" to="{number}"/></connection>'
+    ways = [
+        road_xml(
+            name,
+            length=20.0,
+            x=100.0,
+            curvature=bend,
+            lanes=lanes(lane_links_xml(number)),
+            link=predecessor_xml("a"),
+            junction="9",
+            rule=rule,
         )
-    a = road("a", lanes=lanes(), link='<successor elementType="junction" elementId="9"/>', rule=rule)
-    return RoadNetwork.parse(map_of(a, *ways, rest="".join(rest) + "</junction>"))
+        for name, bend in bends.items()
+    ]
+    a = road_xml("a", lanes=lanes(), link=successor_xml(junction="9"), rule=rule)
+    junction = junction_xml("9", "a", dict.fromkeys(bends, number), to=number)
+    return RoadNetwork.parse(map_xml(a, *ways, rest=junction))
 
 
-def test_advance_at_junction_selects_straightest_or_chosen_branch(road: Text, map_of: Text) -> None:
-    network = fork(road, map_of)
+def test_advance_at_junction_selects_straightest_or_chosen_branch() -> None:
+    network = fork()
     start = network.location("a", -1, 95.0)
     default = network.advance(start, 10.0)
     assert default is not None
@@ -202,25 +202,25 @@ def test_advance_at_junction_selects_straightest_or_chosen_branch(road: Text, ma
 @pytest.mark.parametrize(("rule", "expected"), [("RHT", "right"), ("LHT", "left")])
 @pytest.mark.parametrize("order", [("left", "right"), ("right", "left")])
 def test_advance_at_symmetric_fork_turns_to_the_side_of_the_traffic(
-    road: Text, map_of: Text, rule: str, expected: str, order: tuple[str, str]
+    rule: str, expected: str, order: tuple[str, str]
 ) -> None:
     """ASAM OpenSCENARIO XML 1.3.1, 6.8.1: right with right-hand traffic, left with left-hand traffic."""
     bends = {"left": 0.05, "right": -0.05}
-    network = fork(road, map_of, {name: bends[name] for name in order}, rule)
+    network = fork({name: bends[name] for name in order}, rule)
     moved = network.advance(network.location("a", -1 if rule == "RHT" else 1, 95.0), 10.0)
     assert moved is not None
     assert moved.road == expected
 
 
-def test_advance_backwards_leaves_a_junction(road: Text, map_of: Text) -> None:
-    network = fork(road, map_of)
+def test_advance_backwards_leaves_a_junction() -> None:
+    network = fork()
     back = network.advance(network.location("left", -1, 4.0), -20.0)
     assert back is not None
     assert back.road == "a"
 
 
-def test_distance_along_connected_roads(road: Text, map_of: Text) -> None:
-    network = chained(road, map_of)
+def test_distance_along_connected_roads() -> None:
+    network = chained()
     a = network.location("a", -1, 90.0)
     b = network.location("b", 1, 80.0, -0.4)
     assert network.distance(a, b) == pytest.approx((30.0, 0.4))
@@ -230,6 +230,6 @@ def test_distance_along_connected_roads(road: Text, map_of: Text) -> None:
     assert network.distance(a, network.location("a", 1, 60.0)) == pytest.approx((-30.0, 3.0))
 
 
-def test_distance_between_unconnected_roads_is_none(road: Text, map_of: Text) -> None:
-    network = RoadNetwork.parse(map_of(road("a"), road("b", y=50.0)))
+def test_distance_between_unconnected_roads_is_none() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml("a"), road_xml("b", y=50.0)))
     assert network.distance(network.location("a", -1, 1.0), network.location("b", -1, 1.0)) is None

@@ -1,24 +1,17 @@
 """Tests of the OpenDRIVE reader: supported content and diagnostics of invalid files."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
+from opendrive_xml import map_xml, road_xml
+from road_errors import road_diagnostics
 
 from eidrive_scenario.errors import Diagnostic, RoadError
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
-
-Text = Callable[..., str]
-
-
-def diagnostics(text: str) -> list[str]:
-    with pytest.raises(RoadError) as caught:
-        RoadNetwork.parse(text, "town.xodr")
-    return [str(diagnostic) for diagnostic in caught.value.diagnostics]
 
 
 def test_missing_file_is_an_error(tmp_path: Path) -> None:
@@ -28,29 +21,29 @@ def test_missing_file_is_an_error(tmp_path: Path) -> None:
 
 def test_document_type_declaration_is_an_error() -> None:
     bomb = '<!DOCTYPE x [<!ENTITY a "b"><!ENTITY c "&a;&a;&a;&a;">]><OpenDRIVE>&c;</OpenDRIVE>'
-    (found,) = diagnostics(bomb)
+    (found,) = road_diagnostics(bomb)
     assert found.startswith("town.xodr:1: the file has a document type declaration (DOCTYPE)")
     outside = '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/hostname">]><OpenDRIVE>&a;</OpenDRIVE>'
-    assert diagnostics(outside) == [found]
+    assert road_diagnostics(outside) == [found]
 
 
 def test_malformed_xml_and_other_xml_are_errors() -> None:
-    (found,) = diagnostics("<OpenDRIVE>\n<road></OpenDRIVE>")
+    (found,) = road_diagnostics("<OpenDRIVE>\n<road></OpenDRIVE>")
     assert found.startswith("town.xodr:2: not well-formed XML: an end tag does not match its start tag")
-    assert diagnostics("<OpenSCENARIO/>") == [
+    assert road_diagnostics("<OpenSCENARIO/>") == [
         "town.xodr:1: the root element is not <OpenDRIVE>; is this another kind of file?"
     ]
 
 
-def test_all_errors_are_reported_with_line_and_hint(road: Text, map_of: Text) -> None:
-    text = map_of(
+def test_all_errors_are_reported_with_line_and_hint() -> None:
+    text = map_xml(
         "\n"
-        + road("1", geometry='<geometry s="0" x="0" y="nan" hdg="0" length="100"><arc curvatur="0.1"/></geometry>'),
-        "\n" + road("1", rule="LTH"),
-        "\n" + road("2", link='<successor elementType="road" elementId="7" contactPoint="begin"/>'),
-        "\n" + road("3", geometry='<geometry s="0" x="0" y="0" hdg="0" length="100"><spline/></geometry>'),
+        + road_xml("1", geometry='<geometry s="0" x="0" y="nan" hdg="0" length="100"><arc curvatur="0.1"/></geometry>'),
+        "\n" + road_xml("1", rule="LTH"),
+        "\n" + road_xml("2", link='<successor elementType="road" elementId="7" contactPoint="begin"/>'),
+        "\n" + road_xml("3", geometry='<geometry s="0" x="0" y="0" hdg="0" length="100"><spline/></geometry>'),
     )
-    assert diagnostics(text) == [
+    assert road_diagnostics(text) == [
         "town.xodr:2: <geometry> has y='nan'; give a finite number",
         "town.xodr:2: <arc> lacks the attribute 'curvature'; did you mean 'curvatur'? (rename it to curvature)",
         "town.xodr:3: road '1' occurs twice; give each road a unique id",
@@ -71,9 +64,9 @@ def one_lane(number: int) -> str:
     return f'<lane id="{number}" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
 
 
-def test_duplicate_lanes_and_misplaced_center_are_errors(road: Text, map_of: Text) -> None:
+def test_duplicate_lanes_and_misplaced_center_are_errors() -> None:
     center, right = f"<center>{one_lane(0)}{one_lane(1)}</center>", f"<right>{one_lane(-1)}{one_lane(-1)}</right>"
-    found = diagnostics(map_of(road(lanes=sides(f"<left>{one_lane(0)}</left>", center, right))))
+    found = road_diagnostics(map_xml(road_xml(lanes=sides(f"<left>{one_lane(0)}</left>", center, right))))
     assert [line.split(": ", 1)[1] for line in found] == [
         "lane 0 is listed under <left>; left lanes have ids above 0, the center lane 0, right lanes ids below 0",
         "lane 1 is listed under <center>; left lanes have ids above 0, the center lane 0, right lanes ids below 0",
@@ -81,9 +74,9 @@ def test_duplicate_lanes_and_misplaced_center_are_errors(road: Text, map_of: Tex
     ]
 
 
-def test_side_of_a_lane_follows_its_id(road: Text, map_of: Text) -> None:
+def test_side_of_a_lane_follows_its_id() -> None:
     left, right = f"<left>{one_lane(-1)}\n{one_lane(-2)}</left>", f"<right>{one_lane(1)}</right>"
-    text = map_of(road(lanes=sides(left, "<center/>", right)))
+    text = map_xml(road_xml(lanes=sides(left, "<center/>", right)))
     network = RoadNetwork.parse(text, "town.xodr")
     assert [network.lane_pose_at("1", lane, 10.0).y for lane in (1, -1, -2)] == [1.5, -1.5, -4.5]
     (warning,) = network.map_warnings
@@ -95,9 +88,9 @@ def test_side_of_a_lane_follows_its_id(road: Text, map_of: Text) -> None:
     )
 
 
-def test_road_linked_to_missing_junction_ends_there(road: Text, map_of: Text) -> None:
+def test_road_linked_to_missing_junction_ends_there() -> None:
     network = RoadNetwork.parse(
-        map_of(road(link='<successor elementType="junction" elementId="7"/>'), road("2", y=50.0)), "town.xodr"
+        map_xml(road_xml(link='<successor elementType="junction" elementId="7"/>'), road_xml("2", y=50.0)), "town.xodr"
     )
     (warning,) = network.map_warnings
     assert warning.rule == "road-link"
@@ -110,18 +103,16 @@ def test_road_linked_to_missing_junction_ends_there(road: Text, map_of: Text) ->
 
 
 @pytest.mark.parametrize(("length", "there"), [(100.0, "20 m before"), (50.0, "30 m after")])
-def test_road_length_that_differs_from_geometry_is_replaced_with_a_warning(
-    road: Text, map_of: Text, length: float, there: str
-) -> None:
+def test_road_length_that_differs_from_geometry_is_replaced_with_a_warning(length: float, there: str) -> None:
     short = '<geometry s="0" x="0" y="0" hdg="0" length="80"><line/></geometry>'
     one_lane = (
         '<laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><link>'
         '<{}cessor id="-1"/></link><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
     )
     link = '<{}cessor elementType="road" elementId="{}" contactPoint="{}"/>'
-    first = road(geometry=short, length=length, link=link.format("suc", 2, "start"), lanes=one_lane.format("suc"))
-    second = road("2", x=80.0, link=link.format("prede", 1, "end"), lanes=one_lane.format("prede"))
-    network = RoadNetwork.parse(map_of(first, second), "town.xodr")
+    first = road_xml(geometry=short, length=length, link=link.format("suc", 2, "start"), lanes=one_lane.format("suc"))
+    second = road_xml("2", x=80.0, link=link.format("prede", 1, "end"), lanes=one_lane.format("prede"))
+    network = RoadNetwork.parse(map_xml(first, second), "town.xodr")
     assert network.roads["1"].length == 80.0
     assert [(warning.rule, warning.message) for warning in network.map_warnings] == [
         ("geometry-gap", f"road '1' has length {length:g} m, but its geometry ends {there} that and has priority")
@@ -142,16 +133,14 @@ def test_road_length_that_differs_from_geometry_is_replaced_with_a_warning(
         ('length="3" space="nan"', "<line> has space='nan'"),
     ],
 )
-def test_incomplete_road_mark_line_is_a_warning_and_follows_its_type(
-    road: Text, map_of: Text, line: str, what: str
-) -> None:
+def test_incomplete_road_mark_line_is_a_warning_and_follows_its_type(line: str, what: str) -> None:
     """A broken line with 3 m dashes at a pitch of 9 m on 100 m has 12 dashes, the last of 1 m."""
     lanes = (
         '<laneSection s="0"><center><lane id="0" type="none"><roadMark sOffset="0" type="broken" width="0.2">'
         f'<type name="x"><line {line}/></type></roadMark></lane></center><right><lane id="-1" type="driving">'
         '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
     )
-    network = RoadNetwork.parse(map_of(road(lanes=lanes)), "town.xodr")
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)), "town.xodr")
     (warning,) = network.map_warnings
     assert (warning.rule, warning.line) == ("road-mark", 1)
     assert warning.message == f"{what}, and is drawn without it"
@@ -167,22 +156,22 @@ def test_incomplete_road_mark_line_is_a_warning_and_follows_its_type(
         '<poly3 a="0" b="0" c="0" d="1e6"/>',
     ],
 )
-def test_curve_of_excessive_extent_is_an_error(road: Text, map_of: Text, curve: str) -> None:
+def test_curve_of_excessive_extent_is_an_error(curve: str) -> None:
     """A grid over such a road would take gigabytes."""
-    text = road("1", geometry=f'<geometry s="0" x="0" y="0" hdg="0" length="100">{curve}</geometry>')
-    far = [found for found in diagnostics(map_of(text)) if "a geometry of road '1' leads " in found]
+    text = road_xml("1", geometry=f'<geometry s="0" x="0" y="0" hdg="0" length="100">{curve}</geometry>')
+    far = [found for found in road_diagnostics(map_xml(text)) if "a geometry of road '1' leads " in found]
     assert len(far) == 1
     assert "at most 1e+06 m are read" in far[0]
 
 
-def test_namespace_is_ignored(road: Text, map_of: Text) -> None:
-    text = map_of(road()).replace(
+def test_namespace_is_ignored() -> None:
+    text = map_xml(road_xml()).replace(
         "<OpenDRIVE>", '<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">'
     )
     assert list(RoadNetwork.parse(text).roads) == ["1"]
 
 
-def test_borders_equal_widths(road: Text, map_of: Text) -> None:
+def test_borders_equal_widths() -> None:
     def lane(number: int, entry: str) -> str:
         return f'<lane id="{number}" type="driving">{entry}</lane>'
 
@@ -198,21 +187,21 @@ def test_borders_equal_widths(road: Text, map_of: Text) -> None:
     widths = section(
         '<width sOffset="0" a="3" b="0.01" c="0" d="0"/>', '<width sOffset="0" a="3.5" b="0.02" c="0" d="0"/>'
     )
-    one, two = (RoadNetwork.parse(map_of(road(lanes=lanes))) for lanes in (borders, widths))
+    one, two = (RoadNetwork.parse(map_xml(road_xml(lanes=lanes))) for lanes in (borders, widths))
     for s in (0.0, 33.0, 100.0):
         for number in (-1, -2):
             assert one.lane_width("1", number, s) == pytest.approx(two.lane_width("1", number, s))
             assert one.lane_pose_at("1", number, s) == pytest.approx(two.lane_pose_at("1", number, s))
 
 
-def test_single_side_sections_continue_the_other_side(road: Text, map_of: Text) -> None:
+def test_single_side_sections_continue_the_other_side() -> None:
     def part(s: int, tag: str, number: int, a: float, b: float) -> str:
         lane = f'<lane id="{number}" type="driving"><width sOffset="0" a="{a}" b="{b}" c="0" d="0"/></lane>'
         center = '<center><lane id="0"/></center>'
         return f'<laneSection s="{s}" singleSide="true"><{tag}>{lane}</{tag}>{center}</laneSection>'
 
     lanes = part(0, "right", -1, 3.0, 0.01) + part(0, "left", 1, 4.0, 0.0) + part(40, "left", 1, 2.0, 0.0)
-    network = RoadNetwork.parse(map_of(road(lanes=lanes)))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)))
     assert network.lane_width("1", -1, 70.0) == pytest.approx(3.7)
     assert [network.lane_width("1", 1, s) for s in (39.0, 41.0)] == [4.0, 2.0]
     moved = network.advance(network.location("1", -1, 10.0), 80.0)
@@ -220,7 +209,7 @@ def test_single_side_sections_continue_the_other_side(road: Text, map_of: Text) 
     assert moved.s == pytest.approx(90.0, abs=0.2)
 
 
-def test_speed_limit_of_lane_overrides_road(road: Text, map_of: Text) -> None:
+def test_speed_limit_of_lane_overrides_road() -> None:
     lane = (
         '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/>'
         '<speed sOffset="20" max="30" unit="mph"/></lane>'
@@ -230,7 +219,7 @@ def test_speed_limit_of_lane_overrides_road(road: Text, map_of: Text) -> None:
         '<type s="50" type="motorway"><speed max="no limit"/></type><type s="80" type="rural"/>'
     )
     lanes = f'<laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'
-    network = RoadNetwork.parse(map_of(road(lanes=lanes, extra=kinds)))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=lanes, extra=kinds)))
     assert network.speed_limit("1", 10.0) == pytest.approx(50 / 3.6)
     assert network.speed_limit("1", 10.0, -1) == pytest.approx(50 / 3.6)
     assert network.speed_limit("1", 30.0, -1) == pytest.approx(13.4112)
@@ -244,10 +233,10 @@ SIGNALS = (
 )
 
 
-def test_signals_references_and_controllers(road: Text, map_of: Text) -> None:
+def test_signals_references_and_controllers() -> None:
     other = '<signals><signalReference s="5" t="3" id="7" orientation="-"/></signals>'
     rest = '<controller id="1" name="c"><control signalId="7" type="0"/></controller>'
-    network = RoadNetwork.parse(map_of(road(extra=SIGNALS), road("2", y=50.0, extra=other), rest=rest))
+    network = RoadNetwork.parse(map_xml(road_xml(extra=SIGNALS), road_xml("2", y=50.0, extra=other), rest=rest))
     signal = network.signals["7"]
     assert signal.dynamic
     assert signal.place.validity == ((-1, -1),)
@@ -257,14 +246,14 @@ def test_signals_references_and_controllers(road: Text, map_of: Text) -> None:
     assert pose[:4] == pytest.approx((90.0, -4.0, 5.0, math.pi + 0.1))
 
 
-def test_reference_to_unknown_signal_is_an_error(road: Text, map_of: Text) -> None:
+def test_reference_to_unknown_signal_is_an_error() -> None:
     extra = '<signals><signalReference s="5" t="3" id="9" orientation="-"/></signals>'
-    (found,) = diagnostics(map_of(road(extra=extra)))
+    (found,) = road_diagnostics(map_xml(road_xml(extra=extra)))
     assert found == "town.xodr:1: <signalReference> refers to signal '9', which does not exist; correct the id"
 
 
-def test_signals_with_equal_ids_are_kept_separate(road: Text, map_of: Text) -> None:
-    network = RoadNetwork.parse(map_of(road(extra=SIGNALS), road("2", y=50.0, extra=SIGNALS)))
+def test_signals_with_equal_ids_are_kept_separate() -> None:
+    network = RoadNetwork.parse(map_xml(road_xml(extra=SIGNALS), road_xml("2", y=50.0, extra=SIGNALS)))
     assert {key: signal.place.road for key, signal in network.signals.items()} == {"7": "1", "7#2": "2"}
 
 
@@ -299,7 +288,7 @@ def test_mutated_file_is_an_error_or_gives_a_usable_network(library: Path, data:
         network.advance(network.location(key.road, key.lane, start), 30.0)
 
 
-def test_virtual_junction_is_unreachable_from_road_ends(road: Text, map_of: Text) -> None:
+def test_virtual_junction_is_unreachable_from_road_ends() -> None:
     """A driveway leaves road 1 at s = 50. It must be unreachable from the end of road 1."""
     leaves = '<predecessor elementType="road" elementId="1" elementS="50" elementDir="+"/>'
     connection = (
@@ -310,8 +299,8 @@ def test_virtual_junction_is_unreachable_from_road_ends(road: Text, map_of: Text
         '<junction id="9" name="" type="virtual" mainRoad="1" sStart="45" sEnd="55" orientation="+">'
         f"{connection}</junction>"
     )
-    driveway = road("2", x=50.0, y=-2.0, hdg=-1.5, length=20.0, link=leaves, junction="9")
-    network = RoadNetwork.parse(map_of(road("1"), driveway, rest=virtual), "town.xodr")
+    driveway = road_xml("2", x=50.0, y=-2.0, hdg=-1.5, length=20.0, link=leaves, junction="9")
+    network = RoadNetwork.parse(map_xml(road_xml("1"), driveway, rest=virtual), "town.xodr")
     assert network.advance(network.location("1", -1, 90.0), 20.0) is None
     (warning,) = network.map_warnings
     assert str(warning) == (

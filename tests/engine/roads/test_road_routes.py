@@ -1,16 +1,14 @@
 """Tests of routes over the lane graph."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import networkx as nx
 import numpy as np
 import pytest
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, ring_xml, road_xml, section_xml
 
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, RouteError
-
-Text = Callable[..., str]
 
 
 @pytest.fixture
@@ -18,27 +16,10 @@ def crossing(library: Path) -> RoadNetwork:
     return RoadNetwork.load(library / "coop_1.xodr")
 
 
-def ring(road: Text, map_of: Text) -> RoadNetwork:
+def ring() -> RoadNetwork:
     """Return two consecutive half circles of radius 50 m with two lanes, both counter-clockwise."""
-    lanes = (
-        '<laneSection s="0"><center><lane id="0"/></center><right>'
-        + "".join(
-            f'<lane id="{n}" type="driving"><link><predecessor id="{n}"/><successor id="{n}"/></link>'
-            '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'
-            for n in (-1, -2)
-        )
-        + "</right></laneSection>"
-    )
-    length = 50 * math.pi
-    roads = []
-    for number, other, x, h in (("a", "b", 50.0, math.pi / 2), ("b", "a", -50.0, -math.pi / 2)):
-        arc = f'<geometry s="0" x="{x}" y="0" hdg="{h!r}" length="{length!r}"><arc curvature="0.02"/></geometry>'
-        link = "".join(
-            f'<{tag} elementType="road" elementId="{other}" contactPoint="{end}"/>'
-            for tag, end in (("predecessor", "end"), ("successor", "start"))
-        )
-        roads.append(road(number, length=length, geometry=arc, lanes=lanes, link=link))
-    return RoadNetwork.parse(map_of(*roads))
+    lanes = section_xml(right="".join(lane_xml(n, 4, link=lane_links_xml(n, n)) for n in (-1, -2)))
+    return RoadNetwork.parse(ring_xml(50.0, lanes))
 
 
 def test_route_straight_over_the_crossing(crossing: RoadNetwork) -> None:
@@ -61,8 +42,8 @@ def test_route_of_a_left_turn_has_continuous_heading(crossing: RoadNetwork) -> N
     assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(route.length, rel=1e-3)
 
 
-def test_route_prefers_lane_change_to_detour(road: Text, map_of: Text) -> None:
-    network = ring(road, map_of)
+def test_route_prefers_lane_change_to_detour() -> None:
+    network = ring()
     start, end = network.location("a", -1, 10.0), network.location("b", -2, 10.0)
     route = network.route(start, end)
     kinds = [network.graph.edges[a, b]["kind"] for a, b in zip(route.lanes, route.lanes[1:], strict=False)]
@@ -75,8 +56,8 @@ def test_route_prefers_lane_change_to_detour(road: Text, map_of: Text) -> None:
     assert route.location_at(route.length).lane == -2
 
 
-def test_route_to_goal_behind_the_start_goes_round(road: Text, map_of: Text) -> None:
-    network = ring(road, map_of)
+def test_route_to_goal_behind_the_start_goes_round() -> None:
+    network = ring()
     for lane in (-1, -2):
         route = network.route(network.location("a", -1, 20.0), network.location("a", lane, 10.0))
         assert [key.road for key in route.lanes if key.lane == lane][-1] == "a"
@@ -106,8 +87,8 @@ def test_route_against_the_traffic_is_an_error(crossing: RoadNetwork) -> None:
         crossing.route(crossing.location("2", -1, 5.0), crossing.location("1", -1, 5.0))
 
 
-def test_route_passes_intermediate_locations(road: Text, map_of: Text) -> None:
-    network = ring(road, map_of)
+def test_route_passes_intermediate_locations() -> None:
+    network = ring()
     a, b = network.location("a", -1, 10.0), network.location("a", -1, 60.0)
     once = network.route(a, b)
     round_ = network.route(a, b, via=[network.location("b", -1, 50.0)])
@@ -128,8 +109,8 @@ def test_locations_along_a_route(crossing: RoadNetwork) -> None:
     assert (place.road, place.lane, place.s) == pytest.approx(("3", 3, 15.0))
 
 
-def test_route_from_start_at_destination_has_length_zero(road: Text, map_of: Text) -> None:
-    network = ring(road, map_of)
+def test_route_from_start_at_destination_has_length_zero() -> None:
+    network = ring()
     there, beyond = network.location("a", -1, 30.0), network.location("a", -1, 30.0 + 1e-13)
     assert network.route(beyond, there).length == pytest.approx(0.0, abs=1e-6)
     onward = network.route(beyond, network.location("b", -1, 10.0), via=[there])
@@ -138,7 +119,7 @@ def test_route_from_start_at_destination_has_length_zero(road: Text, map_of: Tex
     assert network.route(network.location("a", -1, 31.0), there).length > 300.0
 
 
-def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
+def round_and_out() -> RoadNetwork:
     """Return road a, which ends at a junction: b leads round to the start of a, c leads out; each is 100 m long."""
     lane = (
         '<laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">'
@@ -151,7 +132,7 @@ def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
         return f'<{tag} elementType="{kind}" elementId="{number}" {contact}/>'
 
     def one(number: str, before: str, after: str, junction: str = "-1") -> str:
-        return road(number, lanes=lane, link=before + after, junction=junction)
+        return road_xml(number, lanes=lane, link=before + after, junction=junction)
 
     ways = "".join(
         f'<connection id="{n}" incomingRoad="a" connectingRoad="to_{n}" contactPoint="start">'
@@ -159,7 +140,7 @@ def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
         for n in ("c", "b")
     )
     return RoadNetwork.parse(
-        map_of(
+        map_xml(
             one("a", link("predecessor", "road", "b"), link("successor", "junction", "J")),
             one("to_b", link("predecessor", "road", "a"), link("successor", "road", "b"), "J"),
             one("to_c", link("predecessor", "road", "a"), link("successor", "road", "c"), "J"),
@@ -170,8 +151,8 @@ def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
     )
 
 
-def test_route_through_a_junction_twice_selects_the_branch_of_each_visit(road: Text, map_of: Text) -> None:
-    network = round_and_out(road, map_of)
+def test_route_through_a_junction_twice_selects_the_branch_of_each_visit() -> None:
+    network = round_and_out()
     start, end = network.location("a", -1, 10.0), network.location("c", -1, 50.0)
     route = network.route(start, end, via=[network.location("b", -1, 50.0)])
     assert [key.road for key in route.lanes] == ["a", "to_b", "b", "a", "to_c", "c"]

@@ -1,15 +1,13 @@
 """Tests of road surfaces and markings."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
 from eidrive_scenario.roads import KINDS, RoadNetwork, SurfaceMesh, outlines, placed_objects, surface_meshes
-
-Text = Callable[..., str]
 
 
 def area(mesh: SurfaceMesh) -> float:
@@ -22,38 +20,35 @@ def by_kind(network: RoadNetwork) -> dict[str, SurfaceMesh]:
 
 
 def marked(kind: str, color: str = "white") -> str:
-    return (
-        '<laneSection s="0"><center><lane id="0" type="none">'
-        f'<roadMark sOffset="0" type="{kind}" color="{color}" width="0.2"/></lane></center>'
-        '<right><lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
-    )
+    mark = f'<roadMark sOffset="0" type="{kind}" color="{color}" width="0.2"/>'
+    return section_xml(right=lane_xml(-1, 4), center=mark)
 
 
-def test_straight_lane_has_few_triangles(road: Text, map_of: Text) -> None:
-    mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked("none")))))["driving"]
+def test_straight_lane_has_few_triangles() -> None:
+    mesh = by_kind(RoadNetwork.parse(map_xml(road_xml(lanes=marked("none")))))["driving"]
     assert area(mesh) == pytest.approx(400.0)
     assert len(mesh.faces) <= 12
     assert np.diff(np.unique(mesh.vertices[:, 0])).max() <= 25.0
     assert mesh.color == KINDS["driving"]
 
 
-def test_bend_is_approximated_to_one_centimeter(road: Text, map_of: Text) -> None:
+def test_bend_is_approximated_to_one_centimeter() -> None:
     length = 20 * math.pi
     bend = f'<geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="0.05"/></geometry>'
-    mesh = by_kind(RoadNetwork.parse(map_of(road(length=length, geometry=bend, lanes=marked("none")))))["driving"]
+    mesh = by_kind(RoadNetwork.parse(map_xml(road_xml(length=length, geometry=bend, lanes=marked("none")))))["driving"]
     assert area(mesh) == pytest.approx(math.pi / 2 * (24.0**2 - 20.0**2), rel=2e-3)
 
 
-def test_road_marks_have_specified_length_and_width(road: Text, map_of: Text) -> None:
+def test_road_marks_have_specified_length_and_width() -> None:
     expected = {"solid": 20.0, "broken": 0.2 * 34, "solid solid": 40.0, "broken solid": 20.0 + 0.2 * 34}
     for kind, size in expected.items():
-        mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked(kind, "yellow")))))["marking_yellow"]
+        mesh = by_kind(RoadNetwork.parse(map_xml(road_xml(lanes=marked(kind, "yellow")))))["marking_yellow"]
         assert area(mesh) == pytest.approx(size), kind
         assert mesh.vertices[:, 2].min() > 0.0
 
 
-def test_broken_solid_center_line_has_its_broken_line_left(road: Text, map_of: Text) -> None:
-    mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked("broken solid")))))["marking_white"]
+def test_broken_solid_center_line_has_its_broken_line_left() -> None:
+    mesh = by_kind(RoadNetwork.parse(map_xml(road_xml(lanes=marked("broken solid")))))["marking_white"]
     left = mesh.vertices[mesh.faces][np.mean(mesh.vertices[mesh.faces][:, :, 1], axis=1) > 0.0]
     assert left[:, :, 0].max() - left[:, :, 0].min() == pytest.approx(100.0, abs=1.1)
     assert len(left) == 2 * 12
@@ -81,7 +76,7 @@ def test_crosswalk_is_striped_and_curb_is_raised(library: Path) -> None:
     assert np.ptp(ground[:, 0]) == pytest.approx(2 * (3.5 + 3.5 + 0.5 + 0.63))
 
 
-def test_repeated_object_is_placed_along_the_road(road: Text, map_of: Text) -> None:
+def test_repeated_object_is_placed_along_the_road() -> None:
     objects = (
         '<objects><object id="1" type="pole" s="0" t="0" radius="0.1" height="1">'
         '<repeat s="10" length="40" distance="20" tStart="4" tEnd="6" heightStart="1" heightEnd="2" '
@@ -89,20 +84,20 @@ def test_repeated_object_is_placed_along_the_road(road: Text, map_of: Text) -> N
         '<object id="2" type="barrier" s="0" t="0" height="1" width="0.3"><repeat s="0" length="12" distance="0" '
         'tStart="5" tEnd="5" heightStart="1" heightEnd="1" zOffsetStart="0" zOffsetEnd="0"/></object></objects>'
     )
-    placed = list(placed_objects(RoadNetwork.parse(map_of(road(extra=objects)))))
+    placed = list(placed_objects(RoadNetwork.parse(map_xml(road_xml(extra=objects)))))
     posts, parts = np.array([(p.pose.x, p.pose.y, p.height) for p in placed[:3]]), placed[3:]
     assert posts == pytest.approx(np.array([(10, 4, 1), (30, 5, 1.5), (50, 6, 2)]))
     assert np.array([(p.pose.x, p.length) for p in parts]) == pytest.approx(np.array([(2, 4), (6, 4), (10, 4)]))
 
 
-def test_cycle_lanes_in_junctions_are_below_driving_lanes(road: Text, map_of: Text) -> None:
+def test_cycle_lanes_in_junctions_are_below_driving_lanes() -> None:
     both = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'
         '<lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'
         '<lane id="-2" type="biking"><width sOffset="0" a="1" b="0" c="0" d="0"/></lane></right></laneSection>'
     )
-    inside = by_kind(RoadNetwork.parse(map_of(road(lanes=both, junction="9"), rest='<junction id="9" name=""/>')))
+    inside = by_kind(RoadNetwork.parse(map_xml(road_xml(lanes=both, junction="9"), rest='<junction id="9" name=""/>')))
     assert np.unique(inside["biking"].vertices[:, 2]) == pytest.approx([-0.01])
     assert inside["junction"].vertices[:, 2].max() == 0.0
-    outside = by_kind(RoadNetwork.parse(map_of(road(lanes=both))))
+    outside = by_kind(RoadNetwork.parse(map_xml(road_xml(lanes=both))))
     assert np.unique(outside["biking"].vertices[:, 2]) == pytest.approx([0.0])

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import pytest
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.randomness import generator
@@ -13,11 +13,7 @@ from eidrive_scenario.roads import RoadNetwork, fastest, fewest_junctions, rando
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route
 
-Text = Callable[..., str]
-LANE = (
-    '<laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving"><link><predecessor id="-1"/>'
-    '<successor id="-1"/></link><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
-)
+LANE = section_xml(right=lane_xml(-1, 4, link=lane_links_xml(-1, -1)))
 WAYS = {
     "a": (300.0, 10.0, ((20, 9), (140, None), (160, 8), (280, None), (300, 7))),
     "b": (360.0, 30.0, ((20, 9), (180, None), (200, 6), (340, None), (360, 7))),
@@ -27,20 +23,18 @@ WAYS = {
 
 
 @pytest.fixture
-def three_ways(road: Text, map_of: Text) -> RoadNetwork:
+def three_ways() -> RoadNetwork:
     """Three routes from `start` to `end` 300 m further: a is the shortest, b the fastest, c has the fewest junctions.
 
     Route c has two junctions, the others three. Routes b and c have slopes up and down.
     """
 
-    def link(tag: str, other: str) -> str:
-        kind = "junction" if other.isdigit() else "road"
-        contact = "" if kind == "junction" else f'contactPoint="{"end" if tag == "predecessor" else "start"}"'
-        return f'<{tag} elementType="{kind}" elementId="{other}" {contact}/>'
+    def to(other: str) -> dict[str, str]:
+        return {"junction" if other.isdigit() else "road": other}
 
     roads = [
-        road("start", length=100.0, lanes=LANE, link=link("successor", "9")),
-        road("end", length=100.0, x=400.0, lanes=LANE, link=link("predecessor", "7")),
+        road_xml("start", length=100.0, lanes=LANE, link=successor_xml(junction="9")),
+        road_xml("end", length=100.0, x=400.0, lanes=LANE, link=predecessor_xml(junction="7")),
     ]
     connections: dict[int, str] = {}
     for way, (length, limit, pieces) in WAYS.items():
@@ -55,12 +49,21 @@ def three_ways(road: Text, map_of: Text) -> RoadNetwork:
             before, after = (
                 str(owners[n]) if junction is None and owners[n] else names[n] for n in (number - 1, number + 1)
             )
-            links = link("predecessor", before) + link("successor", after)
+            links = predecessor_xml(**to(before)) + successor_xml(**to(after))
             speed = f'<type s="0" type="town"><speed max="{limit}" unit="m/s"/></type>'
             roads.append(
-                road(names[number], length=stop - begin, x=x, y=y, hdg=slope if up else -slope, lanes=LANE, link=links,
-                     junction=str(junction or -1), extra=speed)
-            )  # fmt: skip
+                road_xml(
+                    names[number],
+                    length=stop - begin,
+                    x=x,
+                    y=y,
+                    hdg=slope if up else -slope,
+                    link=links,
+                    lanes=LANE,
+                    extra=speed,
+                    junction=str(junction or -1),
+                )
+            )
             if junction is not None:
                 connections[junction] = connections.get(junction, "") + (
                     f'<connection id="{way}" incomingRoad="{names[number - 1]}" connectingRoad="{names[number]}" '
@@ -68,7 +71,7 @@ def three_ways(road: Text, map_of: Text) -> RoadNetwork:
                 )
             begin = float(stop)
     junctions = "".join(f'<junction id="{one}" name="">{text}</junction>' for one, text in connections.items())
-    return RoadNetwork.parse(map_of(*roads, rest=junctions))
+    return RoadNetwork.parse(map_xml(*roads, rest=junctions))
 
 
 def test_each_cost_selects_its_route(three_ways: RoadNetwork) -> None:

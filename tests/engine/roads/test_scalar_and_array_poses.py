@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
+from opendrive_xml import map_xml, road_xml, section_xml
 
 from eidrive_scenario.roads import RoadNetwork
-
-Text = Callable[..., str]
 
 ROADS = 60
 LENGTH = 80.0
@@ -31,7 +28,7 @@ def curve(draw: np.random.Generator, kind: int) -> str:
     )[kind]
 
 
-def random_road(draw: np.random.Generator, number: int, road: Text) -> str:
+def random_road(draw: np.random.Generator, number: int) -> str:
     """Return a road with bends, slopes and lanes of changing width; a quarter of the roads has no superelevation."""
     x, y, hdg = (float(value) for value in draw.uniform(-3.0, 3.0, 3))
     shape = curve(draw, number % 4)
@@ -46,13 +43,12 @@ def random_road(draw: np.random.Generator, number: int, road: Text) -> str:
     climb = cubic("elevation", "s", draw.normal(size=4) * [20.0, 0.1, 1e-3, 1e-5])
     bank = cubic("superelevation", "s", draw.normal(size=4) * [0.2, 3e-3, 1e-5, 1e-7])
     lateral = "" if number % 16 < 4 else f"<lateralProfile>{bank}</lateralProfile>"
-    return road(
+    return road_xml(
         str(number),
         length=LENGTH,
         geometry=f'<geometry s="0" x="{x!r}" y="{y!r}" hdg="{hdg!r}" length="{LENGTH!r}">{shape}</geometry>',
-        lanes=f'{offset}<laneSection s="0"><left>{lanes[0]}</left><center><lane id="0" type="none"/></center>'
-        f"<right>{lanes[1]}{lanes[2]}</right></laneSection>",
-        extra=f"<elevationProfile>{climb}</elevationProfile>{lateral}",
+        lanes=offset + section_xml(lanes[0], lanes[1] + lanes[2]),
+        profiles=f"<elevationProfile>{climb}</elevationProfile>{lateral}",
     )
 
 
@@ -62,8 +58,8 @@ def draw() -> np.random.Generator:
 
 
 @pytest.fixture
-def network(draw: np.random.Generator, road: Text, map_of: Text) -> RoadNetwork:
-    return RoadNetwork.parse(map_of(*(random_road(draw, number, road) for number in range(ROADS))))
+def network(draw: np.random.Generator) -> RoadNetwork:
+    return RoadNetwork.parse(map_xml(*(random_road(draw, number) for number in range(ROADS))))
 
 
 def test_poses_of_points_and_arrays_agree_on_random_roads(network: RoadNetwork, draw: np.random.Generator) -> None:
@@ -82,10 +78,10 @@ def test_poses_of_points_and_arrays_agree_on_random_roads(network: RoadNetwork, 
 
 
 @pytest.mark.parametrize("number", range(16))
-def test_locate_points_equals_locate_arrays_on_random_roads(number: int, road: Text, map_of: Text) -> None:
+def test_locate_points_equals_locate_arrays_on_random_roads(number: int) -> None:
     """Each road is in a separate network, as random roads overlap. Both methods find the position of the pose."""
     draw = np.random.default_rng(number)
-    network = RoadNetwork.parse(map_of(random_road(draw, number, road)))
+    network = RoadNetwork.parse(map_xml(random_road(draw, number)))
     s, t = draw.uniform(1.0, LENGTH - 1.0, 40), draw.uniform(-5.0, 3.0, 40)
     poses = network.road_pose(str(number), s, t)
     many = network.locate(poses.x, poses.y)

@@ -1,4 +1,4 @@
-"""Message traffic of stations on a radio channel."""
+"""Channels of tests, messages, and the traffic of stations on a radio channel."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
@@ -22,6 +23,10 @@ QUIET: dict[str, object] = {
 
 def radio(seed: int = 0, **profile: Any) -> RadioChannel:
     return RadioChannel(RadioProfile.model_validate(profile), seed)
+
+
+def composed(seed: int = 0, **profile: object) -> ComposedChannel:
+    return ComposedChannel(ComposedProfile.model_validate(profile), seed)
 
 
 def message(sender: str, number: int, time: float, size: int = 300) -> Message:

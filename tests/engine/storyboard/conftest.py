@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
+from openscenario_xml import round_car_xml, scenario_xml
 from py_trees.common import Status
+from storyboard_xml import act_xml, acts_xml, group_xml, init_xml, maneuver_xml
 
 from eidrive_scenario.openscenario import load_scenario, model
 from eidrive_scenario.registry import Registry
@@ -20,29 +24,7 @@ from eidrive_scenario.storyboard.state.domains import Domain
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world.view import WorldView
 
-CAR = """<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="car">
-  <BoundingBox><Center x="1.5" y="0" z="0.75"/><Dimensions width="2" length="5" height="1.5"/></BoundingBox>
-  <Performance maxSpeed="70" maxAcceleration="10" maxDeceleration="10"/>
-  <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.8" positionX="3" positionZ="0.3"/>
-  <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.8" positionX="0" positionZ="0.3"/></Axles>
-  <Properties/></Vehicle></ScenarioObject>"""
-
-SCENARIO = """<OpenSCENARIO>
-  <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="two cars" author="test"/>
-  <CatalogLocations/><RoadNetwork/>
-  <Entities>{cars}</Entities>
-  <Storyboard><Init><Actions/></Init><StopTrigger/></Storyboard></OpenSCENARIO>"""
-
-ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-  <road name="street" length="{length}" id="1" junction="-1"><link/>
-    <planView><geometry s="0" x="0" y="0" hdg="0" length="{length}">{shape}</geometry></planView>
-    <lanes><laneSection s="0">
-      <left><lane id="1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></left>
-      <center><lane id="0" type="none" level="false"/></center>
-      <right>
-        <lane id="-1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>
-        <lane id="-2" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>
-      </right></laneSection></lanes></road></OpenDRIVE>"""
+CARS = round_car_xml("A") + round_car_xml("B")
 
 
 def empty_view(time: float = 0.0, tick: int = 0) -> WorldView:
@@ -116,8 +98,7 @@ class Setting(Task):
 @pytest.fixture
 def context() -> RuntimeContext:
     """Runtime context with cars A and B, without roads."""
-    cars = "".join(CAR.format(name=name) for name in "AB")
-    scenario = load_scenario(SCENARIO.format(cars=cars).encode())
+    scenario = load_scenario(scenario_xml(entities=CARS))
     return RuntimeContext(scenario, None, dt=0.1, seed=0, empty_view=empty_view(tick=-1))
 
 
@@ -148,7 +129,7 @@ def setting(context: RuntimeContext) -> Callable[[], Setting]:
 @pytest.fixture
 def fresh() -> Callable[[], tuple[RuntimeContext, Clock, type[Script], Callable[..., Task]]]:
     """Constructor of a context, its clock, conditions and actions, called for each example of a property."""
-    scenario = load_scenario(SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB")).encode())
+    scenario = load_scenario(scenario_xml(entities=CARS))
 
     def made() -> tuple[RuntimeContext, Clock, type[Script], Callable[..., Task]]:
         context = RuntimeContext(scenario, None, dt=0.1, seed=0, empty_view=empty_view(tick=-1))
@@ -160,37 +141,37 @@ def fresh() -> Callable[[], tuple[RuntimeContext, Clock, type[Script], Callable[
 @pytest.fixture
 def street() -> RoadNetwork:
     """Straight road along x, 200 m: lane 1 (y = 2, towards -x), lanes -1 (y = -2) and -2 (y = -6, towards +x)."""
-    return RoadNetwork.parse(ROAD.format(length=200, shape="<line/>"))
+    return RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes_xml(1, 2, 4))))
 
 
 @pytest.fixture
 def bend() -> RoadNetwork:
     """Road with the same lanes in a left bend of radius 50 m, a quarter circle."""
-    return RoadNetwork.parse(ROAD.format(length=78.5398163397, shape='<arc curvature="0.02"/>'))
-
-
-ACT = """<Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
-  <Actors selectTriggeringEntities="false"><EntityRef entityRef="A"/></Actors>
-  <Maneuver name="maneuver">{events}</Maneuver></ManeuverGroup></Act></Story>"""
+    return RoadNetwork.parse(map_xml(road_xml(length=25 * math.pi, curvature=0.02, lanes=lanes_xml(1, 2, 4))))
 
 
 @pytest.fixture
 def build() -> Callable[..., Storyboard]:
-    """Constructor of a storyboard with cars A and B: Init actions and events of A, stop trigger, global actions."""
+    """Constructor of a storyboard with cars A and B: Init actions and events of A, or a story; the condition groups of
+    the stop trigger.
+    """
 
     def made(
         init: str,
         events: str = "",
-        stop: str = "<StopTrigger/>",
+        stop: str = "",
         global_actions: str = "",
         registered: Registry | None = None,
         declared: str = "",
+        story: str = "",
     ) -> Storyboard:
-        text = SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB"))
-        actions = f'<Actions>{global_actions}<Private entityRef="A">{init}</Private></Actions>'
-        stories = ACT.format(events=events) if events else ""
-        text = text.replace("<CatalogLocations/>", declared + "<CatalogLocations/>")
-        text = text.replace("<Actions/>", actions).replace("<StopTrigger/>", stories + stop)
-        return Storyboard(load_scenario(text.encode()), None, dt=0.1, actions=registered)
+        text = scenario_xml(
+            declarations=declared,
+            entities=CARS,
+            init=global_actions + init_xml("A", init),
+            story=acts_xml(act_xml(group_xml(maneuver_xml(events), "A"))) if events else story,
+            stop=stop,
+        )
+        return Storyboard(load_scenario(text), None, dt=0.1, actions=registered)
 
     return made

@@ -6,6 +6,9 @@ import math
 from typing import Any
 
 import pytest
+from opendrive_xml import elevation_xml, lanes_xml, map_xml, road_xml
+from openscenario_xml import scenario_xml
+from storyboard_xml import global_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario, model
@@ -21,15 +24,14 @@ NORTHING = 5_316_300.0
 @pytest.fixture
 def globe(context: RuntimeContext) -> RuntimeContext:
     """Road to the north from about (0, 0) at z = 10, below another one at z = 17, in shifted coordinates."""
-    road = """<road name="" length="400" id="{number}" junction="-1"><link/>
-      <planView><geometry s="0" x="0" y="0" hdg="1.5707963267948966" length="400"><line/></geometry></planView>
-      <elevationProfile><elevation s="0" a="{z}" b="0" c="0" d="0"/></elevationProfile>
-      <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving">
-      <width sOffset="0" a="8" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>"""
-    text = f"""<OpenDRIVE><header revMajor="1" revMinor="6"><geoReference>+proj=utm +zone=32 +datum=WGS84</geoReference>
-      <offset x="499996" y="{NORTHING}" z="100" hdg="0"/></header>
-      {road.format(number=1, z=10)}{road.format(number=2, z=17)}</OpenDRIVE>"""
-    roads = RoadNetwork.parse(text)
+    reference = "<geoReference>+proj=utm +zone=32 +datum=WGS84</geoReference>"
+    lower, upper = (
+        road_xml(number, length=400.0, hdg=math.pi / 2, profiles=elevation_xml(z), lanes=lanes_xml(0, 1, 8))
+        for number, z in (("1", 10), ("2", 17))
+    )
+    roads = RoadNetwork.parse(
+        map_xml(lower, upper, header=f'{reference}<offset x="499996" y="{NORTHING}" z="100" hdg="0"/>')
+    )
     return RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
 
 
@@ -100,12 +102,9 @@ def test_position_far_from_roads_is_resolved(globe: RuntimeContext) -> None:
 def test_file_of_version_1_1_with_radians_loads() -> None:
     """Version 1.1 requires its own attributes and does not define later ones."""
     frame = '<GeoPosition latitude="0.8" longitude="0.1" height="3"/>'
-    text = f"""<OpenSCENARIO>
-      <FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" description="x" author="y"/>
-      <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><GlobalAction><EntityAction entityRef="A">
-      <AddEntityAction><Position>{frame}</Position></AddEntityAction></EntityAction></GlobalAction></Actions></Init>
-      <StopTrigger/></Storyboard></OpenSCENARIO>"""
+    add = f"<AddEntityAction><Position>{frame}</Position></AddEntityAction>"
+    text = scenario_xml(minor=1, init=global_xml(f'<EntityAction entityRef="A">{add}</EntityAction>'))
     with pytest.raises(ScenarioError, match="entity 'A', which does not exist"):
-        load_scenario(text.encode())
+        load_scenario(text)
     with pytest.raises(ScenarioError, match="latitudeDeg"):
-        load_scenario(text.replace("latitude=", "latitudeDeg=").encode())
+        load_scenario(text.replace(b"latitude=", b"latitudeDeg="))

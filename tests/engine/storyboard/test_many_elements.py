@@ -7,6 +7,18 @@ from itertools import product
 from typing import Any
 
 import pytest
+from openscenario_xml import scenario_xml, variables_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    element_state_xml,
+    event_xml,
+    group_xml,
+    maneuver_xml,
+    time_xml,
+    trigger_xml,
+)
 
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
@@ -16,27 +28,33 @@ from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.storyboard.state.states import ElementState
 from eidrive_scenario.storyboard.tree.events import EventElement
 
-FILE = """<OpenSCENARIO>
-  <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="many" author="test"/>
-  <VariableDeclarations><VariableDeclaration name="Count" variableType="integer" value="0"/></VariableDeclarations>
-  <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions/></Init>
-  <Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
-  <Actors selectTriggeringEntities="false"/><Maneuver name="maneuver">{events}</Maneuver></ManeuverGroup></Act></Story>
-  </Storyboard></OpenSCENARIO>"""
-EVENT = """<Event name="event {number}" priority="{priority}"><Action name="action {number}"><GlobalAction>
-  <VariableAction variableRef="Count"><ModifyAction><Rule><AddValue value="1"/></Rule></ModifyAction></VariableAction>
-  </GlobalAction></Action><StartTrigger><ConditionGroup><Condition name="c" delay="0" conditionEdge="none">
-  <ByValueCondition>{condition}</ByValueCondition></Condition></ConditionGroup></StartTrigger></Event>"""
-AT = '<SimulationTimeCondition value="{time}" rule="greaterOrEqual"/>'
-BEHIND = """<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="{reference}"
-  state="completeState"/>"""
+ADD_ONE = """<GlobalAction><VariableAction variableRef="Count"><ModifyAction><Rule><AddValue value="1"/></Rule>
+  </ModifyAction></VariableAction></GlobalAction>"""
+
+
+def scenario_of(events: str) -> bytes:
+    """Return a scenario without entities with these events."""
+    return scenario_xml(
+        declarations=variables_xml(Count=("integer", "0")),
+        entities="",
+        story=acts_xml(act_xml(group_xml(maneuver_xml(events), ""))),
+    )
+
+
+def counting(number: int, condition: str, priority: str = "parallel") -> str:
+    """Return an event that adds 1 to the variable Count."""
+    return event_xml(f"event {number}", ADD_ONE, trigger_xml(condition_xml(condition)), priority=priority)
+
+
+def at_time(value: float) -> str:
+    return time_xml(value, "greaterOrEqual")
 
 
 def chain(length: int, order: Callable[[list[int]], Any], reference: str = "event {}") -> bytes:
     """Return events of which each starts by the end of the previous one, in a given order."""
-    conditions = [AT.format(time=0.5), *(BEHIND.format(reference=reference.format(n)) for n in range(length - 1))]
-    events = [EVENT.format(number=n, priority="parallel", condition=conditions[n]) for n in range(length)]
-    return FILE.format(events="".join(events[number] for number in order(list(range(length))))).encode()
+    ends = (element_state_xml("event", reference.format(n), "completeState") for n in range(length - 1))
+    events = [counting(number, condition) for number, condition in enumerate([at_time(0.5), *ends])]
+    return scenario_of("".join(events[number] for number in order(list(range(length)))))
 
 
 def zigzag(numbers: list[int]) -> list[int]:
@@ -62,10 +80,8 @@ def test_interval_analysis_of_chain_has_linear_cost(
 
 
 def test_overriding_event_reads_running_events_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    events = "".join(
-        EVENT.format(number=n, priority="override", condition=AT.format(time=0.01 * n)) for n in range(200)
-    )
-    scenario = load_scenario(FILE.format(events=events).encode())
+    events = "".join(counting(n, at_time(0.01 * n), "override") for n in range(200))
+    scenario = load_scenario(scenario_of(events))
     asked: list[EventElement] = []
 
     def counted(self: EventElement) -> ElementState | None:

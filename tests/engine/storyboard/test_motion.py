@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_xml
 
 from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion
@@ -80,12 +81,9 @@ def test_actor_stops_at_the_end_of_the_road(street: Any) -> None:
     assert motion.step(0.1).speed == 0.0
 
 
-def section(s: int, number: int, link: str = "") -> str:
-    side = "right" if number < 0 else "left"
-    lane = f'<lane id="{number}" type="driving"><link>{link}</link><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'
-    center = '<center><lane id="0" type="none"/></center>'
-    lanes = f"<left>{lane}</left>{center}" if side == "left" else f"{center}<right>{lane}</right>"
-    return f'<laneSection s="{s}">{lanes}</laneSection>'
+def section(s: float, number: int, link: str = "") -> str:
+    lane = lane_xml(number, 4, link=link)
+    return section_xml(right=lane, s=s) if number < 0 else section_xml(lane, s=s)
 
 
 @pytest.mark.parametrize(
@@ -94,17 +92,14 @@ def section(s: int, number: int, link: str = "") -> str:
         (section(0, -1) + section(100, 1), -1, 99.0, 30.0, 100.0),
         (section(0, -1) + section(100, 1), 1, 101.0, 30.0, 100.0),
         (section(0, 1) + section(100, -1), -1, 101.0, -30.0, 100.0),
-        (section(0, -2, '<successor id="-1"/>') + section(199, -1, '<predecessor id="-2"/>'), -2, 198.0, 30.0, 200.0),
+        (section(0, -2, lane_links_xml(after=-1)) + section(199, -1, lane_links_xml(-2)), -2, 198.0, 30.0, 200.0),
     ],
 )
 def test_step_beyond_the_end_of_a_lane_stops_there(
     sections: str, lane: int, start: float, speed: float, end: float
 ) -> None:
     """Lanes that end inside their road, and a lane with another id in the last section."""
-    text = f"""<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="200" id="1" junction="-1"><link/>
-      <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
-      <lanes>{sections}</lanes></road></OpenDRIVE>"""
-    motion = on_lane(RoadNetwork.parse(text), lane, start)
+    motion = on_lane(RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=sections))), lane, start)
     motion.set_speed(speed)
     assert motion.step(0.1).x == pytest.approx(end)
     assert motion.end_of_road

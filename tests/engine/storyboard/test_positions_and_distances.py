@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
@@ -19,26 +20,6 @@ from eidrive_scenario.storyboard.positions.distances import closing_speed, dista
 from eidrive_scenario.storyboard.positions.resolution import resolve_position
 from eidrive_scenario.storyboard.positions.road_positions import count_lanes
 from eidrive_scenario.world.view import WorldView
-
-JOINED = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-  <road name="" length="200" id="1" junction="-1"><link><successor elementType="road" elementId="2"
-    contactPoint="start"/></link>
-    <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
-    <lanes><laneSection s="0">{first}</laneSection><laneSection s="100">{second}</laneSection></lanes></road>
-  <road name="" length="200" id="2" junction="-1"><link><predecessor elementType="road" elementId="1"
-    contactPoint="end"/></link>
-    <planView><geometry s="0" x="200" y="0" hdg="0" length="200"><line/></geometry></planView>
-    <lanes><laneSection s="0">{third}</laneSection></lanes></road></OpenDRIVE>"""
-"""Two connected roads; the first one has two lane sections."""
-
-
-def right(*widths: float, link: str = "") -> str:
-    lanes = "".join(
-        f'<lane id="{-number}" type="driving"><link>{link.format(-number)}</link>'
-        f'<width sOffset="0" a="{width}" b="0" c="0" d="0"/></lane>'
-        for number, width in enumerate(widths, 1)
-    )
-    return f'<center><lane id="0" type="none"/></center><right>{lanes}</right>'
 
 
 @pytest.fixture
@@ -65,9 +46,12 @@ def test_relative_position_beyond_a_lane_section_without_the_lane_keeps_its_t(
     context: Any, frame: Any, y: float
 ) -> None:
     """Lanes of 4 m become one of 10 m before the road ends: A is in lane -2 at y = -6, the wide one is at -5."""
-    first, second = right(4.0, 4.0), right(10.0, link='<successor id="{}"/>')
-    text = JOINED.format(first=first, second=second, third=right(10.0, link='<predecessor id="{}"/>'))
-    roads = RoadNetwork.parse(text)
+    narrow = section_xml(right=lane_xml(-1, 4.0) + lane_xml(-2, 4.0))
+    wide = section_xml(right=lane_xml(-1, 10.0, link=lane_links_xml(after=-1)), s=100.0)
+    beyond = section_xml(right=lane_xml(-1, 10.0, link=lane_links_xml(-1)))
+    first = road_xml("1", length=200.0, link=successor_xml("2"), lanes=narrow + wide)
+    second = road_xml("2", length=200.0, x=200.0, link=predecessor_xml("1"), lanes=beyond)
+    roads = RoadNetwork.parse(map_xml(first, second))
     made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
     here = roads.location("1", -2, 80.0)
     made.add_actor("A", ResolvedPosition(roads.pose(here), here))

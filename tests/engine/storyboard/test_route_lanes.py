@@ -6,6 +6,16 @@ import math
 
 import numpy as np
 import pytest
+from opendrive_xml import (
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion
@@ -15,60 +25,38 @@ TURN = 20.0 * math.pi
 
 
 def lane(number: int, before: int | None = None, after: int | None = None) -> str:
-    links = [f'<{tag} id="{n}"/>' for tag, n in (("predecessor", before), ("successor", after)) if n is not None]
-    return (
-        f'<lane id="{number}" type="driving"><link>{"".join(links)}</link>'
-        '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'
-    )
-
-
-def road(
-    number: str,
-    length: float,
-    x: float,
-    y: float,
-    hdg: float,
-    lanes: str,
-    links: str,
-    junction: str = "-1",
-    bend: str = "",
-) -> str:
-    shape = f'<arc curvature="{bend}"/>' if bend else "<line/>"
-    return (
-        f'<road id="{number}" length="{length!r}" junction="{junction}"><link>{links}</link><planView>'
-        f'<geometry s="0" x="{x!r}" y="{y!r}" hdg="{hdg!r}" length="{length!r}">{shape}</geometry></planView>'
-        f'<lanes><laneSection s="0"><center><lane id="0"/></center><right>{lanes}</right></laneSection></lanes></road>'
-    )
-
-
-def link(tag: str, number: str) -> str:
-    if number == "J":
-        return f'<{tag} elementType="junction" elementId="J"/>'
-    return (
-        f'<{tag} elementType="road" elementId="{number}" contactPoint="{"end" if tag == "predecessor" else "start"}"/>'
-    )
+    return lane_xml(number, 4, link=lane_links_xml(before, after))
 
 
 @pytest.fixture
 def fork() -> RoadNetwork:
     """Road a, 200 m along x: lane -1 continues straight to b, lane -2 turns right to c."""
-    connections = "".join(
-        f'<connection id="{name}" incomingRoad="a" connectingRoad="{name}" contactPoint="start">'
-        f'<laneLink from="{number}" to="-1"/></connection>'
-        for name, number in (("on", -1), ("off", -2))
-    )
-    through = lane(-1, -1, -1)
+    through = section_xml(right=lane(-1, -1, -1))
     return RoadNetwork.parse(
-        "<OpenDRIVE>"
-        + road("a", 200.0, 0.0, 0.0, 0.0, lane(-1) + lane(-2), link("successor", "J"))
-        + road("on", 40.0, 200.0, 0.0, 0.0, through, link("predecessor", "a") + link("successor", "b"), "J")
-        + road(
-            *("off", TURN, 200.0, -4.0, 0.0, lane(-1, -2, -1), link("predecessor", "a") + link("successor", "c"), "J"),
-            bend="-0.025",
+        map_xml(
+            road_xml("a", length=200.0, link=successor_xml(junction="J"), lanes=section_xml(right=lane(-1) + lane(-2))),
+            road_xml(
+                "on",
+                length=40.0,
+                x=200.0,
+                link=predecessor_xml("a") + successor_xml("b"),
+                lanes=through,
+                junction="J",
+            ),
+            road_xml(
+                "off",
+                length=TURN,
+                x=200.0,
+                y=-4.0,
+                curvature=-0.025,
+                link=predecessor_xml("a") + successor_xml("c"),
+                lanes=section_xml(right=lane(-1, -2, -1)),
+                junction="J",
+            ),
+            road_xml("b", x=240.0, link=predecessor_xml(junction="J"), lanes=through),
+            road_xml("c", x=240.0, y=-44.0, hdg=-math.pi / 2, link=predecessor_xml(junction="J"), lanes=through),
+            rest=junction_xml("J", "a", {"on": -1, "off": -2}),
         )
-        + road("b", 100.0, 240.0, 0.0, 0.0, through, link("predecessor", "J"))
-        + road("c", 100.0, 240.0, -44.0, -math.pi / 2, through, link("predecessor", "J"))
-        + f'<junction id="J" name="">{connections}</junction></OpenDRIVE>'
     )
 
 

@@ -5,20 +5,16 @@ from __future__ import annotations
 import math
 
 import pytest
+from opendrive_xml import map_xml, road_xml
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.state.signals import Signals
 
-ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-  <road name="" length="100" id="1" junction="-1"><link/>
-    <planView><geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView>
-    <lanes><laneSection s="0"><center><lane id="0" type="none"/></center>
-      <right><lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
-    </laneSection></lanes>
-    <signals><signal s="50" t="-5" id="7" name="" dynamic="yes" orientation="+" type="1000001" subtype="-1"/>
-      <signal s="60" t="-5" id="8" name="" dynamic="yes" orientation="+" type="1000002" subtype="-1"/></signals></road>
-  <controller id="c1" name="crossing"><control signalId="7"/><control signalId="8"/></controller></OpenDRIVE>"""
+SIGNALS = """<signals><signal s="50" t="-5" id="7" name="" dynamic="yes" orientation="+" type="1000001" subtype="-1"/>
+  <signal s="60" t="-5" id="8" name="" dynamic="yes" orientation="+" type="1000002" subtype="-1"/></signals>"""
+CONTROLLER = '<controller id="c1" name="crossing"><control signalId="7"/><control signalId="8"/></controller>'
+ROAD = map_xml(road_xml(extra=SIGNALS), rest=CONTROLLER)
 
 
 def phase(name: str, duration: float, group: str | None = None, **states: str) -> model.Phase:

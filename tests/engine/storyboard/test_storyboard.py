@@ -8,22 +8,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+from storyboard_xml import (
+    condition_xml,
+    element_state_xml,
+    event_xml,
+    groups_xml,
+    speed_xml,
+    teleport_xml,
+    time_xml,
+    trigger_xml,
+    world_position_xml,
+)
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.registry import Registry
 from eidrive_scenario.storyboard.state.states import ElementTransition
 
-TELEPORT = """<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"""
-AT = '<WorldPosition x="{x}" y="0"/>'
-SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
-  <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{value}"/>
-  <SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget>
-  </SpeedAction></LongitudinalAction></PrivateAction>"""
-EVENT = '<Event name="{name}" priority="override"><Action name="{name} action">{action}</Action>{trigger}</Event>'
-AFTER = """<{kind}Trigger><ConditionGroup><Condition name="later" delay="0" conditionEdge="{edge}"><ByValueCondition>
-  <SimulationTimeCondition value="{value}" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup>
-  </{kind}Trigger>"""
-STARTS = TELEPORT.format(position=AT.format(x=5)) + SPEED.format(shape="step", value=0, speed=10)
+STARTS = teleport_xml(world_position_xml(5)) + speed_xml(10)
+
+
+def later(value: float, edge: str = "none") -> str:
+    """Return a start trigger by the simulation time."""
+    return trigger_xml(condition_xml(time_xml(value), edge))
 
 
 def view_of(placements: Any, tick: Any, like: Any) -> Any:
@@ -71,13 +77,13 @@ def test_init_is_executed_before_the_first_view(build: Any) -> None:
 
 
 def test_relative_positions_in_init_are_independent_of_order(build: Any) -> None:
-    beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
-    storyboard = build(beside + '</Private><Private entityRef="B">' + TELEPORT.format(position=AT.format(x=30)))
+    beside = teleport_xml('<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
+    storyboard = build(beside + '</Private><Private entityRef="B">' + teleport_xml(world_position_xml(30)))
     assert storyboard.initial().spawns["A"].x == 32.0
 
 
 def test_position_relative_to_unplaced_entity_in_init_is_rejected(build: Any) -> None:
-    beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
+    beside = teleport_xml('<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
     with pytest.raises(ScenarioError, match="entity without a position"):
         build(beside).initial()
 
@@ -85,14 +91,14 @@ def test_position_relative_to_unplaced_entity_in_init_is_rejected(build: Any) ->
 @pytest.mark.element("SimulationTimeCondition")
 def test_speed_step_moves_the_actor_in_its_step(build: Any) -> None:
     """Speed 10 m/s from x = 5; the event at 0.2 s (the first time above 0.15 s) sets 20 m/s."""
-    trigger = AFTER.format(kind="Start", edge="rising", value=0.15)
-    event = EVENT.format(name="go", action=SPEED.format(shape="step", value=0, speed=20), trigger=trigger)
+    trigger = later(0.15, "rising")
+    event = event_xml("go", speed_xml(20), trigger)
     answers = play(build(STARTS, event), 4)
     assert [round(a.placements["A"].x, 6) for a in answers] == [6.0, 7.0, 9.0, 11.0]
 
 
 def test_linear_speed_change_ends_with_its_last_step(build: Any) -> None:
-    event = EVENT.format(name="go", action=SPEED.format(shape="linear", value=0.3, speed=13), trigger="")
+    event = event_xml("go", speed_xml(13, 0.3))
     storyboard = build(STARTS, event)
     answers = play(storyboard, 4)
     assert [a.placements["A"].speed for a in answers] == pytest.approx([11.0, 12.0, 13.0, 13.0])
@@ -102,7 +108,7 @@ def test_linear_speed_change_ends_with_its_last_step(build: Any) -> None:
 
 @pytest.mark.element("SimulationTimeCondition", "Storyboard StopTrigger")
 def test_stop_trigger_ends_the_run(build: Any) -> None:
-    storyboard = build(STARTS, stop=AFTER.format(kind="Stop", edge="none", value=0.25))
+    storyboard = build(STARTS, stop=groups_xml(condition_xml(time_xml(0.25))))
     ended = []
     play(storyboard, 3)
     ended.append(storyboard.ended)
@@ -113,11 +119,8 @@ def test_stop_trigger_ends_the_run(build: Any) -> None:
 
 
 def test_criteria_in_the_stop_trigger_do_not_stop_the_run(build: Any) -> None:
-    stop = """<StopTrigger><ConditionGroup>
-      <Condition name="criteria_CollisionTest" delay="0" conditionEdge="none"><ByValueCondition>
-        <ParameterCondition parameterRef="" value="" rule="lessThan"/></ByValueCondition></Condition>
-      </ConditionGroup></StopTrigger>"""
-    storyboard = build(STARTS, stop=stop)
+    stop = condition_xml(time_xml(-1), name="criteria_CollisionTest")
+    storyboard = build(STARTS, stop=groups_xml(stop))
     play(storyboard, 2)
     assert storyboard.ended is None
 
@@ -131,10 +134,10 @@ def test_storyboard_without_stop_trigger_and_stories_continues(build: Any) -> No
 @pytest.mark.element("AddEntityAction", "DeleteEntityAction")
 def test_entities_are_added_and_deleted_by_triggers(build: Any) -> None:
     entity = '<GlobalAction><EntityAction entityRef="B">{}</EntityAction></GlobalAction>'
-    come = entity.format(f"<AddEntityAction><Position>{AT.format(x=50)}</Position></AddEntityAction>")
+    come = entity.format(f"<AddEntityAction><Position>{world_position_xml(50)}</Position></AddEntityAction>")
     go = entity.format("<DeleteEntityAction/>")
-    events = EVENT.format(name="come", action=come, trigger=AFTER.format(kind="Start", edge="none", value=0.05))
-    events += EVENT.format(name="go", action=go, trigger=AFTER.format(kind="Start", edge="none", value=0.25))
+    events = event_xml("come", come, later(0.05))
+    events += event_xml("go", go, later(0.25))
     first, second, third, fourth = play(build(STARTS, events), 4)
     assert "B" not in first.spawns
     assert second.spawns["B"].x == 50.0
@@ -149,7 +152,7 @@ def test_unsupported_actions_are_reported_together_with_lines(build: Any) -> Non
     with pytest.raises(ScenarioError) as caught:
         build(
             STARTS,
-            EVENT.format(name="odd", action=swarm, trigger=""),
+            event_xml("odd", swarm),
             global_actions=swarm,
             registered=Registry("actions", all_but_one),
         )
@@ -159,17 +162,10 @@ def test_unsupported_actions_are_reported_together_with_lines(build: Any) -> Non
 
 
 def test_reference_to_unknown_element_suggests_the_nearest_name(build: Any) -> None:
-    trigger = """<StartTrigger><ConditionGroup><Condition name="state" delay="0" conditionEdge="none"><ByValueCondition>
-      <StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="goo" state="endTransition"/>
-      </ByValueCondition></Condition></ConditionGroup></StartTrigger>"""
-    action = SPEED.format(shape="step", value=0, speed=20)
+    trigger = trigger_xml(condition_xml(element_state_xml("event", "goo", "endTransition")))
+    action = speed_xml(20)
     with pytest.raises(ScenarioError, match="did you mean 'go'"):
-        build(STARTS, EVENT.format(name="go", action=action, trigger=trigger))
-
-
-WATCH = """<StartTrigger><ConditionGroup><Condition name="watch" delay="0" conditionEdge="none"><ByValueCondition>
-  <StoryboardElementStateCondition storyboardElementType="{kind}" storyboardElementRef="{name}" state="{state}"/>
-  </ByValueCondition></Condition></ConditionGroup></StartTrigger>"""
+        build(STARTS, event_xml("go", action, trigger))
 
 
 @pytest.mark.element("StoryboardElementStateCondition")
@@ -186,18 +182,19 @@ WATCH = """<StartTrigger><ConditionGroup><Condition name="watch" delay="0" condi
 )
 def test_transitions_are_observed_in_their_step(build: Any, kind: Any, name: Any, state: Any, when: Any) -> None:
     """The action of the first event takes from 0 s to 0.3 s and ends with its third step."""
-    events = EVENT.format(name="first", action=SPEED.format(shape="linear", value=0.3, speed=12), trigger="")
-    watch = WATCH.format(kind=kind, name=f"{name} action" if kind == "action" else name, state=state)
-    events += EVENT.format(name="second", action=SPEED.format(shape="step", value=0, speed=5), trigger=watch)
+    events = event_xml("first", speed_xml(12, 0.3))
+    observed = element_state_xml(kind, f"{name} action" if kind == "action" else name, state)
+    watch = trigger_xml(condition_xml(observed))
+    events += event_xml("second", speed_xml(5), watch)
     storyboard = build(STARTS, events)
     assert starts(storyboard, "second") == pytest.approx([when])
 
 
 def test_transition_is_observed_once(build: Any) -> None:
-    events = EVENT.format(name="first", action=SPEED.format(shape="step", value=0, speed=20), trigger="")
-    watch = WATCH.format(kind="event", name="first", state="endTransition")
-    second = EVENT.format(name="second", action=SPEED.format(shape="step", value=0, speed=5), trigger=watch)
-    storyboard = build(STARTS, events + second.replace("<Event ", '<Event maximumExecutionCount="3" ', 1))
+    events = event_xml("first", speed_xml(20))
+    watch = trigger_xml(condition_xml(element_state_xml("event", "first", "endTransition")))
+    second = event_xml("second", speed_xml(5), watch)
+    storyboard = build(STARTS, events + second)
     assert len(starts(storyboard, "second")) == 1
 
 

@@ -6,42 +6,44 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from openscenario_xml import variables_xml
+from storyboard_xml import (
+    condition_xml,
+    element_state_xml,
+    event_xml,
+    groups_xml,
+    speed_xml,
+    teleport_xml,
+    time_xml,
+    trigger_xml,
+    world_position_xml,
+)
 
 from eidrive_scenario.storyboard.state.states import ElementTransition
 from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator
 
-PLACE = """<PrivateAction><TeleportAction><Position><WorldPosition x="5" y="0"/></Position></TeleportAction>
-  </PrivateAction>"""
-RAMP = """<PrivateAction><LongitudinalAction><SpeedAction>
-  <SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="{time}"/>
-  <SpeedActionTarget><AbsoluteTargetSpeed value="1"/></SpeedActionTarget>
-  </SpeedAction></LongitudinalAction></PrivateAction>"""
+PLACE = teleport_xml(world_position_xml(5))
 NOTE = """<UserDefinedAction><CustomCommandAction type="note">{text}</CustomCommandAction></UserDefinedAction>"""
 SET = """<GlobalAction><VariableAction variableRef="x"><SetAction value="{value}"/></VariableAction></GlobalAction>"""
-EVENT = """<Event name="{name}" priority="parallel" maximumExecutionCount="{limit}">
-  <Action name="{name} action">{action}</Action>{trigger}</Event>"""
-STATE = (
-    """<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="{of}" state="{state}"/>"""
-)
-TIME = '<SimulationTimeCondition value="{value}" rule="greaterThan"/>'
-VARIABLE = '<VariableCondition variableRef="x" value="{value}" rule="equalTo"/>'
-CONDITION = """<Condition name="c" delay="{delay}" conditionEdge="{edge}">
-  <ByValueCondition>{what}</ByValueCondition></Condition>"""
+VARIABLE = '<ByValueCondition><VariableCondition variableRef="x" value="{value}" rule="equalTo"/></ByValueCondition>'
 
 
-def when(*whats: str, kind: str = "Start", edge: str = "none", delay: float = 0.0) -> str:
-    """Return a trigger of one group."""
-    conditions = "".join(CONDITION.format(what=what, edge=edge, delay=delay) for what in whats)
-    return f"<{kind}Trigger><ConditionGroup>{conditions}</ConditionGroup></{kind}Trigger>"
+def group(*whats: str, edge: str = "none", delay: float = 0.0) -> str:
+    return "".join(condition_xml(what, edge, delay) for what in whats)
+
+
+def when(*whats: str, edge: str = "none", delay: float = 0.0) -> str:
+    """Return a start trigger of one group."""
+    return trigger_xml(group(*whats, edge=edge, delay=delay))
 
 
 def event(name: str, trigger: str = "", action: str | None = None, limit: int = 1) -> str:
     """Return an event; by default its action takes no time."""
-    return EVENT.format(name=name, action=action or NOTE.format(text=name), trigger=trigger, limit=limit)
+    return event_xml(name, action or NOTE.format(text=name), trigger, count=limit)
 
 
 def ended(of: str, state: str = "endTransition") -> str:
-    return STATE.format(of=of, state=state)
+    return element_state_xml("event", of, state)
 
 
 def course(storyboard: Any, ticks: int) -> list[list[str]]:
@@ -63,7 +65,7 @@ def test_chain_transitions_in_one_step_in_any_order(build: Any, state: str, edge
     events = event("third", when(ended("second", state), edge=edge)) + event(
         "second", when(ended("first", state), edge=edge)
     )
-    ticks = course(build(PLACE, events + event("first", when(TIME.format(value=0.05)))), 3)
+    ticks = course(build(PLACE, events + event("first", when(time_xml(0.05)))), 3)
     assert ticks[0] == ["storyboard starts"]
     assert ticks[1][:6] == [f"{name} {word}" for name in ("first", "second", "third") for word in ("starts", "ends")]
     assert ticks[2] == []
@@ -71,36 +73,35 @@ def test_chain_transitions_in_one_step_in_any_order(build: Any, state: str, edge
 
 @pytest.mark.element("StoryboardElementStateCondition")
 def test_next_action_starts_when_the_goal_is_reached(build: Any) -> None:
-    events = event("slow", action=RAMP.format(time=0.3)) + event("next", when(ended("slow")))
+    events = event("slow", action=speed_xml(1, 0.3)) + event("next", when(ended("slow")))
     ticks = course(build(PLACE, events), 4)
     assert ticks[:3] == [["storyboard starts", "slow starts"], [], []]
     assert ticks[3] == ["slow ends", "next starts", "next ends", "storyboard ends"]
 
 
 def test_cyclic_triggers_start_once_per_step(build: Any) -> None:
-    kick = CONDITION.format(what=TIME.format(value=0.05), edge="rising", delay=0)
-    either = when(ended("b")).replace("</Start", f"<ConditionGroup>{kick}</ConditionGroup></Start")
+    either = trigger_xml(group(ended("b")), group(time_xml(0.05), edge="rising"))
     ticks = course(build(PLACE, event("a", either, limit=4) + event("b", when(ended("a")), limit=4)), 6)
     assert ticks[1] == ["a starts", "a ends", "b starts", "b ends"]
     assert [sum("starts" in entry for entry in tick) for tick in ticks[1:]] == [2, 2, 2, 2, 0]
 
 
 def test_edge_coincides_with_condition_of_the_same_instant(build: Any) -> None:
-    both = when(TIME.format(value=0.05), ended("first"), edge="rising")
-    ticks = course(build(PLACE, event("both", both) + event("first", when(TIME.format(value=0.05), edge="rising"))), 3)
+    both = when(time_xml(0.05), ended("first"), edge="rising")
+    ticks = course(build(PLACE, event("both", both) + event("first", when(time_xml(0.05), edge="rising"))), 3)
     assert ticks[1][:4] == ["first starts", "first ends", "both starts", "both ends"]
 
 
 @pytest.mark.element("Storyboard StopTrigger")
 def test_stop_trigger_observes_end_in_its_step(build: Any) -> None:
-    events = event("slow", action=RAMP.format(time=0.2)) + event("other", when(TIME.format(value=9)))
-    storyboard = build(PLACE, events, stop=when(ended("slow"), kind="Stop"))
+    events = event("slow", action=speed_xml(1, 0.2)) + event("other", when(time_xml(9)))
+    storyboard = build(PLACE, events, stop=groups_xml(group(ended("slow"))))
     assert course(storyboard, 3)[2] == ["slow ends", "other stops", "storyboard stops"]
     assert storyboard.ended == "stop trigger"
 
 
 def test_delay_counts_from_the_step_of_the_end(build: Any) -> None:
-    events = event("slow", action=RAMP.format(time=0.2)) + event("late", when(ended("slow"), edge="rising", delay=0.3))
+    events = event("slow", action=speed_xml(1, 0.2)) + event("late", when(ended("slow"), edge="rising", delay=0.3))
     ticks = course(build(PLACE, events), 6)
     assert ticks[2] == ["slow ends"]
     assert ticks[5][0] == "late starts"
@@ -109,12 +110,9 @@ def test_delay_counts_from_the_step_of_the_end(build: Any) -> None:
 @pytest.mark.element("VariableSetAction")
 def test_value_is_observed_in_its_step_by_earlier_triggers(build: Any) -> None:
     events = event("reader", when(VARIABLE.format(value="7"), edge="rising")) + event(
-        "writer", when(TIME.format(value=0.15)), action=SET.format(value="7")
+        "writer", when(time_xml(0.15)), action=SET.format(value="7")
     )
-    declared = (
-        '<VariableDeclarations><VariableDeclaration name="x" variableType="int" value="0"/></VariableDeclarations>'
-    )
-    ticks = course(build(PLACE, events, declared=declared), 3)
+    ticks = course(build(PLACE, events, declared=variables_xml(x=("int", "0"))), 3)
     assert ticks[1] == []
     assert ticks[2][:4] == ["writer starts", "writer ends", "reader starts", "reader ends"]
 

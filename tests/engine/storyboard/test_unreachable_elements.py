@@ -8,6 +8,20 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    element_state_xml,
+    event_xml,
+    group_xml,
+    maneuver_xml,
+    speed_xml,
+    teleport_xml,
+    time_xml,
+    trigger_xml,
+    world_position_xml,
+)
 
 from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
@@ -15,15 +29,7 @@ from eidrive_scenario.storyboard.state.states import ElementTransition
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 TICKS = 60
-PLACE = """<PrivateAction><TeleportAction><Position><WorldPosition x="0" y="0"/></Position></TeleportAction>
-</PrivateAction>"""
-ACTION = """<Action name="{}"><PrivateAction><LongitudinalAction><SpeedAction>
-<SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="{}"/>
-<SpeedActionTarget><AbsoluteTargetSpeed value="{}"/></SpeedActionTarget>
-</SpeedAction></LongitudinalAction></PrivateAction></Action>"""
-ACT = """<Act name="{name}"><ManeuverGroup name="{name} group" maximumExecutionCount="{count}">
-<Actors selectTriggeringEntities="false"><EntityRef entityRef="A"/></Actors>
-<Maneuver name="{name} maneuver">{events}</Maneuver></ManeuverGroup>{start}{stop}</Act>"""
+PLACE = teleport_xml(world_position_xml(0))
 RULES = ("greaterThan", "greaterOrEqual", "lessThan", "lessOrEqual", "equalTo", "notEqualTo")
 EDGES = ("none", "rising", "falling", "risingOrFalling")
 STATES = (
@@ -46,55 +52,38 @@ class Storyteller:
         ]
 
     def story(self) -> str:
-        acts = "".join(self.act(name) for name in ("one", "two"))
-        return f'<Story name="story">{acts}</Story>'
+        return acts_xml(*(self.act(name) for name in ("one", "two")))
 
     def act(self, name: str) -> str:
         events = "".join(self.event(f"{name} {number}") for number in range(3))
-        return ACT.format(
-            name=name,
-            count=self.chance.choice([1, 1, 2]),
-            events=events,
-            start=self.trigger("StartTrigger", 0.6),
-            stop=self.trigger("StopTrigger", 0.3),
-        )
+        maneuver = maneuver_xml(events, f"{name} maneuver")
+        group = group_xml(maneuver, "A", name=f"{name} group", count=self.chance.choice([1, 1, 2]))
+        return act_xml(group, self.trigger("StartTrigger", 0.6) + self.trigger("StopTrigger", 0.3), name)
 
     def event(self, name: str) -> str:
-        chance = self.chance
-        action = ACTION.format(f"{name} action", chance.choice([0, 0.3, 1]), chance.choice([5, 10]))
-        priority = chance.choice(["override", "parallel", "skip"])
+        seconds, speed = self.chance.choice([0, 0.3, 1]), self.chance.choice([5, 10])
+        priority = self.chance.choice(["override", "parallel", "skip"])
         start = self.trigger("StartTrigger", 0.85)
-        return (
-            f'<Event name="{name}" priority="{priority}" maximumExecutionCount="{chance.choice([1, 1, 2])}">'
-            f"{action}{start}</Event>"
-        )
+        action = speed_xml(speed, seconds, shape="linear")
+        return event_xml(name, action, start, priority=priority, count=self.chance.choice([1, 1, 2]))
 
     def trigger(self, kind: str, likely: float) -> str:
         if self.chance.random() > likely:
             return ""
-        groups = "".join(self.group() for _ in range(self.chance.choice([1, 1, 2])))
-        return f"<{kind}>{groups}</{kind}>"
+        return trigger_xml(*(self.group() for _ in range(self.chance.choice([1, 1, 2]))), kind=kind)
 
     def group(self) -> str:
-        conditions = "".join(self.condition() for _ in range(self.chance.choice([1, 1, 2])))
-        return f"<ConditionGroup>{conditions}</ConditionGroup>"
+        return "".join(self.condition() for _ in range(self.chance.choice([1, 1, 2])))
 
     def condition(self) -> str:
         chance = self.chance
         if chance.random() < 0.5:
             value = chance.choice([-1, 0, 0.5, 1, 2])
-            inside = f'<SimulationTimeCondition rule="{chance.choice(RULES)}" value="{value}"/>'
+            inside = time_xml(value, chance.choice(RULES))
         else:
             kind, names = chance.choice(self.names)
-            inside = (
-                f'<StoryboardElementStateCondition storyboardElementType="{kind}" '
-                f'storyboardElementRef="{chance.choice(names)}" state="{chance.choice(STATES)}"/>'
-            )
-        edge, delay = chance.choice(EDGES), chance.choice([0, 0, 0.3])
-        return (
-            f'<Condition name="c" delay="{delay}" conditionEdge="{edge}"><ByValueCondition>{inside}</ByValueCondition>'
-            "</Condition>"
-        )
+            inside = element_state_xml(kind, chance.choice(names), chance.choice(STATES))
+        return condition_xml(inside, chance.choice(EDGES), chance.choice([0, 0, 0.3]))
 
 
 def starts(storyboard: Storyboard) -> dict[tuple[str, ...], float]:
@@ -113,7 +102,7 @@ def starts(storyboard: Storyboard) -> dict[tuple[str, ...], float]:
 def test_elements_start_not_before_their_earliest_time(build: Callable[..., Storyboard], seed: int) -> None:
     unreachable = reached = 0
     for number in range(30):
-        storyboard = build(PLACE, stop=f"{Storyteller(1000 * seed + number).story()}<StopTrigger/>")
+        storyboard = build(PLACE, story=Storyteller(1000 * seed + number).story())
         outline = Outline(storyboard.scenario)
         earliest = ReachabilityAnalysis(outline).start
         happened = starts(storyboard)

@@ -1,69 +1,25 @@
 """Tests of cars that follow lanes and leaders."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from fleet_scene import LENGTH, WIDTH, car, view_of
+from opendrive_xml import lane_links_xml, lane_xml, ring_xml, section_xml
 
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, IntelligentDriver
-from eidrive_scenario.world.actor import ActorSpec, Placement
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.actor import Placement
 
-LENGTH, WIDTH, REAR_AXLE = 4.6, 1.9, 1.4
 DT = 0.05
 RADIUS = 100.0
-
-
-def spec(name: str) -> ActorSpec:
-    return ActorSpec(name, "car", "car", (LENGTH, WIDTH, 1.5), (REAR_AXLE, 0.0, 0.75), wheelbase=2.8)
-
-
-def view(placements: dict[str, Placement], time: float = 0.0) -> WorldView:
-    rows = list(placements.values())
-    count = len(rows)
-    yaw, speed = np.array([p.yaw for p in rows]), np.array([p.speed for p in rows])
-    return WorldView(
-        time=time,
-        tick=0,
-        names=tuple(placements),
-        categories=("car",) * count,
-        position=np.array([(p.x, p.y, p.z) for p in rows]).reshape(count, 3),
-        yaw=yaw,
-        pitch=np.zeros(count),
-        roll=np.zeros(count),
-        velocity=np.stack([speed * np.cos(yaw), speed * np.sin(yaw), 0.0 * yaw], axis=1),
-        acceleration=np.zeros((count, 3)),
-        yaw_rate=np.zeros(count),
-        speed=speed,
-        size=np.tile((LENGTH, WIDTH, 1.5), (count, 1)),
-        offset=np.tile((REAR_AXLE, 0.0, 0.75), (count, 1)),
-    )
 
 
 @pytest.fixture(scope="module")
 def loop() -> RoadNetwork:
     """Circle of radius 100 m in two roads; lane -1 runs counter-clockwise at 102 m from the center."""
-    length = math.pi * RADIUS
-    roads = []
-    for number, other, x, h in (("a", "b", RADIUS, math.pi / 2), ("b", "a", -RADIUS, -math.pi / 2)):
-        roads.append(
-            f'<road id="{number}" length="{length!r}" junction="-1"><link>'
-            f'<predecessor elementType="road" elementId="{other}" contactPoint="end"/>'
-            f'<successor elementType="road" elementId="{other}" contactPoint="start"/></link><planView>'
-            f'<geometry s="0" x="{x}" y="0" hdg="{h!r}" length="{length!r}"><arc curvature="{1 / RADIUS}"/></geometry>'
-            '</planView><lanes><laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">'
-            '<link><predecessor id="-1"/><successor id="-1"/></link>'
-            '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>'
-        )
-    return RoadNetwork.parse(f"<OpenDRIVE>{''.join(roads)}</OpenDRIVE>")
-
-
-@pytest.fixture(scope="module")
-def crossing() -> RoadNetwork:
-    return RoadNetwork.load(Path(__file__).parents[3] / "xosc" / "roads" / "coop_2.xodr")
+    return RoadNetwork.parse(ring_xml(RADIUS, section_xml(right=lane_xml(-1, 4, link=lane_links_xml(-1, -1)))))
 
 
 def gaps(placements: dict[str, Placement]) -> list[float]:
@@ -81,7 +37,7 @@ def test_ring_of_cars_converges_to_equilibrium_gap(loop: RoadNetwork) -> None:
     for k in range(count):
         place = (k + 0.3 * rng.uniform(-1, 1)) * 2 * math.pi * RADIUS / count % (2 * math.pi * RADIUS)
         road, s = ("a", place) if place < math.pi * RADIUS else ("b", place - math.pi * RADIUS)
-        fleet.add(spec(f"car{k}"), loop.location(road, -1, s), speed=float(rng.uniform(0, 6)), desired_speed=15.0)
+        fleet.add(car(f"car{k}"), loop.location(road, -1, s), speed=float(rng.uniform(0, 6)), desired_speed=15.0)
     smallest = math.inf
     for _ in range(8000):
         smallest = min(smallest, *gaps(fleet.step(None, DT)))
@@ -98,7 +54,7 @@ def test_shorter_time_steps_give_the_same_positions(loop: RoadNetwork) -> None:
     for dt in (0.05, 0.01):
         fleet = Fleet(loop)
         for k, speed in enumerate((3.0, 12.0, 8.0)):
-            fleet.add(spec(f"car{k}"), loop.location("a", -1, 20.0 + 25.0 * k), speed=speed, desired_speed=13.0)
+            fleet.add(car(f"car{k}"), loop.location("a", -1, 20.0 + 25.0 * k), speed=speed, desired_speed=13.0)
         path = [fleet.step(None, dt) for _ in range(round(20.0 / dt))]
         places[dt] = path[round(0.05 / dt) - 1 :: round(0.05 / dt)]
     for coarse, fine in zip(places[0.05], places[0.01], strict=True):
@@ -109,9 +65,9 @@ def test_shorter_time_steps_give_the_same_positions(loop: RoadNetwork) -> None:
 def test_car_added_between_decisions_reacts_in_the_next_step(loop: RoadNetwork) -> None:
     """A car is added 8 m ahead of a car that drives 10 m/s. The follower brakes in the next step."""
     fleet = Fleet(loop)
-    fleet.add(spec("first"), loop.location("a", -1, 20.0), speed=10.0, desired_speed=13.0)
+    fleet.add(car("first"), loop.location("a", -1, 20.0), speed=10.0, desired_speed=13.0)
     fleet.step(None, 0.01)
-    fleet.add(spec("second"), loop.location("a", -1, 20.0 + LENGTH + 8.0), speed=0.0)
+    fleet.add(car("second"), loop.location("a", -1, 20.0 + LENGTH + 8.0), speed=0.0)
     before = fleet.speeds["first"]
     fleet.step(None, 0.01)
     assert fleet.speeds["first"] < before - 0.05
@@ -120,34 +76,34 @@ def test_car_added_between_decisions_reacts_in_the_next_step(loop: RoadNetwork) 
 def test_string_of_cars_stops_for_obstacle_and_restarts_after_its_removal(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     for k in range(5):
-        fleet.add(spec(f"car{k}"), loop.location("a", -1, 100.0 - 20.0 * k), speed=10.0, desired_speed=13.0)
+        fleet.add(car(f"car{k}"), loop.location("a", -1, 100.0 - 20.0 * k), speed=10.0, desired_speed=13.0)
     pose = loop.lane_pose_at("a", -1, 250.0)
     wall = {"wall": Placement(pose.x, pose.y, yaw=pose.h)}
     closest = math.inf
     for _ in range(1200):
-        placements = fleet.step(view(wall), DT)
+        placements = fleet.step(view_of(wall), DT)
         closest = min(closest, *gaps(placements | wall))
     queue = sorted(gaps(placements | wall))[:5]
     assert closest > 1.5
     assert all(speed < 0.05 for speed in fleet.speeds.values())
     assert queue == pytest.approx([2.0] * 5, abs=0.5)
     for _ in range(400):
-        fleet.step(view({}), DT)
+        fleet.step(view_of({}), DT)
     assert min(fleet.speeds.values()) > 5.0
 
 
 def test_car_beside_the_lane_is_ignored(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
-    fleet.add(spec("car"), loop.location("a", -1, 50.0), speed=10.0, desired_speed=10.0)
+    fleet.add(car("car"), loop.location("a", -1, 50.0), speed=10.0, desired_speed=10.0)
     pose = loop.lane_pose_at("a", -1, 90.0, -4.0)
     for _ in range(100):
-        fleet.step(view({"parked": Placement(pose.x, pose.y, yaw=pose.h)}), DT)
+        fleet.step(view_of({"parked": Placement(pose.x, pose.y, yaw=pose.h)}), DT)
     assert fleet.speeds["car"] > 9.9
 
 
 def test_step_length_equals_speed_times_dt(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
-    before = fleet.add(spec("car"), loop.location("a", -1, 300.0), speed=12.0, desired_speed=12.0)
+    before = fleet.add(car("car"), loop.location("a", -1, 300.0), speed=12.0, desired_speed=12.0)
     assert before.teleport
     for _ in range(100):
         (after,) = fleet.step(None, DT).values()
@@ -156,10 +112,10 @@ def test_step_length_equals_speed_times_dt(loop: RoadNetwork) -> None:
         before = after
 
 
-def test_cars_slow_down_ahead_of_a_bend(crossing: RoadNetwork) -> None:
-    fleet = Fleet(crossing, seed=1, driver=IntelligentDriver(lateral_acceleration=2.0))
+def test_cars_slow_down_ahead_of_a_bend(library_roads: RoadNetwork) -> None:
+    fleet = Fleet(library_roads, seed=1, driver=IntelligentDriver(lateral_acceleration=2.0))
     for k in range(6):
-        fleet.add(spec(f"car{k}"), crossing.location("3", 1, 80.0 - 14.0 * k), desired_speed=13.0)
+        fleet.add(car(f"car{k}"), library_roads.location("3", 1, 80.0 - 14.0 * k), desired_speed=13.0)
     turned = False
     heading: dict[str, float] = {}
     for _ in range(1200):
@@ -172,28 +128,28 @@ def test_cars_slow_down_ahead_of_a_bend(crossing: RoadNetwork) -> None:
     assert turned
 
 
-def crossing_fleet(crossing: RoadNetwork, seed: int) -> Fleet:
-    fleet = Fleet(crossing, seed=seed)
+def crossing_fleet(library_roads: RoadNetwork, seed: int) -> Fleet:
+    fleet = Fleet(library_roads, seed=seed)
     lanes = [(road, n) for road, lanes in {"1": (-1, -2), "2": (2, 3), "3": (1,), "4": (-1,)}.items() for n in lanes]
     for road, n in lanes:
         for k in range(4):
-            length = crossing.roads[road].length
+            length = library_roads.roads[road].length
             s = length - 12.0 - 16.0 * k if n < 0 else 12.0 + 16.0 * k
             if road in ("1", "4"):
                 s = length - 12.0 - 16.0 * k
-            fleet.add(spec(f"{road}/{n}/{k}"), crossing.location(road, n, s), speed=5.0)
+            fleet.add(car(f"{road}/{n}/{k}"), library_roads.location(road, n, s), speed=5.0)
     return fleet
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_cars_pass_a_crossing_without_contact(crossing: RoadNetwork, seed: int) -> None:
-    fleet = crossing_fleet(crossing, seed)
+def test_cars_pass_a_crossing_without_contact(library_roads: RoadNetwork, seed: int) -> None:
+    fleet = crossing_fleet(library_roads, seed)
     gone: set[str] = set()
     for tick in range(4000):
         placements = fleet.step(None, DT)
         gone |= fleet.departed
         if tick % 5 == 0 and len(placements) > 1:
-            boxes = view(placements).boxes
+            boxes = view_of(placements).boxes
             near = np.hypot(*(boxes[:, None, :2] - boxes[None, :, :2]).transpose(2, 0, 1)) < LENGTH + WIDTH
             for i, j in zip(*np.nonzero(np.triu(near, 1)), strict=True):
                 assert not overlap(boxes[i], boxes[j]), (list(placements)[i], list(placements)[j])
@@ -202,21 +158,21 @@ def test_cars_pass_a_crossing_without_contact(crossing: RoadNetwork, seed: int) 
     assert len(gone) == 24
 
 
-def test_cars_wait_for_foreign_car_in_crossing(crossing: RoadNetwork) -> None:
-    fleet = Fleet(crossing)
-    fleet.add(spec("car"), crossing.location("3", 1, 8.0), speed=8.0)
-    route = crossing.route(crossing.location("1", -1, 90.0), crossing.location("2", -1, 40.0))
+def test_cars_wait_for_foreign_car_in_crossing(library_roads: RoadNetwork) -> None:
+    fleet = Fleet(library_roads)
+    fleet.add(car("car"), library_roads.location("3", 1, 8.0), speed=8.0)
+    route = library_roads.route(library_roads.location("1", -1, 90.0), library_roads.location("2", -1, 40.0))
     for tick in range(200):
         pose = route.pose_at(min(4.0 * tick * DT, route.length))
         ego = Placement(pose.x, pose.y, yaw=pose.h, speed=4.0)
-        placements = fleet.step(view({"ego": ego}), DT)
-        boxes = view({"ego": ego} | placements).boxes
+        placements = fleet.step(view_of({"ego": ego}), DT)
+        boxes = view_of({"ego": ego} | placements).boxes
         assert len(boxes) == 1 or not overlap(boxes[0], boxes[1])
 
 
-def test_branches_depend_on_the_seed(crossing: RoadNetwork) -> None:
+def test_branches_depend_on_the_seed(library_roads: RoadNetwork) -> None:
     def traces(seed: int) -> list[Placement]:
-        fleet = crossing_fleet(crossing, seed)
+        fleet = crossing_fleet(library_roads, seed)
         for _ in range(300):
             placements = fleet.step(None, DT)
         return list(placements.values())
@@ -228,12 +184,12 @@ def test_branches_depend_on_the_seed(crossing: RoadNetwork) -> None:
 
 def test_add_with_used_name_is_an_error_until_removal(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
-    fleet.add(spec("car"), loop.location("a", -1, 10.0))
+    fleet.add(car("car"), loop.location("a", -1, 10.0))
     with pytest.raises(ValueError, match="'car' is in the fleet already"):
-        fleet.add(spec("car"), loop.location("a", -1, 30.0))
+        fleet.add(car("car"), loop.location("a", -1, 30.0))
     fleet.remove("car")
     assert fleet.step(None, DT) == {}
-    fleet.add(spec("car"), loop.location("a", -1, 30.0))
+    fleet.add(car("car"), loop.location("a", -1, 30.0))
     assert fleet.names == ("car",)
 
 
@@ -241,7 +197,7 @@ def test_cars_keep_their_order_over_a_long_run(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     wishes = (6.0, 14.0, 9.0, 12.0)
     for k, wish in enumerate(wishes):
-        fleet.add(spec(f"car{k}"), loop.location("a", -1, 280.0 - 30.0 * k), desired_speed=wish)
+        fleet.add(car(f"car{k}"), loop.location("a", -1, 280.0 - 30.0 * k), desired_speed=wish)
     for _ in range(3000):
         placements = fleet.step(None, DT)
         ahead = sorted(placements, key=lambda name: math.atan2(placements[name].y, placements[name].x))

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from fleet_scene import car, street
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet, LaneChanger
 from eidrive_scenario.traffic.mobil import Prospect, incentive, safe
-from eidrive_scenario.world.actor import ActorSpec
-
-Street = Callable[..., RoadNetwork]
-Car = Callable[[str], ActorSpec]
 
 BUMPERS = 4.6
 """Distance between the reference points of two cars in contact [m]."""
@@ -55,9 +52,7 @@ def lane_after_one_step(fleet: Fleet, name: str = "me") -> int:
     return fleet.lanes.keys[int(fleet.places([name])[0][0])].lane
 
 
-def queue(
-    roads: RoadNetwork, car: Car, changer: LaneChanger, *, leader_gap: float, follower_gap: float | None = None
-) -> Fleet:
+def queue(roads: RoadNetwork, changer: LaneChanger, *, leader_gap: float, follower_gap: float | None = None) -> Fleet:
     """Return a fleet with a car, a leader and a follower.
 
     The car drives 20 m/s in the right of two lanes with a desired speed of 25 m/s. The leader drives 10 m/s. The
@@ -72,36 +67,36 @@ def queue(
     return fleet
 
 
-def test_car_changes_lane_behind_a_slow_leader(street: Street, car: Car) -> None:
+def test_car_changes_lane_behind_a_slow_leader() -> None:
     """At a gap of 100 m the desired gap is 2 + 20 + 20·10/(2·√1.5) = 103.65 m.
 
     So a = 1 - 0.8⁴ - 1.0365² = -0.484 behind the leader, and +0.590 on the free lane.
     """
-    assert lane_after_one_step(queue(street(), car, LaneChanger(), leader_gap=100.0)) == -1
+    assert lane_after_one_step(queue(street(), LaneChanger(), leader_gap=100.0)) == -1
 
 
-def test_gain_below_the_threshold_prevents_lane_change(street: Street, car: Car) -> None:
+def test_gain_below_the_threshold_prevents_lane_change() -> None:
     """The gain is (103.65 / gap)²: 1.074 at 100 m."""
-    assert lane_after_one_step(queue(street(), car, LaneChanger(threshold=1.07), leader_gap=100.0)) == -1
-    assert lane_after_one_step(queue(street(), car, LaneChanger(threshold=1.08), leader_gap=100.0)) == -2
+    assert lane_after_one_step(queue(street(), LaneChanger(threshold=1.07), leader_gap=100.0)) == -1
+    assert lane_after_one_step(queue(street(), LaneChanger(threshold=1.08), leader_gap=100.0)) == -2
 
 
-def test_near_follower_in_target_lane_prevents_lane_change(street: Street, car: Car) -> None:
+def test_near_follower_in_target_lane_prevents_lane_change() -> None:
     """The follower would brake by (22 / gap)² - 0.590: 4.0 m/s² at 10.27 m."""
     egoistic = LaneChanger(politeness=0.0)
-    assert lane_after_one_step(queue(street(), car, egoistic, leader_gap=100.0, follower_gap=10.4)) == -1
-    assert lane_after_one_step(queue(street(), car, egoistic, leader_gap=100.0, follower_gap=10.1)) == -2
+    assert lane_after_one_step(queue(street(), egoistic, leader_gap=100.0, follower_gap=10.4)) == -1
+    assert lane_after_one_step(queue(street(), egoistic, leader_gap=100.0, follower_gap=10.1)) == -2
 
 
-def test_polite_driver_does_not_change_ahead_of_near_follower(street: Street, car: Car) -> None:
+def test_polite_driver_does_not_change_ahead_of_near_follower() -> None:
     """At 20 m the follower loses (22/20)² = 1.21. The incentive is positive if 1.074 - 1.21·p > 0.1, for p < 0.805."""
     for politeness, lane in ((0.80, -1), (0.81, -2)):
         polite = LaneChanger(politeness=politeness)
-        fleet = queue(street(), car, polite, leader_gap=100.0, follower_gap=20.0)
+        fleet = queue(street(), polite, leader_gap=100.0, follower_gap=20.0)
         assert lane_after_one_step(fleet) == lane
 
 
-def test_polite_leader_changes_lane_for_faster_follower(street: Street, car: Car) -> None:
+def test_polite_leader_changes_lane_for_faster_follower() -> None:
     """The leader loses nothing, and its follower gains 1.074: p·1.074 > 0.1 for p > 0.093."""
     for politeness, lane in ((0.09, -2), (0.10, -1)):
         roads = street()
@@ -111,12 +106,12 @@ def test_polite_leader_changes_lane_for_faster_follower(street: Street, car: Car
         assert lane_after_one_step(fleet) == lane
 
 
-def test_solid_marking_prevents_lane_change(street: Street, car: Car) -> None:
+def test_solid_marking_prevents_lane_change() -> None:
     for mark, lane in (("none", -2), ("decrease", -2), ("increase", -1)):
-        assert lane_after_one_step(queue(street(mark=mark), car, LaneChanger(), leader_gap=100.0)) == lane
+        assert lane_after_one_step(queue(street(mark=mark), LaneChanger(), leader_gap=100.0)) == lane
 
 
-def test_car_does_not_change_to_oncoming_lane(street: Street, car: Car) -> None:
+def test_car_does_not_change_to_oncoming_lane() -> None:
     roads = street(1, 1)
     fleet = Fleet(roads)
     fleet.add(car("me"), roads.location("1", -1, 400.0), speed=20.0, desired_speed=25.0)
@@ -124,7 +119,7 @@ def test_car_does_not_change_to_oncoming_lane(street: Street, car: Car) -> None:
     assert lane_after_one_step(fleet) == -1
 
 
-def test_free_car_returns_to_slow_lane_with_bias_only(street: Street, car: Car) -> None:
+def test_free_car_returns_to_slow_lane_with_bias_only() -> None:
     # In left-hand traffic lane -1 of a one-way road drives against s, and its left neighbor is lane -2.
     for rule, bias, lane, after in (
         ("RHT", 0.0, -1, -1),
@@ -138,7 +133,7 @@ def test_free_car_returns_to_slow_lane_with_bias_only(street: Street, car: Car) 
         assert lane_after_one_step(fleet) == after
 
 
-def test_one_of_two_cars_changes_into_the_same_gap(street: Street, car: Car) -> None:
+def test_one_of_two_cars_changes_into_the_same_gap() -> None:
     roads = street(right=3)
     fleet = Fleet(roads)
     for lane in (-1, -3):
@@ -149,9 +144,9 @@ def test_one_of_two_cars_changes_into_the_same_gap(street: Street, car: Car) -> 
     assert sorted(fleet.lanes.keys[int(row)].lane for row in rows) in ([-2, -1], [-3, -2])
 
 
-def test_lateral_path_is_a_quintic_of_stated_duration(street: Street, car: Car) -> None:
+def test_lateral_path_is_a_quintic_of_stated_duration() -> None:
     """The path is 3.5 m along a quintic over v·4 s, with a maximum slope of 1.875·3.5/80 in the middle."""
-    fleet = queue(street(), car, LaneChanger(politeness=0.0), leader_gap=100.0)
+    fleet = queue(street(), LaneChanger(politeness=0.0), leader_gap=100.0)
     path = [(place.x, place.y, place.yaw) for _ in range(160) if (place := fleet.step(None, 0.05)["me"])]
     x, y, yaw = np.array(path).T
     moving = (y > -5.25 + 1e-6) & (y < -1.75 - 1e-6)
@@ -162,7 +157,7 @@ def test_lateral_path_is_a_quintic_of_stated_duration(street: Street, car: Car) 
     assert np.arctan2(np.diff(y), np.diff(x)) == pytest.approx(0.5 * (yaw[1:] + yaw[:-1]), abs=2e-3)
 
 
-def test_dense_traffic_changes_lanes_without_contact(street: Street, car: Car) -> None:
+def test_dense_traffic_changes_lanes_without_contact() -> None:
     roads = street(right=3, length=3000.0)
     rng = np.random.default_rng(3)
     fleet = Fleet(roads, seed=2)
@@ -184,35 +179,21 @@ def test_dense_traffic_changes_lanes_without_contact(street: Street, car: Car) -
 def ending_lane() -> RoadNetwork:
     """Return two lanes, of which the right one tapers off from s = 250 to 300 m, and a following road."""
 
-    def road(number: str, x: float, lanes: str, link: str) -> str:
-        return (
-            f'<road id="{number}" length="300" junction="-1"><link>{link}</link><planView>'
-            f'<geometry s="0" x="{x}" y="0" hdg="0" length="300"><line/></geometry></planView>'
-            f'<lanes><laneSection s="0"><center><lane id="0"/></center><right>{lanes}</right></laneSection></lanes>'
-            "</road>"
-        )
-
-    on = '<lane id="-1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
     taper = (
         '<lane id="-2" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
         '<width sOffset="250" a="3.5" b="-0.07" c="0" d="0"/></lane>'
     )
-    first = road(
-        "1",
-        0.0,
-        on.format('<successor id="-1"/>') + taper,
-        '<successor elementType="road" elementId="2" contactPoint="start"/>',
+    both = section_xml(right=lane_xml(-1, link=lane_links_xml(after=-1)) + taper)
+    one = section_xml(right=lane_xml(-1, link=lane_links_xml(-1)))
+    return RoadNetwork.parse(
+        map_xml(
+            road_xml("1", length=300.0, link=successor_xml("2"), lanes=both),
+            road_xml("2", length=300.0, x=300.0, link=predecessor_xml("1"), lanes=one),
+        )
     )
-    second = road(
-        "2",
-        300.0,
-        on.format('<predecessor id="-1"/>'),
-        '<predecessor elementType="road" elementId="1" contactPoint="end"/>',
-    )
-    return RoadNetwork.parse(f"<OpenDRIVE>{first}{second}</OpenDRIVE>")
 
 
-def test_cars_leave_ending_lane(car: Car) -> None:
+def test_cars_leave_ending_lane() -> None:
     """The lane is narrower than 2.2 m from s = 250 + 1.3/0.07 = 268.6 m on; the next sample is at 270 m."""
     roads = ending_lane()
     fleet = Fleet(roads)

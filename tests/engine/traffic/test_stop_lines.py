@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
+from fleet_scene import car, street
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Fleet
-from eidrive_scenario.world.actor import ActorSpec
-
-Street = Callable[..., RoadNetwork]
-Car = Callable[[str], ActorSpec]
 
 FRONT = 1.4 + 0.5 * 4.6
 """Distance from the reference point to the front bumper [m]."""
@@ -36,16 +32,16 @@ class Lights:
         return self.red
 
 
-def approaching(roads: RoadNetwork, car: Car, lights: Lights, *, lane: int = -1, at: float = 60.0) -> Fleet:
+def approaching(roads: RoadNetwork, lights: Lights, *, lane: int = -1, at: float = 60.0) -> Fleet:
     fleet = Fleet(roads, must_stop=lights)
     fleet.add(car("me"), roads.location("1", lane, at), speed=14.0, desired_speed=14.0)
     return fleet
 
 
-def test_car_waits_at_red_light_until_green(street: Street, car: Car) -> None:
+def test_car_waits_at_red_light_until_green() -> None:
     """The car stops 1 m before the line plus the standstill gap of 2 m."""
     lights = Lights()
-    fleet = approaching(street(right=1, extra=light()), car, lights)
+    fleet = approaching(street(right=1, extra=light()), lights)
     for _ in range(800):
         place = fleet.step(None, 0.05)["me"]
     assert lights.asked == {"7"}
@@ -57,9 +53,9 @@ def test_car_waits_at_red_light_until_green(street: Street, car: Car) -> None:
     assert place.x > 250.0
 
 
-def test_following_car_stops_behind_waiting_car(street: Street, car: Car) -> None:
+def test_following_car_stops_behind_waiting_car() -> None:
     roads = street(right=1, extra=light())
-    fleet = approaching(roads, car, Lights())
+    fleet = approaching(roads, Lights())
     fleet.add(car("next"), roads.location("1", -1, 30.0), speed=14.0, desired_speed=14.0)
     for _ in range(800):
         places = fleet.step(None, 0.05)
@@ -78,19 +74,17 @@ def test_following_car_stops_behind_waiting_car(street: Street, car: Car) -> Non
         ("+", '<validity fromLane="-2" toLane="-1"/>', -1, True),
     ],
 )
-def test_light_stops_cars_on_its_valid_lanes_only(
-    street: Street, car: Car, orientation: str, validity: str, lane: int, stops: bool
-) -> None:
+def test_light_stops_cars_on_its_valid_lanes_only(orientation: str, validity: str, lane: int, stops: bool) -> None:
     roads = street(1, 2, extra=light(500.0, orientation, validity), mark="none")
-    fleet = approaching(roads, car, Lights(), lane=lane, at=460.0 - 60.0 if lane < 0 else 600.0)
+    fleet = approaching(roads, Lights(), lane=lane, at=460.0 - 60.0 if lane < 0 else 600.0)
     for _ in range(700):
         place = fleet.step(None, 0.05)["me"]
     assert (place.speed < 0.05) is stops
 
 
-def test_static_signal_does_not_stop_cars(street: Street, car: Car) -> None:
+def test_static_signal_does_not_stop_cars() -> None:
     lights = Lights()
-    fleet = approaching(street(right=1, extra=light(dynamic="no")), car, lights)
+    fleet = approaching(street(right=1, extra=light(dynamic="no")), lights)
     for _ in range(300):
         place = fleet.step(None, 0.05)["me"]
     assert not lights.asked
@@ -98,33 +92,20 @@ def test_static_signal_does_not_stop_cars(street: Street, car: Car) -> None:
 
 
 @pytest.mark.parametrize(("distance", "stops"), [(25.5, True), (23.5, False)])
-def test_car_that_cannot_brake_comfortably_passes_red_light(
-    street: Street, car: Car, distance: float, stops: bool
-) -> None:
+def test_car_that_cannot_brake_comfortably_passes_red_light(distance: float, stops: bool) -> None:
     """From 14 m/s, braking with 4 m/s² takes 24.5 m."""
-    fleet = approaching(street(right=1, extra=light()), car, Lights(), at=200.0 - FRONT - distance)
+    fleet = approaching(street(right=1, extra=light()), Lights(), at=200.0 - FRONT - distance)
     for _ in range(300):
         place = fleet.step(None, 0.05)["me"]
     assert (place.x < 200.0 - FRONT) is stops
 
 
-def test_car_standing_on_stop_line_continues(car: Car) -> None:
+def test_car_standing_on_stop_line_continues() -> None:
     """The line is 0.5 m into the second road. The car stands on the first road with its front beyond the line."""
-    lane = (
-        '<lane id="-1" type="driving"><link><{kind} id="-1"/></link>'
-        '<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
-    )
-    road = (
-        '<road id="{id}" length="100" junction="-1"><link><{kind} elementType="road" elementId="{other}" '
-        'contactPoint="{end}"/></link><planView><geometry s="0" x="{x}" y="0" hdg="0" length="100"><line/></geometry>'
-        '</planView><lanes><laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'
-        "</lanes>{extra}</road>"
-    )
-    first = road.format(id=1, kind="successor", other=2, end="start", x=0, lane=lane.format(kind="successor"), extra="")
-    second = road.format(
-        id=2, kind="predecessor", other=1, end="end", x=100, lane=lane.format(kind="predecessor"), extra=light(0.5)
-    )
-    roads = RoadNetwork.parse(f'<OpenDRIVE><header revMajor="1" revMinor="7"/>{first}{second}</OpenDRIVE>')
+    lanes = [section_xml(right=lane_xml(-1, link=link)) for link in (lane_links_xml(after=-1), lane_links_xml(-1))]
+    first = road_xml("1", link=successor_xml("2"), lanes=lanes[0])
+    second = road_xml("2", x=100.0, link=predecessor_xml("1"), lanes=lanes[1], extra=light(0.5))
+    roads = RoadNetwork.parse(map_xml(first, second))
     fleet = Fleet(roads, must_stop=Lights())
     fleet.add(car("me"), roads.location("1", -1, 98.0))
     for _ in range(100):
@@ -132,7 +113,7 @@ def test_car_standing_on_stop_line_continues(car: Car) -> None:
     assert place.x > 102.0
 
 
-def test_red_light_holds_car_before_junction_until_green(library_roads: RoadNetwork, car: Car) -> None:
+def test_red_light_holds_car_before_junction_until_green(library_roads: RoadNetwork) -> None:
     lights = Lights()
     fleet = Fleet(library_roads, must_stop=lights)
     start = library_roads.location("3", 1, 70.0)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 
 import numpy as np
 import pytest
+from fleet_scene import street
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.roads import RoadNetwork
@@ -13,33 +15,19 @@ from eidrive_scenario.traffic import Cursor, SpawnSites, Stretch, polygon, road_
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.spawning.sites import SpawnAreas
 
-Street = Callable[..., RoadNetwork]
-
 
 def three_in_a_row(turned: bool = False) -> RoadNetwork:
     """Return three consecutive roads a, b, c of 100 m; with `turned` the middle one has the opposite direction."""
-    lane = '<lane id="-1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
-    left = '<lane id="1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
 
     def road(number: str, x: float, before: tuple[str, str] | None, after: tuple[str, str] | None) -> str:
-        link, lanes = "", ""
-        flipped = turned and number == "b"
-        ends = [("predecessor", before), ("successor", after)]
-        for name, end in ends:
-            if end is not None:
-                link += f'<{name} elementType="road" elementId="{end[0]}" contactPoint="{end[1]}"/>'
-        same = -1 if turned else 1
-        links = "".join(f'<{name} id="{{}}"/>' for name, end in ends if end is not None)
-        lanes = (
-            f"<left>{left.format(links.replace('{}', str(same)))}</left><center><lane id='0'/></center>"
-            f"<right>{lane.format(links.replace('{}', str(-same)))}</right>"
-        )
-        start, hdg = (x + 100.0, np.pi) if flipped else (x, 0.0)
-        return (
-            f'<road id="{number}" length="100" junction="-1"><link>{link}</link><planView><geometry s="0" x="{start}" '
-            f'y="0" hdg="{hdg!r}" length="100"><line/></geometry></planView><lanes><laneSection s="0">{lanes}'
-            "</laneSection></lanes></road>"
-        )
+        link = (predecessor_xml(*before) if before else "") + (successor_xml(*after) if after else "")
+        sides = [
+            lane_xml(lane, link=lane_links_xml(other if before else None, other if after else None))
+            for lane in (1, -1)
+            for other in (-lane if turned else lane,)
+        ]
+        start, hdg = (x + 100.0, math.pi) if turned and number == "b" else (x, 0.0)
+        return road_xml(number, x=start, hdg=hdg, link=link, lanes=section_xml(*sides))
 
     if turned:
         roads = [
@@ -53,25 +41,25 @@ def three_in_a_row(turned: bool = False) -> RoadNetwork:
             road("b", 100.0, ("a", "end"), ("c", "start")),
             road("c", 200.0, ("b", "end"), None),
         ]
-    return RoadNetwork.parse(f"<OpenDRIVE>{''.join(roads)}</OpenDRIVE>")
+    return RoadNetwork.parse(map_xml(*roads))
 
 
-def test_range_on_one_road(street: Street) -> None:
+def test_range_on_one_road() -> None:
     roads = street()
     assert road_range(roads, [Cursor("1", 100.0, (-1,)), Cursor("1", 300.0)]) == [Stretch("1", 100.0, 300.0, (-1,))]
     assert road_range(roads, [Cursor("1", 300.0), Cursor("1", 100.0)]) == [Stretch("1", 100.0, 300.0)]
 
 
-def test_cursor_without_s_is_start_or_end_of_its_road(street: Street) -> None:
+def test_cursor_without_s_is_start_or_end_of_its_road() -> None:
     assert road_range(street(), [Cursor("1"), Cursor("1")]) == [Stretch("1", 0.0, 1000.0)]
 
 
-def test_lanes_of_cursor_are_valid_up_to_the_next_cursor(street: Street) -> None:
+def test_lanes_of_cursor_are_valid_up_to_the_next_cursor() -> None:
     cursors = [Cursor("1", 100.0, (-1,)), Cursor("1", 200.0, (-2,)), Cursor("1", 300.0)]
     assert road_range(street(), cursors) == [Stretch("1", 100.0, 200.0, (-1,)), Stretch("1", 200.0, 300.0, (-2,))]
 
 
-def test_length_truncates_the_range(street: Street) -> None:
+def test_length_truncates_the_range() -> None:
     roads = street()
     assert road_range(roads, [Cursor("1", 100.0), Cursor("1", 300.0)], 50.0) == [Stretch("1", 100.0, 150.0)]
     backwards = [Cursor("1", 300.0), Cursor("1", 100.0)]
@@ -98,25 +86,15 @@ def test_range_over_several_roads_follows_their_links() -> None:
     ]
 
 
-def test_range_over_unknown_or_unlinked_roads_is_an_error(street: Street) -> None:
+def test_range_over_unknown_or_unlinked_roads_is_an_error() -> None:
     with pytest.raises(InputError, match="road '2' does not exist"):
         road_range(street(), [Cursor("1"), Cursor("2")])
-    lane = '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
-    lanes = f'<laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'
-    apart = RoadNetwork.parse(
-        "<OpenDRIVE>"
-        + "".join(
-            f'<road id="{n}" length="10" junction="-1"><planView><geometry s="0" x="0" y="{n}00" hdg="0" length="10">'
-            f"<line/></geometry></planView><lanes>{lanes}</lanes></road>"
-            for n in (1, 2)
-        )
-        + "</OpenDRIVE>"
-    )
+    apart = RoadNetwork.parse(map_xml(road_xml("1", length=10.0), road_xml("2", length=10.0, y=100.0)))
     with pytest.raises(InputError, match="no chain of roads leads from road '1' to road '2'"):
         road_range(apart, [Cursor("1"), Cursor("2")])
 
 
-def test_areas_cover_sites_in_range_and_polygon(street: Street) -> None:
+def test_areas_cover_sites_in_range_and_polygon() -> None:
     lanes = TrafficLanes(street(1, 1))
     sites = SpawnAreas(lanes).driving
     inside = sites.subset(stretches_cover(lanes, [Stretch("1", 100.0, 200.0, (-1,))])(sites))

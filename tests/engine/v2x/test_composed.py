@@ -8,16 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
+from radio_traffic import composed
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel
 from eidrive_scenario.v2x.link_models.delay import Delay, LognormalDelay
 from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.messages.size import cpm_size
-
-
-def channel(seed: int = 0, **profile: object) -> ComposedChannel:
-    return ComposedChannel(ComposedProfile.model_validate(profile), seed)
 
 
 def message(sender: str, number: int) -> Message:
@@ -37,7 +34,7 @@ def bernoulli(probability: float, scope: str = "link") -> dict[str, object]:
 
 @pytest.mark.parametrize("scope", ["link", "frame"])
 def test_messages_delivered_with_more_loss_are_delivered_with_less(scope: str) -> None:
-    sets = [received(channel(4, loss=bernoulli(p, scope))) for p in (0.0, 0.1, 0.3, 0.6, 0.9, 1.0)]
+    sets = [received(composed(4, loss=bernoulli(p, scope))) for p in (0.0, 0.1, 0.3, 0.6, 0.9, 1.0)]
     assert all(larger > smaller for larger, smaller in pairwise(sets))
     assert len(sets[0]) == 400
     assert sets[-1] == set()
@@ -45,13 +42,13 @@ def test_messages_delivered_with_more_loss_are_delivered_with_less(scope: str) -
 
 def test_bernoulli_loss_ratio_is_the_probability() -> None:
     """Five standard deviations of 4000 draws at 0.3 are 0.036."""
-    kept = received(channel(1, loss=bernoulli(0.3)), 4000)
+    kept = received(composed(1, loss=bernoulli(0.3)), 4000)
     assert len(kept) / 4000 == pytest.approx(0.7, abs=5 * math.sqrt(0.21 / 4000))
 
 
 def test_outcome_of_a_link_is_independent_of_other_stations() -> None:
     profile = {"loss": bernoulli(0.4), "delay": {"kind": "shifted_gamma", "minimum": 0.01, "mean": 0.1}}
-    alone, crowd = channel(7, **profile), channel(7, **profile)
+    alone, crowd = composed(7, **profile), composed(7, **profile)
     for number in range(300):
         expected = alone.send(message("RSU", number), ["Ego"], number * 0.05)
         senders = ["X", "RSU", "A"] if number % 2 else ["A", "X", "RSU"]
@@ -65,16 +62,16 @@ def test_outcome_of_a_link_is_independent_of_other_stations() -> None:
 
 def test_delay_is_independent_of_loss() -> None:
     delay = {"kind": "uniform", "minimum": 0.0, "maximum": 1.0}
-    calm = [channel(2, delay=delay).send(message("RSU", n), ["Ego"], 0.0)[0].arrives for n in range(50)]
-    lossy = channel(2, delay=delay, loss=bernoulli(0.5))
+    calm = [composed(2, delay=delay).send(message("RSU", n), ["Ego"], 0.0)[0].arrives for n in range(50)]
+    lossy = composed(2, delay=delay, loss=bernoulli(0.5))
     for number, arrives in enumerate(calm):
         event = lossy.send(message("RSU", number), ["Ego"], 0.0)[0]
         assert event.arrives in (None, arrives)
 
 
 def test_losses_of_seeds_and_links_differ() -> None:
-    assert received(channel(1, loss=bernoulli(0.5))) != received(channel(2, loss=bernoulli(0.5)))
-    carrier = channel(1, loss=bernoulli(0.5))
+    assert received(composed(1, loss=bernoulli(0.5))) != received(composed(2, loss=bernoulli(0.5)))
+    carrier = composed(1, loss=bernoulli(0.5))
     outcomes = [
         tuple(event.outcome for event in carrier.send(message("RSU", number), ["Ego", "Other"], 0.0))
         for number in range(200)
@@ -84,7 +81,7 @@ def test_losses_of_seeds_and_links_differ() -> None:
 
 def test_frame_loss_drops_all_messages_of_a_receiver_in_a_tick() -> None:
     """Fault of the published code: own detections and received messages are lost together."""
-    carrier = channel(5, own_perception=True, loss=bernoulli(0.3, "frame"))
+    carrier = composed(5, own_perception=True, loss=bernoulli(0.3, "frame"))
     per_tick: list[dict[str, set[str]]] = []
     for number in range(200):
         outcomes: dict[str, set[str]] = {}
@@ -124,7 +121,7 @@ def test_delay_distribution_has_its_mean_and_spread(settings: dict[str, object],
 
 
 def test_delay_of_every_message_grows_with_the_mean() -> None:
-    short, long = (channel(9, delay={"kind": "lognormal", "mean": mean, "sd": 0.05}) for mean in (0.1, 0.2))
+    short, long = (composed(9, delay={"kind": "lognormal", "mean": mean, "sd": 0.05}) for mean in (0.1, 0.2))
     for number in range(100):
         first, second = (c.send(message("RSU", number), ["Ego"], 0.0)[0].arrives for c in (short, long))
         assert first is not None

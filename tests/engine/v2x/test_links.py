@@ -6,23 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from radio_traffic import composed, message
 
-from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.statistics.links import Links
 
 DT = 0.05
 STATIONS = ("Ego", "RSU", "Spectator")
-
-
-def message(sender: str, number: int, time: float, size: int = 121) -> Message:
-    return Message(sender, number, time, StationState(time, 0, 0, 0, 0, 0), Detections(time), size)
-
-
-def channel(seed: int = 0, **profile: object) -> ComposedChannel:
-    return ComposedChannel(ComposedProfile.model_validate(profile), seed)
 
 
 def exchange(
@@ -67,7 +58,7 @@ LOSSES = st.one_of(
 def test_channel_delivers_each_message_once_after_arrival_and_counts_all(
     delay: dict[str, object], loss: dict[str, object], seed: int, reordering: bool, own: bool
 ) -> None:
-    carrier = channel(seed, delay=delay, loss=loss, reordering=reordering)
+    carrier = composed(seed, delay=delay, loss=loss, reordering=reordering)
     events, deliveries = exchange(carrier, 25, own=own)
     by_link = {(event.sender, event.receiver, event.number): event for event in events}
     seen = set()
@@ -95,7 +86,7 @@ def test_channel_delivers_each_message_once_after_arrival_and_counts_all(
 @settings(max_examples=20, deadline=None)
 @given(DELAYS, st.integers(0, 3))
 def test_channel_without_reordering_delivers_in_order_of_sending(delay: dict[str, object], seed: int) -> None:
-    _, deliveries = exchange(channel(seed, delay=delay, reordering=False), 40)
+    _, deliveries = exchange(composed(seed, delay=delay, reordering=False), 40)
     for receiver in STATIONS:
         for sender in STATIONS:
             numbers = [
@@ -106,14 +97,14 @@ def test_channel_without_reordering_delivers_in_order_of_sending(delay: dict[str
 
 @pytest.mark.parametrize("ticks_late", range(1, 25))
 def test_delay_of_whole_ticks_is_not_extended_by_rounding(ticks_late: int) -> None:
-    _, deliveries = exchange(channel(delay={"kind": "constant", "seconds": ticks_late * DT}), 60)
+    _, deliveries = exchange(composed(delay={"kind": "constant", "seconds": ticks_late * DT}), 60)
     lateness = {round(now / DT) - received.message.number for _, now, received in deliveries}
     assert lateness == {ticks_late}
 
 
 def test_delay_of_the_paper_applies_from_the_first_message() -> None:
     """The published code delivers without delay until its queue is full; here the first delivery is at 0.3 s."""
-    _, deliveries = exchange(channel(delay={"kind": "constant", "seconds": 0.3}), 20, ("Ego", "RSU"))
+    _, deliveries = exchange(composed(delay={"kind": "constant", "seconds": 0.3}), 20, ("Ego", "RSU"))
     assert min(now for _, now, _ in deliveries) == pytest.approx(0.3)
     assert {round(now - received.message.generated, 9) for _, now, received in deliveries} == {0.3}
 
@@ -156,7 +147,7 @@ def test_age_of_information_with_one_loss_equals_hand_calculation() -> None:
 @pytest.mark.parametrize(("loss", "delay"), [(0.0, 0.02), (0.3, 0.02), (0.5, 0.3)])
 def test_age_of_information_with_independent_loss_has_its_closed_form(loss: float, delay: float) -> None:
     """Periodic sending: mean age d + T (1/q - 1/2), peak age d + T/q."""
-    carrier = channel(3, delay={"kind": "constant", "seconds": delay}, loss={"kind": "bernoulli", "probability": loss})
+    carrier = composed(3, delay={"kind": "constant", "seconds": delay}, loss={"kind": "bernoulli", "probability": loss})
     exchange(carrier, 8000, ("Ego", "RSU"))
     link = carrier.statistics(8000 * DT)["RSU", "Ego"]
     kept = 1.0 - loss
@@ -166,8 +157,8 @@ def test_age_of_information_with_independent_loss_has_its_closed_form(loss: floa
 
 def test_continue_from_keeps_messages_in_flight() -> None:
     slow, jammed = (
-        channel(delay={"kind": "constant", "seconds": 0.3}),
-        channel(loss={"kind": "bernoulli", "probability": 1.0}),
+        composed(delay={"kind": "constant", "seconds": 0.3}),
+        composed(loss={"kind": "bernoulli", "probability": 1.0}),
     )
     slow.send(message("RSU", 0, 0.0), ["Ego"], 0.0)
     jammed.continue_from(slow)
@@ -178,7 +169,7 @@ def test_continue_from_keeps_messages_in_flight() -> None:
 
 
 def test_links_count_bytes_sent_per_link() -> None:
-    carrier = channel()
+    carrier = composed()
     carrier.send(message("RSU", 0, 0.0, size=156), ["Ego", "Spectator"], 0.0)
     assert carrier.statistics(0.0)["RSU", "Ego"].bytes_sent == 156
     assert np.sum([link.bytes_sent for link in carrier.statistics(0.0).values()]) == 312

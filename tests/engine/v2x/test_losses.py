@@ -10,6 +10,7 @@ from time import process_time
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from radio_traffic import composed
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
@@ -20,10 +21,6 @@ from eidrive_scenario.v2x.profile import load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 DT = 0.1
-
-
-def channel(seed: int = 0, **profile: object) -> ComposedChannel:
-    return ComposedChannel(ComposedProfile.model_validate(profile), seed)
 
 
 def message(number: int, sender: str = "RSU") -> Message:
@@ -43,7 +40,7 @@ def burst(probability: float, length: float) -> dict[str, object]:
 @pytest.mark.parametrize(("probability", "length"), [(0.05, 2.0), (0.1, 10.0), (0.3, 2.0), (0.3, 10.0)])
 def test_burst_loss_has_its_probability_and_burst_length(probability: float, length: float) -> None:
     """Burst lengths are geometric, so the standard error of their mean is length / sqrt(bursts)."""
-    kept = received(channel(5, loss=burst(probability, length)), 40000)
+    kept = received(composed(5, loss=burst(probability, length)), 40000)
     bursts = [len(list(run)) for lost, run in groupby(not got for got in kept) if lost]
     assert np.mean(bursts) == pytest.approx(length, abs=5 * length / math.sqrt(len(bursts)))
     spread = math.sqrt(probability * (1 - probability) * 2 * length / 40000)
@@ -60,17 +57,17 @@ def test_burst_loss_with_minimum_burst_length_is_bernoulli() -> None:
 def test_burst_loss_with_losses_in_both_states_has_closed_form() -> None:
     loss = GilbertElliottLoss(kind="gilbert_elliott", to_bad=0.1, to_good=0.3, good_loss=0.02, bad_loss=0.8)
     assert loss.share_bad == pytest.approx(0.25)
-    kept = received(channel(2, loss=loss.model_dump(exclude_none=True)), 40000)
+    kept = received(composed(2, loss=loss.model_dump(exclude_none=True)), 40000)
     assert 1 - np.mean(kept) == pytest.approx(0.25 * 0.8 + 0.75 * 0.02, abs=0.02)
 
 
 def test_burst_loss_of_a_late_receiver_equals_that_of_an_early_one() -> None:
     """The state of a link is a function of seed, link and number, without the preceding messages."""
-    early = received(channel(6, loss=burst(0.3, 4)), 10_000)
-    late = channel(6, loss=burst(0.3, 4))
+    early = received(composed(6, loss=burst(0.3, 4)), 10_000)
+    late = composed(6, loss=burst(0.3, 4))
     for number in (4095, 4096, 4200, 9990, 9999):
         assert (late.send(message(number), ["Ego"], number * DT)[0].outcome == "delivered") == early[number]
-    far = channel(6, loss=burst(0.3, 4))
+    far = composed(6, loss=burst(0.3, 4))
     begun = process_time()
     far.send(message(10**9), ["Ego"], 1e8)
     assert process_time() - begun < 1.0
@@ -79,7 +76,7 @@ def test_burst_loss_of_a_late_receiver_equals_that_of_an_early_one() -> None:
 def test_messages_delivered_with_more_bursts_are_delivered_with_fewer() -> None:
     """The share of the bad state grows at constant burst length."""
     sets = [
-        {n for n, got in enumerate(received(channel(4, loss=burst(p, 5.0)), 2000)) if got} for p in (0.05, 0.2, 0.5)
+        {n for n, got in enumerate(received(composed(4, loss=burst(p, 5.0)), 2000)) if got} for p in (0.05, 0.2, 0.5)
     ]
     assert all(larger > smaller for larger, smaller in pairwise(sets))
 
@@ -91,7 +88,7 @@ def test_mean_age_depends_on_bursts_and_peak_age_does_not(length: float, mean: f
     to_bad = to_good * 0.3 / 0.7
     closed = 0.02 + DT * (1 + to_bad * (2 + to_good) / to_good**2) / (2 * (1 + to_bad / to_good))
     assert closed == pytest.approx(mean, abs=5e-4)
-    carrier = channel(6, loss=burst(0.3, length), delay={"kind": "constant", "seconds": 0.02})
+    carrier = composed(6, loss=burst(0.3, length), delay={"kind": "constant", "seconds": 0.02})
     for number in range(60000):
         carrier.send(message(number), ["Ego"], number * DT)
         carrier.deliver("Ego", (number + 1) * DT)
@@ -102,7 +99,7 @@ def test_mean_age_depends_on_bursts_and_peak_age_does_not(length: float, mean: f
 
 def test_p95_age_of_two_period_lengths_equals_hand_calculation() -> None:
     """Ages run from 0.1 to 1.1 s nine times and to 2.1 s once: 10 of 11 s are below 1.1 s, so 95 % at 1.55 s."""
-    carrier = channel(delay={"kind": "constant", "seconds": 0.1})
+    carrier = composed(delay={"kind": "constant", "seconds": 0.1})
     times = [*range(10), 11]
     for number, time in enumerate(times):
         sent = Message("RSU", number, time, StationState(time, 0, 0, 0, 0, 0), Detections(time), 121)
@@ -115,7 +112,7 @@ def test_p95_age_of_two_period_lengths_equals_hand_calculation() -> None:
 
 def test_mean_age_with_random_delays_is_half_the_period_plus_mean_delay() -> None:
     """Closed form T/2 + E[D], because delays are shorter than the period."""
-    carrier = channel(1, delay={"kind": "uniform", "minimum": 0.0, "maximum": 0.09})
+    carrier = composed(1, delay={"kind": "uniform", "minimum": 0.0, "maximum": 0.09})
     for number in range(20000):
         carrier.send(message(number), ["Ego"], number * DT)
         carrier.deliver("Ego", (number + 1) * DT)
@@ -125,7 +122,7 @@ def test_mean_age_with_random_delays_is_half_the_period_plus_mean_delay() -> Non
 def test_loss_by_distance_follows_its_table() -> None:
     loss = {"kind": "by_distance", "distances": [0, 100, 200], "reception": [1.0, 0.8, 0.0]}
     for distance, reception in ((0.0, 1.0), (50.0, 0.9), (150.0, 0.4), (500.0, 0.0)):
-        carrier = channel(3, loss=loss)
+        carrier = composed(3, loss=loss)
         carrier.update_environment(RadioEnvironment({"RSU": (0.0, 0.0, 0.0), "Ego": (distance, 0.0, 0.0)}))
         kept = received(carrier, 4000)
         assert np.mean(kept) == pytest.approx(reception, abs=5 * math.sqrt(0.25 / 4000))
@@ -136,11 +133,11 @@ def test_loss_by_distance_follows_its_table() -> None:
 
 def test_loss_by_distance_without_antenna_positions_raises() -> None:
     with pytest.raises(ValueError, match="requires antenna positions of 'RSU' and 'Ego'"):
-        received(channel(loss={"kind": "by_distance", "distances": [0], "reception": [1]}), 1)
+        received(composed(loss={"kind": "by_distance", "distances": [0], "reception": [1]}), 1)
 
 
 def test_analytic_loss_counts_losses_by_cause() -> None:
-    carrier = channel(3, loss={"kind": "80211p", "density": 0.12, "rate": 25, "size": 500})
+    carrier = composed(3, loss={"kind": "80211p", "density": 0.12, "rate": 25, "size": 500})
     carrier.update_environment(RadioEnvironment({"RSU": (0.0, 0.0, 0.0), "Ego": (150.0, 0.0, 0.0)}))
     kept = received(carrier, 4000)
     table = carrier.profile.loss.table()  # type: ignore[union-attr]
@@ -155,7 +152,7 @@ def test_analytic_loss_counts_losses_by_cause() -> None:
 def test_trace_delay_from_a_list_is_interpolated_or_replayed() -> None:
     delay = TraceDelay.model_validate({"kind": "trace", "seconds": [0.3, 0.1, 0.2]})
     assert [delay.quantile(u) for u in (0.0, 0.25, 0.5, 1.0)] == pytest.approx([0.1, 0.15, 0.2, 0.3])
-    carrier = channel(delay={"kind": "trace", "seconds": [0.3, 0.1, 0.2], "replay": True})
+    carrier = composed(delay={"kind": "trace", "seconds": [0.3, 0.1, 0.2], "replay": True})
     arrives = [carrier.send(message(n), ["Ego"], 0.0)[0].arrives for n in range(5)]
     assert arrives == [0.3, 0.1, 0.2, 0.3, 0.1]
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from corpora import corpora_folder
 from lxml import etree
 
 from eidrive_scenario.errors import ScenarioError
@@ -122,10 +122,7 @@ def test_mast_has_shape_of_roadside_unit() -> None:
 
 @pytest.mark.parametrize("file", ["vehicles", "pedestrians", "misc_objects"])
 def test_catalogs_are_valid_by_the_schema(file: str) -> None:
-    corpora = os.environ.get("EIDRIVE_CORPORA")
-    if not corpora:
-        pytest.skip("EIDRIVE_CORPORA is not set: ASAM's schema is not part of the project")
-    schema = etree.XMLSchema(etree.parse(Path(corpora) / "schema" / "OpenSCENARIOv1.3.1.xsd"))
+    schema = etree.XMLSchema(etree.parse(corpora_folder() / "schema" / "OpenSCENARIOv1.3.1.xsd"))
     schema.assertValid(etree.parse(CATALOGS / f"{file}.xosc"))
 
 

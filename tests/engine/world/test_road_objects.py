@@ -5,24 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies, signal_heads
 
-ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-  <road name="" length="200" id="1" junction="-1"><link/>
-    <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
-    <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
-    <lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
-    <objects>{objects}</objects><signals>{signals}</signals></road></OpenDRIVE>"""
-
 
 def network(*objects: str, signals: str = "") -> RoadNetwork:
     """Return a street along x whose only lane has its center at y = -2, with objects by their attributes."""
     listed = "".join(f'<object id="{number}" hdg="0" {one}</object>' for number, one in enumerate(objects))
-    return RoadNetwork.parse(ROAD.format(objects=listed, signals=signals))
+    extra = f"<objects>{listed}</objects><signals>{signals}</signals>"
+    return RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes_xml(0, 1, 4), extra=extra)))
 
 
 def only(*objects: str) -> RoadObjectBody:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml, superelevation_xml
 from sample_car import CarFactory, Resistances
 
 from eidrive_scenario.roads import RoadNetwork
@@ -13,25 +14,20 @@ from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Control, Placement
 from eidrive_scenario.world.physics.vehicle_parameters import GRAVITY
 
-ROAD = """<OpenDRIVE>
-  <header revMajor="1" revMinor="6" name="" version="1.0"/>
-  <road name="" length="400" id="1" junction="-1">
-    <planView><geometry s="0" x="0" y="0" hdg="{heading}" length="400"><line/></geometry></planView>
-    <elevationProfile>{elevation}</elevationProfile>
-    <lateralProfile><superelevation s="0" a="{bank}" b="0" c="0" d="0"/></lateralProfile>
-    <lanes><laneSection s="0">
-      <center><lane id="0" type="none" level="false"/></center>
-      <right>
-        <lane id="-1" type="driving" level="false"><width sOffset="0" a="8" b="0" c="0" d="0"/></lane>
-      </right>
-    </laneSection></lanes>
-    <objects>{objects}</objects>
-  </road>
-</OpenDRIVE>"""
-
 
 def road(elevation: str = "", heading: float = 0.0, bank: float = 0.0, objects: str = "") -> RoadNetwork:
-    return RoadNetwork.parse(ROAD.format(elevation=elevation, heading=heading, bank=bank, objects=objects))
+    """Return a road of 400 m with one lane of 8 m."""
+    return RoadNetwork.parse(
+        map_xml(
+            road_xml(
+                length=400.0,
+                hdg=heading,
+                profiles=f"<elevationProfile>{elevation}</elevationProfile>{superelevation_xml(bank)}",
+                lanes=lanes_xml(0, 1, 8),
+                extra=f"<objects>{objects}</objects>",
+            )
+        )
+    )
 
 
 def slope(grade: float) -> str:

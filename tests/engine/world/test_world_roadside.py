@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
 from sample_car import CarFactory
 
 from eidrive_scenario.roads import RoadNetwork, Signal, SignalPlace
@@ -29,16 +30,11 @@ from eidrive_scenario.world.meshes.sign_faces import (
 from eidrive_scenario.world.meshes.signs import sign
 from eidrive_scenario.world.weather import Weather
 
-STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
-  <road name="" length="200" id="1" junction="-1"><link/>
-    <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
-    <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
-    <lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
-    <signals><signal id="L" name="" s="30" t="-5" zOffset="2" height="0.9" width="0.4" type="1000001" subtype="-1"
-      dynamic="yes" orientation="+"/><signal id="P" name="" s="30" t="-7" zOffset="2" height="0.6" width="0.4"
-      type="1000002" subtype="-1" dynamic="yes" orientation="+"/><signal id="S" name="" s="30" t="1" zOffset="2"
-      height="0.8" width="0.8" type="206" country="DE" subtype="-1" dynamic="no" orientation="+"/></signals>
-  </road></OpenDRIVE>"""
+SIGNALS = """<signals><signal id="L" name="" s="30" t="-5" zOffset="2" height="0.9" width="0.4" type="1000001"
+  subtype="-1" dynamic="yes" orientation="+"/><signal id="P" name="" s="30" t="-7" zOffset="2" height="0.6" width="0.4"
+  type="1000002" subtype="-1" dynamic="yes" orientation="+"/><signal id="S" name="" s="30" t="1" zOffset="2"
+  height="0.8" width="0.8" type="206" country="DE" subtype="-1" dynamic="no" orientation="+"/></signals>"""
+STREET = map_xml(road_xml(length=200.0, lanes=lanes_xml(0, 1, 4), extra=SIGNALS))
 
 
 def looking(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:

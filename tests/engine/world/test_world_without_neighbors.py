@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from opendrive_xml import elevation_xml, lanes_xml, map_xml, road_xml, superelevation_xml
 from sample_car import CarFactory
 
 from eidrive_scenario.roads import RoadNetwork
@@ -16,20 +17,14 @@ from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
 from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics
 
-HILL = """<OpenDRIVE>
-  <header revMajor="1" revMinor="6" name="" version="1.0"/>
-  <road name="" length="400" id="1" junction="-1">
-    <planView><geometry s="0" x="0" y="0" hdg="0.4" length="400"><line/></geometry></planView>
-    <elevationProfile><elevation s="0" a="1" b="0.04" c="0.0005" d="0"/></elevationProfile>
-    <lateralProfile><superelevation s="0" a="0.03" b="0" c="0" d="0"/></lateralProfile>
-    <lanes><laneSection s="0">
-      <center><lane id="0" type="none" level="false"/></center>
-      <right>
-        <lane id="-1" type="driving" level="false"><width sOffset="0" a="30" b="0" c="0" d="0"/></lane>
-      </right>
-    </laneSection></lanes>
-  </road>
-</OpenDRIVE>"""
+HILL = map_xml(
+    road_xml(
+        length=400.0,
+        hdg=0.4,
+        profiles=elevation_xml(1, 0.04, 0.0005) + superelevation_xml(0.03),
+        lanes=lanes_xml(0, 1, 30),
+    )
+)
 
 
 def wild_ride(tick: int) -> Control:

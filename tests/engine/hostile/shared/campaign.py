@@ -1,6 +1,6 @@
 """Mutants of all scenarios and roads of the library, and of the corpora where they are present, through check and run.
 
-    python tests/engine/hostile/shared/campaign.py --count 3000 --out /tmp/mutants
+    PYTHONPATH=tests/shared python tests/engine/hostile/shared/campaign.py --count 3000 --out mutants
 
 prints a line for each mutant that ends in an internal error, blocks, or needs too much time or memory, and keeps its
 file. The mutants of a seed are the same on every machine with the same files. Set OPENBLAS_NUM_THREADS and
@@ -20,8 +20,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 from mutants import mutant
+from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
+from storyboard_xml import init_xml, lane_position_xml, speed_xml, teleport_xml
 from trial import TIME_LIMIT, Outcome, attempt
 
 from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
@@ -125,32 +128,18 @@ def _scenario_on(source: Path) -> str:
         )
     except (InputError, StopIteration):
         place = ("0", -1)
-    cars = "".join(_CAR.format(name=name, controller=_AGENT if name == "Ego" else "") for name in ("Ego", "Other"))
-    starts = "".join(
-        _START.format(name=name, road=place[0].replace("&", "&amp;").replace('"', "&quot;"), lane=place[1], s=s)
-        for name, s in (("Ego", 1.0), ("Other", 14.0))
-    )
-    return _SCENARIO.format(cars=cars, starts=starts)
-
-
-_SCENARIO = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="" description=""/>
-<CatalogLocations/><RoadNetwork><LogicFile filepath="ROADS"/></RoadNetwork>
-<Entities>{cars}</Entities>
-<Storyboard><Init><Actions>{starts}</Actions></Init><StopTrigger/></Storyboard></OpenSCENARIO>"""
-_CAR = """<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="car">
-<BoundingBox><Center x="1.4" y="0" z="0.75"/><Dimensions width="1.8" length="4.5" height="1.5"/></BoundingBox>
-<Performance maxSpeed="50" maxAcceleration="5" maxDeceleration="9"/><Axles>
-<FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
-<RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles><Properties/>
-</Vehicle>{controller}</ScenarioObject>"""
-_AGENT = """<ObjectController><Controller name="c"><Properties><Property name="module" value="eidrive"/>
-<Property name="detector" value="lidar"/><Property name="obey_signals" value="true"/></Properties></Controller>
-</ObjectController>"""
-_START = """<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>
-<LanePosition roadId="{road}" laneId="{lane}" s="{s}"/></Position></TeleportAction></PrivateAction>
-<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time"
-value="0"/><SpeedActionTarget><AbsoluteTargetSpeed value="10"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
-</PrivateAction></Private>"""
+    agent = agent_xml(detector="lidar", obey_signals="true")
+    positions = {"Ego": 1.0, "Other": 14.0}
+    return scenario_xml(
+        road=road_file_xml("ROADS"),
+        entities="".join(object_xml(name, controller=agent if name == "Ego" else "") for name in positions),
+        init="".join(
+            init_xml(
+                name, teleport_xml(lane_position_xml(place[1], s, escape(place[0], {'"': "&quot;"}))), speed_xml(10)
+            )
+            for name, s in positions.items()
+        ),
+    ).decode()
 
 
 def main() -> int:

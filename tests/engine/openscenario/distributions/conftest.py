@@ -1,15 +1,12 @@
+"""Fixtures that write distribution files."""
+
+from __future__ import annotations
+
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-DISTRIBUTION = """<OpenSCENARIO>
-<FileHeader revMajor="1" revMinor="{minor}" date="2026-01-31T12:00:00" description="a test" author="test"/>
-<ParameterValueDistribution>
-<ScenarioFile filepath="scenario.xosc"/>
-{body}
-</ParameterValueDistribution>
-</OpenSCENARIO>"""
+from openscenario_xml import distribution_xml
 
 
 @pytest.fixture
@@ -19,7 +16,7 @@ def distribution_file(tmp_path: Path) -> Callable[..., Path]:
     def write(body: str, *, minor: int = 3) -> Path:
         (tmp_path / "scenario.xosc").touch()
         path = tmp_path / "distribution.xosc"
-        path.write_text(DISTRIBUTION.format(minor=minor, body=body), encoding="utf-8")
+        path.write_bytes(distribution_xml(body, minor=minor))
         return path
 
     return write

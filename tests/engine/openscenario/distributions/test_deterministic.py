@@ -7,23 +7,17 @@ from pathlib import Path
 
 import pytest
 from lxml import etree
+from openscenario_xml import deterministic_xml, scenario_xml, single_xml, values_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 
 Write = Callable[..., Path]
 
-SINGLE = '<DeterministicSingleParameterDistribution parameterName="{}">{}</DeterministicSingleParameterDistribution>'
-
-
-def values(name: str, *texts: str) -> str:
-    elements = "".join(f'<Element value="{text}"/>' for text in texts)
-    return SINGLE.format(name, f"<DistributionSet>{elements}</DistributionSet>")
-
 
 def steps(name: str, lower: str, upper: str, step: str) -> str:
     limits = f'<Range lowerLimit="{lower}" upperLimit="{upper}"/>'
-    return SINGLE.format(name, f'<DistributionRange stepWidth="{step}">{limits}</DistributionRange>')
+    return single_xml(name, f'<DistributionRange stepWidth="{step}">{limits}</DistributionRange>')
 
 
 def sets(*choices: dict[str, str]) -> str:
@@ -38,17 +32,15 @@ def sets(*choices: dict[str, str]) -> str:
     )
 
 
-def deterministic(*distributions: str) -> str:
-    return "<Deterministic>\n" + "\n".join(distributions) + "\n</Deterministic>"
-
-
 def texts(path: Path) -> list[str]:
     return [run.parameters["P"] for run in load_distribution(path)]
 
 
 @pytest.mark.element("DistributionSet", "ValueSetDistribution")
 def test_combinations_have_the_order_of_the_file(distribution_file: Write, tmp_path: Path) -> None:
-    body = deterministic(values("A", "1", "2"), sets({"B": "x", "C": "u"}, {"B": "y", "C": "v"}), values("D", "on"))
+    body = deterministic_xml(
+        values_xml("A", "1", "2"), sets({"B": "x", "C": "u"}, {"B": "y", "C": "v"}), values_xml("D", "on")
+    )
     runs = load_distribution(distribution_file(body))
     assert len(runs) == 4
     assert [list(run.parameters.items()) for run in runs] == [
@@ -67,14 +59,15 @@ def test_combinations_have_the_order_of_the_file(distribution_file: Write, tmp_p
 
 
 def test_values_have_lines(distribution_file: Write) -> None:
-    path = distribution_file(deterministic(values("A", "1"), steps("B", "0", "1", "1"), sets({"C": "x"})))
+    path = distribution_file(deterministic_xml(values_xml("A", "1"), steps("B", "0", "1", "1"), sets({"C": "x"})))
     origins = {name: given.origin for name, given in load_distribution(path)[0].assignments.items()}
     assert origins == {"A": (str(path), 6), "B": (str(path), 7), "C": (str(path), 8)}
 
 
 def test_tree_without_lines_is_expanded(distribution_file: Write) -> None:
     """Elements that a program creates have no lines."""
-    tree = etree.parse(distribution_file(deterministic(values("A", "1", "2"), sets({"C": "x"}, {"C": "y"}))))
+    body = deterministic_xml(values_xml("A", "1", "2"), sets({"C": "x"}, {"C": "y"}))
+    tree = etree.parse(distribution_file(body))
     for node in tree.iter("*"):
         node.sourceline = 0
     found = {tuple(run.parameters.items()) for run in load_distribution(tree)}
@@ -99,7 +92,7 @@ def test_tree_without_lines_is_expanded(distribution_file: Write) -> None:
 def test_range_has_exact_decimal_steps(
     distribution_file: Write, lower: str, upper: str, step: str, expected: list[str]
 ) -> None:
-    assert texts(distribution_file(deterministic(steps("P", lower, upper, step)))) == expected
+    assert texts(distribution_file(deterministic_xml(steps("P", lower, upper, step)))) == expected
 
 
 def test_empty_deterministic_is_one_run_without_assignments(distribution_file: Write) -> None:
@@ -109,7 +102,7 @@ def test_empty_deterministic_is_one_run_without_assignments(distribution_file: W
 
 def test_expansion_creates_runs_on_access(distribution_file: Write) -> None:
     """For 10⁹ runs the count and any run are available immediately, and an iteration needs constant memory."""
-    body = deterministic(*(steps(name, "1", "1000", "1") for name in "ABC"))
+    body = deterministic_xml(*(steps(name, "1", "1000", "1") for name in "ABC"))
     runs = load_distribution(distribution_file(body))
     assert len(runs) == 10**9
     assert runs[123_456_789].parameters == {"A": "124", "B": "457", "C": "790"}
@@ -126,7 +119,9 @@ def test_expansion_creates_runs_on_access(distribution_file: Write) -> None:
 
 def test_spread_covers_all_values(distribution_file: Write) -> None:
     sizes = {"A": 5, "B": 4, "C": 7, "D": 6}
-    runs = load_distribution(distribution_file(deterministic(*(steps(n, "1", str(m), "1") for n, m in sizes.items()))))
+    runs = load_distribution(
+        distribution_file(deterministic_xml(*(steps(n, "1", str(m), "1") for n, m in sizes.items())))
+    )
     assert len(runs) == 840
     for name, size in sizes.items():
         taken = [runs[number].parameters[name] for number in runs.spread(2 * size)]
@@ -150,14 +145,14 @@ def test_spread_covers_all_values(distribution_file: Write) -> None:
         ([steps("P", "0", "1", "0")], 6, "stepWidth is 0; specify a number above zero"),
         ([steps("P", "0", "1", "-1")], 6, "stepWidth is -1; specify a number above zero"),
         (
-            [values("P", "1"), sets({"P": "2"})],
+            [values_xml("P", "1"), sets({"P": "2"})],
             7,
             "parameter 'P' is also varied by another distribution; see line 6",
         ),
         ([sets({"P": "$Other"})], 6, "value of ParameterAssignment: unknown parameter $Other"),
         ([steps("A", "0", "1", "1e-9"), steps("B", "0", "1", "1e-9"), steps("C", "0", "1", "1e-9")], 5, "1.0e+27 runs"),
         (
-            [SINGLE.format("P", '<UserDefinedDistribution type="mine">x</UserDefinedDistribution>')],
+            [single_xml("P", '<UserDefinedDistribution type="mine">x</UserDefinedDistribution>')],
             6,
             "UserDefinedDistribution of 'P' is specific to another tool; write DistributionSet or DistributionRange",
         ),
@@ -166,7 +161,7 @@ def test_spread_covers_all_values(distribution_file: Write) -> None:
 def test_invalid_distribution_error_has_line(
     distribution_file: Write, distributions: list[str], line: int, message: str
 ) -> None:
-    path = distribution_file(deterministic(*distributions))
+    path = distribution_file(deterministic_xml(*distributions))
     with pytest.raises(ScenarioError) as caught:
         load_distribution(path)
     assert [(diagnostic.source, diagnostic.line) for diagnostic in caught.value.diagnostics] == [(str(path), line)]
@@ -174,7 +169,7 @@ def test_invalid_distribution_error_has_line(
 
 
 def test_duplicate_assignment_in_set_is_an_error(distribution_file: Write) -> None:
-    body = deterministic(sets({"P": "1"})).replace(
+    body = deterministic_xml(sets({"P": "1"})).replace(
         "</ParameterValueSet>", '<ParameterAssignment parameterRef="P" value="2"/></ParameterValueSet>'
     )
     with pytest.raises(ScenarioError, match=r":6: ParameterValueSet assigns 'P' twice; remove one"):
@@ -182,7 +177,7 @@ def test_duplicate_assignment_in_set_is_an_error(distribution_file: Write) -> No
 
 
 def test_missing_scenario_file_is_an_error(distribution_file: Write) -> None:
-    path = distribution_file(deterministic())
+    path = distribution_file(deterministic_xml())
     path.write_text(path.read_text(encoding="utf-8").replace("scenario.xosc", "scenaro.xosc"), encoding="utf-8")
     with pytest.raises(
         ScenarioError, match=r":4: ScenarioFile: scenario 'scenaro\.xosc' does not exist; did you mean 'scenario'\?"
@@ -190,14 +185,14 @@ def test_missing_scenario_file_is_an_error(distribution_file: Write) -> None:
         load_distribution(path)
 
 
-def test_scenario_and_distribution_are_distinguished(distribution_file: Write, scenario_xml: Write) -> None:
+def test_scenario_and_distribution_are_distinguished(distribution_file: Write) -> None:
     with pytest.raises(ScenarioError, match="the file is a scenario, not a parameter value distribution"):
         load_distribution(bytes(scenario_xml()))
     with pytest.raises(ScenarioError, match="the file is a parameter value distribution, not a scenario"):
-        load_scenario(distribution_file(deterministic()))
+        load_scenario(distribution_file(deterministic_xml()))
 
 
 def test_distributions_require_version_1_1(distribution_file: Write) -> None:
     with pytest.raises(ScenarioError, match=r"part of OpenSCENARIO since 1\.1; the version of the file is 1\.0"):
-        load_distribution(distribution_file(deterministic(), minor=0))
-    assert len(load_distribution(distribution_file(deterministic(), minor=1))) == 1
+        load_distribution(distribution_file(deterministic_xml(), minor=0))
+    assert len(load_distribution(distribution_file(deterministic_xml(), minor=1))) == 1

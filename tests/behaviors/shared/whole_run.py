@@ -5,23 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-from street_scene import CAR, GROUP, NOTHING, OURS, STREET, TRIGGER, at
+from openscenario_xml import road_file_xml, round_car_xml, scenario_xml
+from storyboard_xml import act_xml, acts_xml, condition_xml, end_xml, init_xml, trigger_xml
+from street_scene import AGENT, NOTHING, STREET, at, groups_of
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
 
-FILE = """<OpenSCENARIO>
-  <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="scene" author="test"/>
-  <MonitorDeclarations><MonitorDeclaration name="Passed" value="false"/></MonitorDeclarations>
-  <CatalogLocations/><RoadNetwork><LogicFile filepath="street.xodr"/>{signals}</RoadNetwork>
-  <Entities>{cars}{more}</Entities>
-  <Storyboard><Init><Actions>{everywhere}{private}</Actions></Init>
-    <Story name="story"><Act name="act">{groups}{start}</Act></Story>
-    <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
-    <SimulationTimeCondition value="{end}" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
-    </StopTrigger></Storyboard></OpenSCENARIO>"""
+MONITOR = '<MonitorDeclarations><MonitorDeclaration name="Passed" value="false"/></MonitorDeclarations>'
 
 
 class RecordedRun:
@@ -57,14 +49,14 @@ class RecordedRun:
 
 
 class Run:
-    """Run of actions in the complete simulation: `run(end, (actor, action[, condition]), …)`.
+    """Runner of actions in the complete simulation: `run(end, (actor, action[, condition]), …)`.
 
-    Ego is in lane -1 at 100 m, driven by default. With a condition `start` the act starts by that, and its triggering
-    entities act in all groups.
+    Ego starts in lane -1 at 100 m, driven by default. With a condition `start` the act starts by that, and its
+    triggering entities act in all groups.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
 
     def __call__(
         self,
@@ -85,45 +77,26 @@ class Run:
         edge: str = "none",
         delay: float = 0.0,
     ) -> RecordedRun:
-        (self._folder / "street.xodr").write_text(street)
-        groups = "".join(
-            GROUP.format(
-                number=number,
-                actor=actor,
-                action=action,
-                trigger=TRIGGER.format(edge=edge, condition=condition[0]) if condition else "",
-            )
-            for number, (actor, action, *condition) in enumerate(steps)
-        )
-        groups = groups.replace('delay="0"', f'delay="{delay}"')
-        if start:
-            start = TRIGGER.format(edge=edge, condition=start).replace('delay="0"', f'delay="{delay}"')
-            groups = groups.replace('selectTriggeringEntities="false"', 'selectTriggeringEntities="true"')
+        (self.folder / "street.xodr").write_text(street)
         places = {"Ego": ego, **(others or {})}
-        text = FILE.format(
-            cars="".join(CAR.format(name=n, controller=OURS if driven and n == "Ego" else "") for n in places),
-            more=more,
-            everywhere=globally,
-            private="".join(f'<Private entityRef="{name}">{at(*place)}</Private>' for name, place in places.items())
-            + init,
-            start=start,
-            groups=groups or GROUP.format(number=0, actor="Ego", action=NOTHING, trigger=""),
-            end=end,
-            signals=signals,
+        groups = groups_of(steps or [("Ego", NOTHING)], edge=edge, delay=delay, selecting=bool(start))
+        begins = trigger_xml(condition_xml(start, edge, delay)) if start else ""
+        path = self.folder / "scene.xosc"
+        path.write_bytes(
+            scenario_xml(
+                declarations=MONITOR,
+                road=road_file_xml("street.xodr") + signals,
+                entities="".join(round_car_xml(n, AGENT if driven and n == "Ego" else "") for n in places) + more,
+                init=globally + "".join(init_xml(name, at(*place)) for name, place in places.items()) + init,
+                story=acts_xml(act_xml(groups, begins)),
+                stop=end_xml(end),
+            )
         )
-        path = self._folder / "scene.xosc"
-        path.write_text(text)
         record = RecordedRun()
         simulation = Simulation(load_scenario(path), seed=seed, settings=settings or RunSettings(), observers=[record])
         record.during = None if during is None else lambda frame: during(simulation, frame)
         record.result = simulation.run()
         return record
-
-
-@pytest.fixture
-def run(tmp_path: Path) -> Run:
-    """Return a function that runs actions in the complete simulation."""
-    return Run(tmp_path)
 
 
 def slope(values: list[float], start: float, end: float, dt: float = 0.05) -> float:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-CATEGORIES = '<VehicleCategoryDistributionEntry category="car" weight="1"/>'
-DRIVER = '<Controller name="d"><Properties><Property name="{}" value="{}"/></Properties></Controller>'
-DEFINITION = (
-    '<TrafficDefinition name="mix"><VehicleCategoryDistribution>{}</VehicleCategoryDistribution>'
-    '<ControllerDistribution><ControllerDistributionEntry weight="1">{}</ControllerDistributionEntry>'
-    "</ControllerDistribution></TrafficDefinition>"
-)
+from storyboard_xml import global_xml, lane_position_xml, time_xml
+from whole_run import RecordedRun
+
 PEDESTRIAN = (
     '<Pedestrian name="walker" mass="70" pedestrianCategory="pedestrian"><BoundingBox><Center x="0" y="0" z="0.9"/>'
     '<Dimensions width="0.5" length="0.5" height="1.8"/></BoundingBox></Pedestrian>'
@@ -21,17 +17,24 @@ VEHICLE = (
     "</Vehicle>"
 )
 
-FASTER = (
-    "<PrivateAction><LongitudinalAction><SpeedAction>"
-    '<SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>'
-    '<SpeedActionTarget><AbsoluteTargetSpeed value="30"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
-    "</PrivateAction>"
-)
-
 
 def traffic(inside: str, name: str = "crowd") -> str:
     given = f' trafficName="{name}"' if name else ""
-    return f"<GlobalAction><TrafficAction{given}>{inside}</TrafficAction></GlobalAction>"
+    return global_xml(f"<TrafficAction{given}>{inside}</TrafficAction>")
+
+
+def definition(*categories: tuple[str, float], **properties: object) -> str:
+    """Return a traffic definition of vehicle categories with weights, by default cars, and properties of its driver."""
+    shares = "".join(
+        f'<VehicleCategoryDistributionEntry category="{category}" weight="{weight}"/>'
+        for category, weight in categories or (("car", 1),)
+    )
+    given = "".join(f'<Property name="{name}" value="{value}"/>' for name, value in properties.items())
+    return (
+        f'<TrafficDefinition name="mix"><VehicleCategoryDistribution>{shares}</VehicleCategoryDistribution>'
+        '<ControllerDistribution><ControllerDistributionEntry weight="1"><Controller name="d"><Properties>'
+        f"{given}</Properties></Controller></ControllerDistributionEntry></ControllerDistribution></TrafficDefinition>"
+    )
 
 
 def distribution(*entities: tuple[float, str]) -> str:
@@ -57,7 +60,7 @@ def swarm(
 
 
 def position(s: float, lane: int = -1) -> str:
-    return f'<Position><LanePosition roadId="1" laneId="{lane}" s="{s}"/></Position>'
+    return f"<Position>{lane_position_xml(lane, s)}</Position>"
 
 
 def source(rate: float, s: float, *, more: str = "", **given: float) -> str:
@@ -82,4 +85,10 @@ def road_range(start: float, end: float, lanes: str = "") -> str:
 
 
 def at_time(value: float) -> str:
-    return f'<ByValueCondition><SimulationTimeCondition value="{value}" rule="greaterOrEqual"/></ByValueCondition>'
+    return time_xml(value, "greaterOrEqual")
+
+
+def crowd(played: RecordedRun, time: float, name: str = "crowd") -> list[str]:
+    """Return the names of the road users of a traffic at a time."""
+    frame = played.frames[round(time / 0.05)]
+    return [one for one in frame.view.names if one.startswith(f"{name}.")]

@@ -1,0 +1,74 @@
+"""RelativeClearanceCondition: lanes, range and free space.
+
+Ego drives at 20 m/s from x = 100 in lane -1.
+"""
+
+from __future__ import annotations
+
+import pytest
+from recorded_scene import RunScene, first_start
+from storyboard_xml import by_entity_xml
+from street_scene import NOTHING
+
+
+@pytest.mark.element("RelativeClearanceCondition")
+@pytest.mark.parametrize(
+    ("other", "opposite", "clear"),
+    [
+        ((-2, 120, 20), "false", False),
+        ((-2, 140, 20), "false", True),
+        ((-2, 85, 20), "false", False),
+        ((-2, 75, 20), "false", True),
+        ((-1, 110, 20), "false", True),
+        ((1, 110, 20), "true", True),
+    ],
+)
+def test_clearance_in_the_right_lane_depends_on_the_range(
+    scene: RunScene, other: tuple[int, float, float], opposite: str, clear: bool
+) -> None:
+    """The range is 30 m ahead and 20 m behind in the lane to the right."""
+    condition = by_entity_xml(
+        f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="false" '
+        f'oppositeLanes="{opposite}"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
+    )
+    assert first_start(scene(0.2, ("Ego", NOTHING, condition), other=other)) == (0.0 if clear else None)
+
+
+@pytest.mark.element("RelativeClearanceCondition")
+@pytest.mark.parametrize(
+    ("s", "free_space", "clear"),
+    [(130.5, "false", True), (130.5, "true", False), (131.5, "true", True), (77, "true", False), (75, "true", True)],
+)
+def test_clearance_with_free_space_counts_the_whole_box(
+    scene: RunScene, s: float, free_space: str, clear: bool
+) -> None:
+    """The box of Other extends from 1 m behind its reference point to 4 m ahead of it."""
+    condition = by_entity_xml(
+        f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="{free_space}" '
+        f'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
+    )
+    assert first_start(scene(0.2, ("Ego", NOTHING, condition), other=(-2, s, 20))) == (0.0 if clear else None)
+
+
+@pytest.mark.parametrize(("free_space", "time"), [("true", 0.1), ("false", None)])
+def test_clearance_with_free_space_counts_a_side_in_the_lane(
+    scene: RunScene, free_space: str, time: float | None
+) -> None:
+    """From 0.1 s Other is 1.5 m beside the center of a 4 m lane; its side is 0.5 m inside the lane to the right."""
+    condition = by_entity_xml(
+        f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="{free_space}" '
+        f'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
+    )
+    aside = """<PrivateAction><LateralAction><LaneOffsetAction continuous="false">
+      <LaneOffsetActionDynamics dynamicsShape="step"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="-1.5"/>
+      </LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
+    played = scene(0.3, ("Ego", NOTHING, condition), ("Other", aside), other=(-1, 110, 20), edge="falling")
+    assert first_start(played) == (None if time is None else pytest.approx(time))
+
+
+def test_clearance_without_the_lane_is_false(scene: RunScene) -> None:
+    condition = by_entity_xml(
+        '<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="false" '
+        'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
+    )
+    assert first_start(scene(0.2, ("Ego", NOTHING, condition), ego=(-2, 100, 20))) is None

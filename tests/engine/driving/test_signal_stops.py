@@ -1,0 +1,181 @@
+"""Vehicles that stop for traffic lights and stop signs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from opendrive_xml import map_xml, road_xml
+from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
+from signal_street import CAR, EAST, ROUND, light, stop_sign, street
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    end_xml,
+    event_xml,
+    group_xml,
+    init_xml,
+    lane_position_xml,
+    maneuver_xml,
+    teleport_xml,
+    time_xml,
+    trigger_xml,
+)
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.control.pid_controller import PidController
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
+from eidrive_scenario.driving.planning.signal_stops import BEFORE_LINE, WAIT, SignalStops
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.requests import Goal
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import SignalReading
+from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.signals import SignalSensor
+from eidrive_scenario.simulation import run_file
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import Placement
+
+
+class Drive:
+    """Car that follows its lane from x = 20 m at 10 m/s with the readings of a signal sensor."""
+
+    def __init__(self, roads: RoadNetwork, *, obeys: bool = True) -> None:
+        self.world = World(roads, dt=0.05)
+        self.world.add(CAR, Placement(20.0, -1.75, speed=10.0), driven=True)
+        settings = AgentSettings.model_validate({"obey_signals": obeys, "target_speed": 10.0})
+        self.planner = RoutePlanner(settings, CAR, roads, dt=0.05, seed=0)
+        self.controller = PidController(CAR, 0.05)
+        self.sensor = SignalSensor(CAR, roads)
+        self.rig = Rig(CAR, {})
+        self.reasons: list[str] = []
+
+    def run(self, seconds: float, states: Mapping[str, str]) -> tuple[float, float]:
+        """Run for a duration [s]; return the position of its front [m] and its speed [m/s]."""
+        for _ in range(round(seconds / 0.05)):
+            view = self.world.view()
+            ego = self.rig.read(self.world, view).ego
+            self.planner.observe_signals(self.sensor.read(self.world, view, 0, states))
+            plan = self.planner.plan(ego, Detections(view.time), Goal(), view.time)
+            self.reasons.append(plan.reason)
+            self.world.step({}, {"Ego": self.controller.control(ego, plan)})
+        view = self.world.view()
+        return float(view.position[0, 0]) + 1.4 + 2.446, float(view.speed[0])
+
+
+def test_car_stops_at_red_and_continues_at_green() -> None:
+    """The light is at 120 m: the front stops within two meters before it, and passes it at green."""
+    drive = Drive(street(light("east", 120.0)))
+    front, speed = drive.run(18.0, {"east": "red"})
+    assert 118.0 < front < 120.0
+    assert abs(speed) < 0.05
+    assert drive.reasons[-1] == "stop at traffic light east"
+    front, speed = drive.run(6.0, {"east": "green"})
+    assert front > 130.0
+    drive.world.close()
+
+
+def test_car_without_obey_signals_passes_red() -> None:
+    drive = Drive(street(light("east", 120.0)), obeys=False)
+    front, speed = drive.run(12.0, {"east": "red"})
+    assert front > 130.0
+    assert speed == pytest.approx(10.0, abs=0.5)
+    drive.world.close()
+
+
+def test_car_passes_light_that_turns_too_late() -> None:
+    """Green until the front is 6 m before the line: stopping from 10 m/s would require 8 m/s²."""
+    drive = Drive(street(light("east", 120.0)))
+    front = 0.0
+    while front < 114.0:
+        front, _ = drive.run(0.05, {"east": "green"})
+    front, speed = drive.run(3.0, {"east": "red"})
+    assert front > 135.0
+    assert speed > 9.0
+    drive.world.close()
+
+
+def test_car_stops_and_waits_at_stop_sign() -> None:
+    drive = Drive(street(stop_sign("stop", 100.0)))
+    fronts, speeds = [], []
+    for _ in range(440):
+        front, speed = drive.run(0.05, {})
+        fronts.append(front)
+        speeds.append(speed)
+    standing = np.abs(speeds) < 0.1
+    assert 98.0 < fronts[int(np.argmax(standing))] < 100.0
+    assert np.count_nonzero(standing) * 0.05 == pytest.approx(WAIT, abs=0.6)
+    assert fronts[-1] > 110.0
+    drive.world.close()
+
+
+def test_interrupted_wait_at_stop_sign_restarts() -> None:
+    stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
+    stops.follow(EAST)
+    stops.signals.see([SignalReading("stop", "")])
+    at_line = 100.0 - CAR.offset[0] - CAR.size[0] / 2.0 - BEFORE_LINE
+    assert stops.next(at_line, 0.0, 0.0) is not None
+    assert stops.next(at_line, 0.0, WAIT - 0.1) is not None
+    assert stops.next(150.0, 5.0, 20.0) is None, "pushed on"
+    assert stops.next(at_line, 0.0, 60.0) is not None
+    assert stops.next(at_line, 0.0, 60.0 + WAIT) is None
+
+
+def test_stop_sign_applies_on_every_lap() -> None:
+    """The wait of the first lap does not count on the second."""
+    stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
+    stops.follow(np.concatenate([ROUND, ROUND[1:]]))
+    stops.signals.see([SignalReading("stop", "")])
+    at_line = 60.0 - CAR.offset[0] - CAR.size[0] / 2.0 - BEFORE_LINE
+    for lap, now in ((0.0, 0.0), (320.0, 60.0)):
+        assert stops.next(lap + at_line - 20.0, 8.0, now) is not None
+        assert stops.next(lap + at_line, 0.0, now + 3.0) is not None
+        assert stops.next(lap + at_line, 0.0, now + 3.0 + WAIT) is None
+        assert stops.next(lap + at_line + 2.0, 2.0, now + 8.0) is None
+
+
+SET_STATE = """<GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction name="7" state="{}"/>
+</TrafficSignalAction></InfrastructureAction></GlobalAction>"""
+
+
+class Track:
+    """Observer of the position of the ego's front, by time."""
+
+    def __init__(self) -> None:
+        self.fronts: dict[float, float] = {}
+
+    def observe(self, frame: Frame) -> None:
+        place = float(frame.view.position[frame.view.row("Ego"), 0])
+        self.fronts[round(frame.view.time, 2)] = place + 1.4 + 2.25
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("obeys", [True, False])
+def test_scenario_with_light_stops_obeying_car_until_green(tmp_path: Path, obeys: bool) -> None:
+    """Light of the storyboard at 80 m: red from the start, green from 18 s on."""
+    road = road_xml(length=400.0, extra=f"<signals>{light('7', 80.0)}</signals>")
+    (tmp_path / "street.xodr").write_text(map_xml(road))
+    later = trigger_xml(condition_xml(time_xml(18, "greaterOrEqual")))
+    path = tmp_path / "light.xosc"
+    path.write_bytes(
+        scenario_xml(
+            road=road_file_xml("street.xodr"),
+            entities=object_xml("Ego", controller=agent_xml(target_speed=10, obey_signals=str(obeys).lower())),
+            init=SET_STATE.format("red") + init_xml("Ego", teleport_xml(lane_position_xml(-1, 20))),
+            story=acts_xml(act_xml(group_xml(maneuver_xml(event_xml("turns", SET_STATE.format("green"), later)), ""))),
+            stop=end_xml(26),
+        )
+    )
+    track = Track()
+    assert run_file(path, seed=0, observers=[track]).end_reason == "stop trigger"
+    if obeys:
+        assert 78.0 < track.fronts[17.95] < 80.0
+        assert track.fronts[26.0] > 95.0
+    else:
+        assert track.fronts[17.95] > 95.0
