@@ -68,8 +68,6 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         message = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
         yield MapWarning(GEOMETRY_GAP, spans, message, "start it at s=0", curves[0].line)
     for one, other in pairwise(curves):
-        if one.line is not None and one.line == other.line:
-            continue
         missing = other.s - one.s - one.length
         if abs(missing) > JUMP:
             relation = "ends before the next one starts" if missing > 0.0 else "overlaps the next one"

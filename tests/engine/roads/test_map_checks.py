@@ -43,6 +43,18 @@ def test_disconnected_geometries_are_a_warning(second: dict[str, float], rule: s
     assert map_warnings(map_xml(road_xml(geometry=two_lines(**second))))[0] == (rule, message)
 
 
+def test_geometries_in_one_line_of_the_file_are_compared() -> None:
+    """Tools write maps without line breaks."""
+    text = map_xml(road_xml(geometry=two_lines(y=1.0).replace("\n", "")))
+    assert map_warnings(text) == [("geometry-gap", "road '1' jumps by 1 m at s = 50 m")]
+
+
+def test_parts_of_one_geometry_give_no_warning() -> None:
+    """A poly3 is divided into parts; v = 0.001 u² + 0.00001 u³."""
+    bend = '<geometry s="0" x="0" y="0" hdg="0.3" length="100"><poly3 a="0" b="0" c="0.001" d="0.00001"/></geometry>'
+    assert map_warnings(map_xml(road_xml(geometry=bend))) == []
+
+
 @pytest.mark.parametrize("second", [{"y": 0.008}, {"h": 0.0008}, {"h": 2 * math.pi}, {"h": 0.5}, {"s": 50.004}])
 def test_rounding_and_corners_give_no_warning(second: dict[str, float]) -> None:
     assert map_warnings(map_xml(road_xml(geometry=two_lines(**second)))) == []
