@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from openscenario_xml import parameters_xml
 from storyboard_xml import (
     condition_xml,
     element_state_xml,
@@ -119,8 +120,10 @@ def test_stop_trigger_ends_the_run(build: Any) -> None:
 
 
 def test_criteria_in_the_stop_trigger_do_not_stop_the_run(build: Any) -> None:
-    stop = condition_xml(time_xml(-1), name="criteria_CollisionTest")
-    storyboard = build(STARTS, stop=groups_xml(stop))
+    """ScenarioRunner evaluates conditions on parameters with such names; this condition is true."""
+    fulfilled = '<ByValueCondition><ParameterCondition parameterRef="P" rule="equalTo" value="1"/></ByValueCondition>'
+    stop = groups_xml(condition_xml(fulfilled, name="criteria_CollisionTest"))
+    storyboard = build(STARTS, stop=stop, declared=parameters_xml(P=("double", "1")))
     play(storyboard, 2)
     assert storyboard.ended is None
 
