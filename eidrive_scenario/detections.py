@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
+import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.records import fast_frozen
 
 NOT_ESTIMATED: Array = np.empty(0)
 """Existence of objects for which no tracker and no fusion method has estimated it."""
@@ -17,9 +16,7 @@ NOT_ESTIMATED.flags.writeable = False
 CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Detections:
+class Detections(msgspec.Struct, frozen=True):
     """Perceived objects at one instant.
 
     boxes       (N, 7) x y z l w h yaw of the box center in the world frame [m, rad]
@@ -32,13 +29,13 @@ class Detections:
     """
 
     time: float
-    boxes: Array = field(default_factory=lambda: np.empty((0, 7)))
-    scores: Array = field(default_factory=lambda: np.empty(0))
+    boxes: Array = msgspec.field(default_factory=lambda: np.empty((0, 7)))
+    scores: Array = msgspec.field(default_factory=lambda: np.empty(0))
     classes: tuple[str, ...] = ()
-    velocity: Array = field(default_factory=lambda: np.empty((0, 2)))
-    covariance: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
+    velocity: Array = msgspec.field(default_factory=lambda: np.empty((0, 2)))
+    covariance: Array = msgspec.field(default_factory=lambda: np.empty((0, 2, 2)))
     tracks: tuple[int, ...] = ()
-    existence: Array = field(default_factory=lambda: NOT_ESTIMATED)
+    existence: Array = msgspec.field(default_factory=lambda: NOT_ESTIMATED)
 
     def __post_init__(self) -> None:
         count = len(self.boxes)

@@ -9,13 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import msgspec
+
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.records import fast_frozen
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Goal:
+class Goal(msgspec.Struct, frozen=True):
     """Goal of a driven vehicle that the storyboard sets; for None the settings of the agent apply.
 
     speed         current target speed [m/s]

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import msgspec
 
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.requests import Goal, Overrides
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
@@ -49,21 +50,18 @@ class StackContext:
     allow_torchscript: bool = False
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class StackInputs:
+class StackInputs(msgspec.Struct, frozen=True):
     """Requests and states of the scenario that a stack receives in one tick.
 
     goals    requests to driven vehicles, by name; a vehicle without an entry uses its own settings
     signals  states of the traffic signals, by id
     """
 
-    goals: Mapping[str, Goal] = field(default_factory=dict)
-    signals: Mapping[str, str] = field(default_factory=dict)
+    goals: Mapping[str, Goal] = msgspec.field(default_factory=dict)
+    signals: Mapping[str, str] = msgspec.field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class StackSettings:
+class StackSettings(msgspec.Struct, frozen=True):
     """Settings of a stack as the result of a run states them. All values are JSON types.
 
     channel          name of the channel profile
@@ -75,9 +73,9 @@ class StackSettings:
 
     channel: str = NO_COOPERATION
     channel_profile: dict[str, Any] | None = None
-    stations: Mapping[str, dict[str, Any]] = field(default_factory=dict)
-    extensions: Mapping[str, str] = field(default_factory=dict)
-    versions: Mapping[str, str] = field(default_factory=dict)
+    stations: Mapping[str, dict[str, Any]] = msgspec.field(default_factory=dict)
+    extensions: Mapping[str, str] = msgspec.field(default_factory=dict)
+    versions: Mapping[str, str] = msgspec.field(default_factory=dict)
 
 
 class DrivingStack(ABC):

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import msgspec
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage
 from eidrive_scenario.world.actor import Control
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Plan:
+class Plan(msgspec.Struct, frozen=True):
     """Trajectory: points (M, 2) [m], the speed at each point (M,) [m/s], and the reason for them."""
 
     points: Array
@@ -28,9 +25,7 @@ class Plan:
     """Objects that are the reason for the plan, as rows of the objects passed to the planner."""
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class AgentStep:
+class AgentStep(msgspec.Struct, frozen=True):
     """Step of one station: detections, received messages, fused objects, plan, control and sent messages."""
 
     detections: Detections

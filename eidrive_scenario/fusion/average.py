@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
@@ -16,7 +17,6 @@ from eidrive_scenario.assignment import MAX_SCALAR as MAX_SCALAR_PAIRS
 from eidrive_scenario.assignment import associate, associate_small
 from eidrive_scenario.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.records import replaced
 
 MAX_SCALAR = 16
 """Maximum number of boxes for scalar evaluation, which is then faster than arrays."""
@@ -47,13 +47,13 @@ class AverageFusion(FusionMethod):
             only = present[0]
             if only.time == now:
                 return only
-            return replaced(only, time=now)
+            return replace(only, time=now)
         labels = self._labels(present)
         small = len(labels) <= MAX_SCALAR
         fused = fuse_average_small(present, labels, now) if small else fuse_average(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
-        return replaced(fused, existence=joint_existence(present, labels))
+        return replace(fused, existence=joint_existence(present, labels))
 
     def _labels(self, reports: Sequence[Detections]) -> list[int]:
         """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance."""

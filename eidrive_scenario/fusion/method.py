@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
+
+import msgspec
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.message import StationState
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Report:
+class Report(msgspec.Struct, frozen=True):
     """Detections of one station, measured at `detections.time` and received at `arrived` [s].
 
     state     reported state of the station; None if it is not reported

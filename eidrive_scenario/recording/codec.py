@@ -1,4 +1,4 @@
-"""Lossless JSON encoding of frozen dataclasses, derived from their field types.
+"""Lossless JSON encoding of records (frozen dataclasses and msgspec structs), derived from their field types.
 
 Numbers keep all 64 bits: Python writes the shortest decimal that reads back the same. Non-finite numbers are written as
 in protobuf's JSON mapping: "NaN", "Infinity", "-Infinity". Arrays are nested lists. An empty array is
@@ -15,6 +15,7 @@ from enum import Enum
 from functools import cache
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+import msgspec
 import numpy as np
 
 Json = Any
@@ -33,7 +34,7 @@ class Codec:
 
 @cache
 def codec(kind: Any) -> Codec:
-    """Return the codec of a type: scalar, enum, array, tuple, mapping, optional type, or a dataclass of these.
+    """Return the codec of a type: scalar, enum, array, tuple, mapping, optional type, or a record of these.
 
     Raise TypeError for any other type, before anything is encoded.
     """
@@ -56,7 +57,7 @@ def codec(kind: Any) -> Codec:
         return _sequence(tuple, (*arguments, ...))
     if isinstance(origin, type) and issubclass(origin, Mapping) and arguments[0] is str:
         return _mapping(codec(arguments[1]))
-    if is_dataclass(kind) and isinstance(kind, type):
+    if isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, msgspec.Struct)):
         return _record(kind)
     raise TypeError(f"{kind!r}: no JSON encoding is defined for this type")
 
@@ -131,8 +132,8 @@ def _mapping(value_codec: Codec) -> Codec:
 
 def _record(kind: type) -> Codec:
     hints = get_type_hints(kind)
-    codecs = {field.name: codec(hints[field.name]) for field in fields(kind)}
-    required = [f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
+    required = _required_by_field(kind)
+    codecs = {name: codec(hints[name]) for name in required}
 
     def encode(record: Any) -> Json:
         return {name: field.encode(getattr(record, name)) for name, field in codecs.items()}
@@ -141,4 +142,13 @@ def _record(kind: type) -> Codec:
         return kind(**{name: codecs[name].decode(value) for name, value in data.items()})
 
     properties = {name: field.schema for name, field in codecs.items()}
-    return Codec(encode, decode, {"type": "object", "properties": properties, "required": required})
+    names = [name for name, is_required in required.items() if is_required]
+    return Codec(encode, decode, {"type": "object", "properties": properties, "required": names})
+
+
+def _required_by_field(kind: type) -> dict[str, bool]:
+    """Return the fields of a record in order, and whether each one has no default."""
+    if issubclass(kind, msgspec.Struct):
+        return {field.name: field.required for field in msgspec.structs.fields(kind)}
+    found = fields(kind)  # type: ignore[arg-type]
+    return {field.name: field.default is MISSING and field.default_factory is MISSING for field in found}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+
+import msgspec
 
 from eidrive_scenario.driving.step import AgentStep
-from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.storyboard.state.states import StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world.appearance import Appearance
@@ -14,9 +14,7 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Frame:
+class Frame(msgspec.Struct, frozen=True):
     """Ground truth, steps of the stations, storyboard transitions and message outcomes of one tick.
 
     steps        step of each station, by name
@@ -29,10 +27,10 @@ class Frame:
     """
 
     view: WorldView
-    steps: Mapping[str, AgentStep] = field(default_factory=dict)
+    steps: Mapping[str, AgentStep] = msgspec.field(default_factory=dict)
     changes: tuple[StateChange, ...] = ()
     links: Sequence[LinkEvent] = ()
-    signals: Mapping[str, str] = field(default_factory=dict)
-    appearances: Mapping[str, Appearance] = field(default_factory=dict)
+    signals: Mapping[str, str] = msgspec.field(default_factory=dict)
+    appearances: Mapping[str, Appearance] = msgspec.field(default_factory=dict)
     environment: Environment | None = None
-    monitors: Mapping[str, bool] = field(default_factory=dict)
+    monitors: Mapping[str, bool] = msgspec.field(default_factory=dict)

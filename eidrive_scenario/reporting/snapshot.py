@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+from msgspec.structs import replace
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.records import fast_frozen
 
 FIELDS = frozenset({"truth", "camera", "lidar", "gnss", "imu"})
 """Kinds of sensors with a separate field in `Readings`."""
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class EgoState:
+class EgoState(msgspec.Struct, frozen=True):
     """Ego motion as measured by the station: reference point (3,) [m], angles [rad], speed along the heading [m/s]."""
 
     time: float
@@ -32,9 +29,7 @@ class EgoState:
     """Acceleration along the heading [m/s²]."""
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class TruthReading:
+class TruthReading(msgspec.Struct, frozen=True):
     """Objects in the line of sight of a truth sensor: the input of the oracle detector.
 
     names (N,), categories (N,), boxes (N, 7) in the world frame [m, rad], velocity (N, 2) [m/s], visibility (N,) share
@@ -48,8 +43,7 @@ class TruthReading:
     visibility: Array
 
 
-@dataclass(frozen=True)
-class CameraReading:
+class CameraReading(msgspec.Struct, frozen=True):
     """Image and camera pose.
 
     rgb (H, W, 3) uint8, depth (H, W) float32 along the optical axis [m], segmentation (H, W) int32: row of the actor in
@@ -62,11 +56,10 @@ class CameraReading:
     segmentation: NDArray[np.int32]
     intrinsics: Array
     pose: Array
-    distortion: Array = field(default_factory=lambda: np.zeros(5))
+    distortion: Array = msgspec.field(default_factory=lambda: np.zeros(5))
 
 
-@dataclass(frozen=True)
-class LidarReading:
+class LidarReading(msgspec.Struct, frozen=True):
     """Lidar point cloud.
 
     points (N, 3) in the sensor frame [m], intensity (N,) in [0, 1]; pose (4, 4) sensor to world; ring (N,) number of
@@ -77,12 +70,11 @@ class LidarReading:
     points: Array
     intensity: Array
     pose: Array
-    ring: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    azimuth: Array = field(default_factory=lambda: np.empty(0))
+    ring: NDArray[np.int32] = msgspec.field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    azimuth: Array = msgspec.field(default_factory=lambda: np.empty(0))
 
 
-@dataclass(frozen=True)
-class GnssReading:
+class GnssReading(msgspec.Struct, frozen=True):
     """Position of the reference point of the station, measured by GNSS.
 
     position (3,) in the world frame [m], covariance (3, 3) of its error [m²]
@@ -92,8 +84,7 @@ class GnssReading:
     covariance: Array
 
 
-@dataclass(frozen=True)
-class ImuReading:
+class ImuReading(msgspec.Struct, frozen=True):
     """Measurement of an IMU in the body frame, x forward, y left, z up.
 
     acceleration (3,) of the reference point without gravity [m/s²]; angular_rate (3,) about the axes [rad/s]
@@ -103,27 +94,24 @@ class ImuReading:
     angular_rate: Array
 
 
-@dataclass(frozen=True)
-class SignalReading:
+class SignalReading(msgspec.Struct, frozen=True):
     """Traffic light or stop sign in sight: its id in the road network, and its state."""
 
     id: str
     state: str
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Readings:
+class Readings(msgspec.Struct, frozen=True):
     """Readings of all sensors of one station; sensors that were not due in this tick are missing."""
 
     time: float
     ego: EgoState
     truth: TruthReading | None = None
-    cameras: Mapping[str, CameraReading] = field(default_factory=dict)
-    lidars: Mapping[str, LidarReading] = field(default_factory=dict)
+    cameras: Mapping[str, CameraReading] = msgspec.field(default_factory=dict)
+    lidars: Mapping[str, LidarReading] = msgspec.field(default_factory=dict)
     gnss: GnssReading | None = None
     imu: ImuReading | None = None
     signals: tuple[SignalReading, ...] = ()
     """Signals in sight, for stations with a signal sensor."""
-    others: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    others: Mapping[str, Mapping[str, Any]] = msgspec.field(default_factory=dict)
     """Readings of all other sensors, by kind and name."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
 from eidrive_scenario.openscenario import Scenario

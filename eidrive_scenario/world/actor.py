@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from eidrive_scenario.records import fast_frozen
+import msgspec
 
 Vector3 = tuple[float, float, float]
 
@@ -59,9 +59,7 @@ class ActorSpec:
         return self.wheelbase > 0.0
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Placement:
+class Placement(msgspec.Struct, frozen=True):
     """State of a scripted actor after the next step: reference point [m], angles [rad], speed [m/s]."""
 
     x: float
@@ -79,9 +77,7 @@ class Placement:
     """
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Control:
+class Control(msgspec.Struct, frozen=True):
     """Pedals and steering of a driven vehicle for the next step."""
 
     throttle: float = 0.0

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.records import fast_frozen
 
 FEW = 16
 """Maximum number of actors for which scalars are faster than arrays."""
@@ -48,9 +48,7 @@ class ActorState(NamedTuple):
     speed: float
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class WorldView:
+class WorldView(msgspec.Struct, frozen=True, dict=True):
     """All actors at time `time` [s]; one row per actor in the order of addition.
 
     position      (N, 3) of the reference point (OpenSCENARIO: rear axle center on the ground for vehicles) [m]
@@ -82,7 +80,7 @@ class WorldView:
     offset: Array
     contacts: tuple[Contact, ...] = ()
     unseen: tuple[str, ...] = ()
-    unseen_by: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    unseen_by: Mapping[str, tuple[str, ...]] = msgspec.field(default_factory=dict)
 
     def hidden_from(self, sensor: str) -> tuple[str, ...]:
         """Return the actors that the scenario hides from the sensor of this name."""
@@ -111,11 +109,9 @@ class WorldView:
         if len(kept) == len(self.names):
             return self
         arrays: dict[str, Any] = {
-            entry.name: value[kept]
-            for entry in fields(self)
-            if isinstance(value := getattr(self, entry.name), np.ndarray)
+            name: value[kept] for name in self.__struct_fields__ if isinstance(value := getattr(self, name), np.ndarray)
         }
-        return replace(
+        return msgspec.structs.replace(
             self,
             names=tuple(self.names[row] for row in kept),
             categories=tuple(self.categories[row] for row in kept),

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
 from eidrive_criteria.monitor import Monitor, MonitorSettings
+from msgspec.structs import replace
 
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
 

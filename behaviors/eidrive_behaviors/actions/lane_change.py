@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, largest_curvature

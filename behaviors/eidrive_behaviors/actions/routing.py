@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.teleport import describe_position

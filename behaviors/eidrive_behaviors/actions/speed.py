@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
+from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, speed_limiter

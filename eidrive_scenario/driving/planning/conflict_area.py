@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar
 
+from msgspec.structs import replace
 from pydantic import BeforeValidator, NonNegativeFloat, PositiveFloat
 
 from eidrive_scenario.detections import Detections
@@ -14,7 +15,6 @@ from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.geometry import point_in_polygon
-from eidrive_scenario.records import replaced
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
@@ -93,9 +93,9 @@ class ConflictAreaPlanner(RoutePlanner):
         if inside_area:
             self._last_sighting = now
             reason = f"{objects.classes[inside_area[0]]} in the conflict area"
-            return replaced(plan, reason=reason, braking=braking, objects=inside_area)
+            return replace(plan, reason=reason, braking=braking, objects=inside_area)
         if now - self._last_sighting < self.planner_settings.conflict_hold_time - TIME_TOLERANCE:
-            return replaced(plan, reason="an object was in the conflict area", braking=braking)
+            return replace(plan, reason="an object was in the conflict area", braking=braking)
         return plan
 
     def _in_areas(self, objects: Detections) -> tuple[int, ...]:

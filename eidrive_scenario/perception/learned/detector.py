@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from msgspec.structs import replace
 from pydantic import Field, model_validator
 
 from eidrive_scenario.arrays import Array

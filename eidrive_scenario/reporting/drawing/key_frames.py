@@ -8,6 +8,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
+
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import box_distance, points_in_polygon
@@ -171,4 +173,4 @@ class KeyFrames:
 
 def _portable(snapshot: StationSnapshot) -> StationSnapshot:
     """Return a copy whose view has no cached values, which cannot be pickled."""
-    return dataclasses.replace(snapshot, view=dataclasses.replace(snapshot.view))
+    return dataclasses.replace(snapshot, view=msgspec.structs.replace(snapshot.view))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any, ClassVar
 
+import msgspec
 import numpy as np
 import py_trees
 from py_trees.common import Status
@@ -131,7 +132,8 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         for actor in [self.context.actors[name] for name in names if name in self.context.actors]:
             values: dict[str, object] = {"motion.pose": actor.motion.pose, "motion.speed": actor.motion.speed}
             if actor.goal is not None:
-                values |= {f"goal.{name}": value for name, value in vars(actor.goal).items() if value is not None}
+                requested = msgspec.structs.asdict(actor.goal)
+                values |= {f"goal.{name}": value for name, value in requested.items() if value is not None}
             for name, value in values.items():
                 if not _is_finite(value):
                     text = f"left actor {actor.name!r} with {name} = {value!r} (expected finite numbers)"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.traffic.background import BackgroundTraffic

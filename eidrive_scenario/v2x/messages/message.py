@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 LineOfSight = Literal["los", "nlosv", "nlos"]
 """State of a line of sight: free, blocked by vehicles only, or by a building or the ground (3GPP TR 37.885, 6.2.1)."""
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class StationState:
+class StationState(msgspec.Struct, frozen=True):
     """State of the sender as it reports it: reference point [m], yaw [rad], speed [m/s], at station `time` [s].
 
     pose_covariance (3, 3) covariance of x, y and yaw, not included in the covariances of the reported objects; None:
@@ -34,9 +31,7 @@ class StationState:
     pose_covariance: NDArray[np.float64] | None = None
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class Message:
+class Message(msgspec.Struct, frozen=True):
     """Message with the objects of a station at station time `detections.time`, generated at true time `generated` [s].
 
     kind     cpm  collective perception message (ETSI TS 103 324): objects that the sender perceives
@@ -59,18 +54,14 @@ class Message:
     """Shared lidar point cloud of the sender, included in `size`; None if it is not shared."""
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class ReceivedMessage:
+class ReceivedMessage(msgspec.Struct, frozen=True):
     """Message at its receiver, with the time of arrival [s]."""
 
     message: Message
     arrived: float
 
 
-@fast_frozen
-@dataclass(frozen=True)
-class LinkEvent:
+class LinkEvent(msgspec.Struct, frozen=True):
     """Outcome of one message on one link: it arrives at `arrives` [s] or is lost for `reason`.
 
     Radio models also report the path loss with shadowing and blockage [dB], the signal-to-noise ratio without

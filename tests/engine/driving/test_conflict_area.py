@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.conflict_area import ConflictAreaPlanner, ConflictAreaSettings

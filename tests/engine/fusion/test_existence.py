@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.average import AverageFusion, fuse_average, fuse_average_small

@@ -6,11 +6,11 @@ import importlib.util
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError

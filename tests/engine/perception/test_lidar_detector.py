@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from opendrive_xml import map_xml, road_xml
 
 from eidrive_scenario.detections import Detections

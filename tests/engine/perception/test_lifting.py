@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from opendrive_xml import elevation_xml, map_xml, road_xml
 
 from eidrive_scenario.geometry import iou_bev, rotation_matrix

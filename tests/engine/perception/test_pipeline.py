@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.agent_factory import build_agent

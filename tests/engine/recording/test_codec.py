@@ -1,9 +1,10 @@
 """Lossless JSON encoding."""
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -76,7 +77,7 @@ def test_codec_of_unsupported_type_raises_type_error() -> None:
 
 def test_schema_of_frame_contains_all_fields() -> None:
     schema = codec(Frame).schema
-    assert set(schema["properties"]) == {f.name for f in fields(Frame)}
+    assert set(schema["properties"]) == {f.name for f in msgspec.structs.fields(Frame)}
     station = schema["properties"]["steps"]["additionalProperties"]
     assert station["properties"]["outbox"]["items"]["properties"]["sender"] == {"type": "string"}
 

@@ -4,10 +4,10 @@ import csv
 import io
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import CsvWriter

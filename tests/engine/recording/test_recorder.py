@@ -1,12 +1,12 @@
 """Recordings: lossless round trip, and reading of truncated files."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError, SettingError, SimulationError
 from eidrive_scenario.recording import Recorder, TraceHash, read_recording

@@ -1,10 +1,10 @@
 """Log of a run: one line per storyboard transition, with its reason."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import Frame, RunLog

@@ -1,13 +1,14 @@
 """Trace hash: equal for equal runs, different for every difference."""
 
+import dataclasses
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.recording import TraceHash
 from eidrive_scenario.recording.frame import Frame
@@ -60,7 +61,7 @@ def test_trace_hash_depends_on_names_contacts_changes_and_messages(make_frame: M
 
 def test_trace_hash_does_not_depend_on_reason_text(make_frame: MakeFrame) -> None:
     frame = make_frame(1)
-    reworded = replace(frame, changes=(replace(frame.changes[0], why="time above 3 s"),))
+    reworded = replace(frame, changes=(dataclasses.replace(frame.changes[0], why="time above 3 s"),))
     assert fingerprint(reworded) == fingerprint(frame)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import pickle
 from collections.abc import Callable
 from types import MappingProxyType
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -68,12 +68,12 @@ def test_hidden_frame_requires_missing_detection_of_ego(street: Play) -> None:
     for frame in street(None):
         seen = detections_of(frame.view, "Incoming")
         steps = {
-            "Ego": dataclasses.replace(
+            "Ego": msgspec.structs.replace(
                 frame.steps["Ego"], detections=seen if frame.view.time < 0.99 else detections_of(frame.view)
             ),
-            "RSU": dataclasses.replace(frame.steps["RSU"], detections=seen),
+            "RSU": msgspec.structs.replace(frame.steps["RSU"], detections=seen),
         }
-        frames.append(dataclasses.replace(frame, steps=steps))
+        frames.append(msgspec.structs.replace(frame, steps=steps))
     assert time_of(story_of(frames), "hidden") == pytest.approx(1.0)
 
 
@@ -101,7 +101,7 @@ def test_entered_frame_depends_on_center_of_car(street: Play) -> None:
 def test_closest_frame_of_contact_is_a_collision(street: Play) -> None:
     frames = street(1)
     blow = Contact("Ego", "Incoming", (0.0, 0.0, 0.0), 3.0)
-    frames[50] = dataclasses.replace(frames[50], view=dataclasses.replace(frames[50].view, contacts=(blow,)))
+    frames[50] = msgspec.structs.replace(frames[50], view=msgspec.structs.replace(frames[50].view, contacts=(blow,)))
     story = story_of(frames)
     assert (story.touched, time_of(story, "closest")) == (True, frames[50].view.time)
     assert story_of(street(1)).touched is False
@@ -144,7 +144,7 @@ def test_closest_frame_of_collision_is_first_contact(street: Play) -> None:
     """With an offset of 7.5 m of the ego, the two cars collide."""
     further = np.array([[7.5, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     frames = [
-        Frame(dataclasses.replace(frame.view, position=frame.view.position + further), frame.steps)
+        Frame(msgspec.structs.replace(frame.view, position=frame.view.position + further), frame.steps)
         for frame in street(None)
     ]
     story = story_of(frames)

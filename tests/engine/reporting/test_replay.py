@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lxml import html
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Callable
 
+import msgspec
 import numpy as np
 import pytest
 from lxml import etree
@@ -101,7 +101,7 @@ def test_snapshot_of_own_detections_over_channel_has_channel_delay(street: Play)
         state = StationState(frame.view.time, 0.0, 0.0, 0.0, 0.0, 0.0)
         back = Message("Ego", tick - 6, 0.0, state, sent[tick - 6], 100)
         inbox = (ReceivedMessage(back, frame.view.time),) if tick >= 6 else ()
-        step = dataclasses.replace(frame.steps["Ego"], inbox=inbox)
+        step = msgspec.structs.replace(frame.steps["Ego"], inbox=inbox)
         event = LinkEvent("Ego", "Ego", tick, frame.view.time, "delivered", frame.view.time + 0.3, "", 100)
         traveling.append(Frame(frame.view, {"Ego": step}, (), (event,)))
     assert len(snapshot_at(traveling, 5).own) == 0
@@ -114,7 +114,7 @@ def heard_by_ego(frames: list[Frame], *messages: Message) -> tuple[ReceivedMessa
     """Return the messages that Ego holds after it has received these in consecutive frames."""
     builder = SnapshotBuilder("Ego")
     for frame, message in zip(frames, messages, strict=False):
-        step = dataclasses.replace(frame.steps["Ego"], inbox=(ReceivedMessage(message, frame.view.time),))
+        step = msgspec.structs.replace(frame.steps["Ego"], inbox=(ReceivedMessage(message, frame.view.time),))
         snapshot = builder.observe(Frame(frame.view, {"Ego": step}))
     return snapshot.heard
 
@@ -125,7 +125,7 @@ def test_snapshot_keeps_cpm_after_cam_of_same_sender(street: Play) -> None:
     state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     seen = frames[0].steps["Ego"].detections
     report = Message("Rsu", 0, 0.0, state, seen, 100)
-    itself = Message("Rsu", 1, 0.05, state, dataclasses.replace(seen.subset([0]), time=0.05), 100, "cam")
+    itself = Message("Rsu", 1, 0.05, state, msgspec.structs.replace(seen.subset([0]), time=0.05), 100, "cam")
     heard = heard_by_ego(frames, report, itself)
     assert [(held.message.kind, len(held.message.detections)) for held in heard] == [("cpm", len(seen)), ("cam", 1)]
 
@@ -134,7 +134,7 @@ def test_snapshot_completes_partial_messages(street: Play) -> None:
     frames = street(None)
     state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     one = frames[0].steps["Ego"].detections.subset([0])
-    other = dataclasses.replace(one, time=0.05, boxes=one.boxes + np.eye(7)[0] * 20.0)
+    other = msgspec.structs.replace(one, time=0.05, boxes=one.boxes + np.eye(7)[0] * 20.0)
     parts = [
         Message("Rsu", n, now, state, held, 100, objects=(n,))
         for n, (now, held) in enumerate([(0.0, one), (0.05, other)])

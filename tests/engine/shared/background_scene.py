@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from fleet_scene import car, street, view_of
+from msgspec.structs import replace
 
 from eidrive_scenario.traffic import (
     BackgroundTraffic,

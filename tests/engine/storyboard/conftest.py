@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from opendrive_xml import lanes_xml, map_xml, road_xml
 from openscenario_xml import round_car_xml, scenario_xml
 from py_trees.common import Status

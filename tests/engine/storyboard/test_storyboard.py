@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from openscenario_xml import parameters_xml
 from storyboard_xml import (
     condition_xml,

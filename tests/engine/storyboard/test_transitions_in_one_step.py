@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 from openscenario_xml import variables_xml
 from storyboard_xml import (
     condition_xml,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from radio_traffic import DT, QUIET, exchange, message, radio
 
 from eidrive_scenario.v2x.messages.message import LinkEvent
@@ -61,7 +60,7 @@ def send_kinds(carrier: RadioChannel, ticks: int, *kinds: str) -> list[LinkEvent
     for tick in range(ticks):
         now = tick * DT
         carrier.update_environment(RadioEnvironment({"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}))
-        sent = [replace(message("A", tick * len(kinds) + part, now), kind=kind) for part, kind in enumerate(kinds)]  # type: ignore[arg-type]
+        sent = [replace(message("A", tick * len(kinds) + part, now), kind=kind) for part, kind in enumerate(kinds)]
         events += carrier.transmit([(one, ["B"]) for one in sent], now)
     return events
 

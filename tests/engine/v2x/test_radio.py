@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from radio_traffic import DT, QUIET, Place, exchange, message, radio
 
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
