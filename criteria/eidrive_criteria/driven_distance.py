@@ -30,6 +30,7 @@ class DrivenDistance(Criterion):
 
     settings_type = DrivenDistanceSettings
     name = "driven_distance"
+    unit = "m"
 
     def __init__(self, settings: DrivenDistanceSettings) -> None:
         super().__init__(settings)
@@ -63,7 +64,7 @@ class DrivenDistance(Criterion):
             passed=was_present and self._distance >= limit,
             value=self._distance if was_present else None,
             limit=limit,
-            unit="m",
+            unit=self.unit,
             first_violation=None,
             reason=f"{of} drove {self._distance:.1f} m" if was_present else actor_never_present([of]),
             fatal=self.fatal and self._late,

@@ -23,6 +23,7 @@ class MaxSpeed(Criterion):
 
     settings_type = MaxSpeedSettings
     name = "max_speed"
+    unit = "m/s"
 
     def __init__(self, settings: MaxSpeedSettings) -> None:
         super().__init__(settings)
@@ -54,7 +55,7 @@ class MaxSpeed(Criterion):
             passed=was_present and self._violated is None,
             value=self._fastest if was_present else None,
             limit=self._settings.at_most,
-            unit="m/s",
+            unit=self.unit,
             first_violation=self._violated,
             reason=reason,
             fatal=self.fatal and self._violated is not None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -31,8 +31,6 @@ class PairCriterion(Criterion):
 
     It also fails if both actors are never present at the same time.
     """
-
-    unit: ClassVar[str]
 
     def __init__(self, settings: PairSettings) -> None:
         super().__init__(settings)

@@ -33,6 +33,7 @@ class ReachPosition(Criterion):
 
     settings_type = ReachPositionSettings
     name = "reach_position"
+    unit = "m"
 
     def __init__(self, settings: ReachPositionSettings) -> None:
         super().__init__(settings)
@@ -69,7 +70,7 @@ class ReachPosition(Criterion):
             passed=self._reached is not None,
             value=self._nearest if math.isfinite(self._nearest) else None,
             limit=settings.within,
-            unit="m",
+            unit=self.unit,
             first_violation=None,
             reason=reason,
             fatal=self.fatal and self._late,

@@ -22,6 +22,7 @@ class TimeLimit(Criterion):
 
     settings_type = TimeLimitSettings
     name = "time_limit"
+    unit = "s"
 
     def __init__(self, settings: TimeLimitSettings) -> None:
         super().__init__(settings)
@@ -43,7 +44,7 @@ class TimeLimit(Criterion):
             passed=passed,
             value=self._time,
             limit=self._within,
-            unit="s",
+            unit=self.unit,
             first_violation=self._violated,
             reason=f"the run {verb} {self._time:.2f} s",
             fatal=self.fatal and not passed,

@@ -16,7 +16,14 @@ from eidrive_scenario.errors import (
     suggestion,
 )
 from eidrive_scenario.files.yaml_text import load_yaml
-from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
+from eidrive_scenario.geometry import (
+    box_distance,
+    footprint,
+    footprint_distance,
+    overlap,
+    point_in_polygon,
+    wrap_angle,
+)
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
@@ -56,6 +63,7 @@ __all__ = [
     "load_yaml",
     "overlap",
     "parse_settings",
+    "point_in_polygon",
     "suggestion",
     "wrap_angle",
 ]

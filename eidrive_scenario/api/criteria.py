@@ -10,12 +10,17 @@ from eidrive_scenario.evaluation.criterion import (
     actor_never_present,
     evaluate_criteria,
 )
+from eidrive_scenario.evaluation.safe_distance import SafeDistanceModel
+from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
 from eidrive_scenario.recording.frame import Frame
 
 __all__ = [
     "Criterion",
     "CriterionSettings",
     "Frame",
+    "Relation",
+    "SafeDistanceModel",
+    "Surroundings",
     "Verdict",
     "actor_never_present",
     "evaluate_criteria",

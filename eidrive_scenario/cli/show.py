@@ -50,6 +50,12 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
 
         width = max(len(rule.name) for rule in ALL_RULES)
         lines = [f"{rule.name:<{width}}  {rule.level.value:<7}  {rule.summary}" for rule in ALL_RULES]
+    elif what is Names.criteria:
+        from eidrive_scenario.evaluation.criteria_list import describe_criteria
+
+        rows = [(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()]
+        widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+        lines = [f"{name:<{widths[0]}}  {unit:<{widths[1]}}  {text}" for name, unit, text in rows]
     else:
         known = registry(what.value)
         width = max(map(len, known), default=0)

@@ -59,12 +59,14 @@ def parse_criteria(
     entities: Collection[str] | None = None,
     monitors: Collection[str] | None = None,
     scope: Scope | None = None,
+    has_roads: bool = True,
 ) -> tuple[CriterionDeclaration, ...]:
     """Return the criteria that the text of a command declares, in its order.
 
     entities  names of the entities of the scenario; None: the actors of the criteria are not checked
     monitors  names of the monitors of the scenario; None: the monitors of the criteria are not checked
     scope     parameters to which settings refer as `$name` or `${expression}`
+    has_roads  whether the scenario has roads
 
     Raise SettingError with file and line of every error.
     """
@@ -83,6 +85,7 @@ def parse_criteria(
             criterion = declaration.build()
             _check_known(criterion, criterion.subjects, "entity", entities, source, here)
             _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
+            _check_roads(criterion, has_roads, source, here)
         except SettingError as error:
             diagnostics.extend(error.diagnostics)
             continue
@@ -159,6 +162,12 @@ def _check_known(
                 for name in unknown
             ]
         )
+
+
+def _check_roads(criterion: Criterion, has_roads: bool, source: str, line: int | None) -> None:
+    if criterion.needs_roads and not has_roads:
+        message = f"criterion {criterion.name!r} requires roads, and the scenario has none"
+        raise SettingError(Diagnostic(message, "add a LogicFile to its RoadNetwork", source, line))
 
 
 def _free_name(name: str, taken: Collection[str]) -> str:

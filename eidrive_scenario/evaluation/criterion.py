@@ -11,8 +11,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.settings import Settings
 
 
@@ -49,17 +50,27 @@ class Criterion(ABC):
     """
 
     settings_type: ClassVar[type[CriterionSettings]] = CriterionSettings
+    unit: ClassVar[str] = ""
+    """Unit of the value and the limit; empty for counts and shares."""
     name: str
     fatal: bool = False
     subjects: tuple[str, ...] = ()
     """Names of the required actors, checked against the entities of the scenario before the run."""
     monitors: tuple[str, ...] = ()
     """Names of the evaluated MonitorDeclarations, checked before the run."""
+    needs_roads: ClassVar[bool] = False
+    """Whether the criterion requires roads; a scenario without roads is then an error before the run."""
+    roads: RoadNetwork | None = None
+    """Roads of the scenario, None without roads. Set by `bind` before the first frame."""
 
     def __init__(self, settings: CriterionSettings) -> None:
         if settings.name is not None:
             self.name = settings.name
         self.fatal = settings.fatal
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        """Set the roads of the scenario, once before the first frame."""
+        self.roads = roads
 
     @property
     def error_subject(self) -> str:
@@ -77,6 +88,14 @@ class Criterion(ABC):
     def metrics(self) -> Mapping[str, float]:
         """Return additional numbers, by names that start with the name of the criterion."""
         return {}
+
+
+def bind_roads(criterion: Criterion, roads: RoadNetwork | None) -> None:
+    """Bind a criterion to the roads of its scenario. Raise SettingError if it requires roads and there are none."""
+    if roads is None and criterion.needs_roads:
+        message = f"criterion {criterion.name!r} requires roads, and there are none"
+        raise SettingError(Diagnostic(message, "pass the road network of the scenario"))
+    criterion.bind(roads)
 
 
 def actor_never_present(names: Iterable[str]) -> str:
@@ -115,8 +134,15 @@ def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
     return metrics
 
 
-def evaluate_criteria(frames: Iterable[Frame], criteria: Sequence[Criterion]) -> tuple[Verdict, ...]:
-    """Return the verdicts of `criteria` over `frames`, for example of a recording."""
+def evaluate_criteria(
+    frames: Iterable[Frame], criteria: Sequence[Criterion], roads: RoadNetwork | None = None
+) -> tuple[Verdict, ...]:
+    """Return the verdicts of `criteria` over `frames`, for example of a recording.
+
+    roads  of the scenario. Raise SettingError if they are missing and a criterion requires them.
+    """
+    for criterion in criteria:
+        bind_roads(criterion, roads)
     for frame in frames:
         for criterion in criteria:
             criterion.observe(frame)

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 from eidrive_scenario.driving.stack import DrivingStack, StackInputs
 from eidrive_scenario.evaluation.criteria_parser import EXITS, build_criteria, exit_verdict, parse_criteria
-from eidrive_scenario.evaluation.criterion import Criterion, Verdict
+from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.commands import CHANNEL, CRITERION, PREFIX, DeclaredCriteria, command_key
 from eidrive_scenario.simulation.run_setup import RunSetup
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
@@ -30,6 +31,7 @@ class RunState:
     """
 
     scenario: Scenario
+    roads: RoadNetwork | None
     world: World
     stack: DrivingStack
     weather_fixed: bool
@@ -44,6 +46,7 @@ class RunState:
         """Return the state of a run before its first tick."""
         return cls(
             setup.scenario,
+            setup.roads,
             setup.world,
             setup.stack,
             weather_fixed=setup.weather is not None,
@@ -124,8 +127,12 @@ def add_criteria(command: CustomCommand, run: RunState) -> None:
             line=command.line,
             entities=run.scenario.entities,
             scope=command.scope,
+            has_roads=run.roads is not None,
         )
-    run.criteria += build_criteria(declarations, [criterion.name for criterion in run.criteria])
+    added = build_criteria(declarations, [criterion.name for criterion in run.criteria])
+    for criterion in added:
+        bind_roads(criterion, run.roads)
+    run.criteria += added
 
 
 def end_run(command: CustomCommand, run: RunState) -> None:

@@ -48,6 +48,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
             entities=scenario.entities,
             monitors=monitors,
             scope=command.scope,
+            has_roads=scenario.road_file is not None,
         )
 
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {

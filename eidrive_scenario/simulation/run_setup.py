@@ -9,7 +9,7 @@ from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFact
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.evaluation.criteria_parser import stop_trigger_criteria, unsupported_criteria
-from eidrive_scenario.evaluation.criterion import Criterion
+from eidrive_scenario.evaluation.criterion import Criterion, bind_roads
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.roads import RoadNetwork
@@ -69,6 +69,8 @@ def set_up_run(
         driving = build_stack(stack, _stack_context(scenario, roads, seed, settings, load_weights))
     with collector:
         criteria = tuple(stop_trigger_criteria(scenario))
+        for criterion in criteria:
+            bind_roads(criterion, roads)
     with collector:
         if settings.weather is not None:
             weather = load_weather(settings.weather, origin="--weather")

@@ -31,11 +31,19 @@ def car() -> type[Car]:
 
 @pytest.fixture
 def frame() -> MakeFrame:
-    """Return a function `frame(time, {"Ego": Car(…)}, contacts=[…])`; the reference point is the box center on the
-    ground.
+    """Return a function `frame(time, {"Ego": Car(…)}, contacts=[…], sizes={"Ego": (length, width, height)})`.
+
+    The reference point is the box center on the ground.
     """
 
-    def make(time: float, cars: Mapping[str, Car], contacts: Sequence[Contact] = ()) -> Frame:
+    def make(
+        time: float,
+        cars: Mapping[str, Car],
+        contacts: Sequence[Contact] = (),
+        sizes: Mapping[str, tuple[float, float, float]] | None = None,
+        signals: Mapping[str, str] | None = None,
+        categories: Mapping[str, str] | None = None,
+    ) -> Frame:
         table = np.array(list(cars.values()), dtype=float).reshape(-1, 4)
         zeros, ones = np.zeros(len(table)), np.ones((len(table), 1))
         x, y, yaw, speed = table.T
@@ -43,7 +51,7 @@ def frame() -> MakeFrame:
             time=time,
             tick=round(time / 0.05),
             names=tuple(cars),
-            categories=("car",) * len(table),
+            categories=tuple((categories or {}).get(name, "car") for name in cars),
             position=np.stack([x, y, zeros], axis=1),
             yaw=yaw,
             pitch=zeros,
@@ -52,10 +60,10 @@ def frame() -> MakeFrame:
             acceleration=np.zeros((len(table), 3)),
             yaw_rate=zeros,
             speed=speed,
-            size=ones * (4.0, 2.0, 1.5),
+            size=np.array([(sizes or {}).get(name, (4.0, 2.0, 1.5)) for name in cars]).reshape(-1, 3),
             offset=ones * (0.0, 0.0, 0.75),
             contacts=tuple(contacts),
         )
-        return Frame(view)
+        return Frame(view, signals=signals or {})
 
     return make

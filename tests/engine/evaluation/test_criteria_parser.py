@@ -15,7 +15,7 @@ from eidrive_scenario.evaluation.criteria_parser import (
     stop_trigger_criteria,
     unsupported_criteria,
 )
-from eidrive_scenario.evaluation.criterion import Criterion, Verdict
+from eidrive_scenario.evaluation.criterion import Criterion, Verdict, evaluate_criteria
 from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.recording.frame import Frame
@@ -110,6 +110,17 @@ def test_parse_criteria_reports_every_error_with_its_line() -> None:
         "a.xosc:14: unknown setting 'too'; did you mean 'to'?",
         "a.xosc:15: setting 'within' is 0; input should be greater than 0",
     ]
+
+
+def test_criterion_that_requires_roads_is_an_error_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Registry, "load", load_unnamed)
+    monkeypatch.setattr(Unnamed, "needs_roads", True)
+    assert diagnostics("collision: {}", has_roads=False) == [
+        "a.xosc:10: criterion 'collision' requires roads, and the scenario has none; add a LogicFile to its RoadNetwork"
+    ]
+    (criterion,) = parse("collision: {}")
+    with pytest.raises(SettingError, match="requires roads, and there are none"):
+        evaluate_criteria([], [criterion])
 
 
 def test_criterion_of_unknown_monitor_is_reported() -> None:

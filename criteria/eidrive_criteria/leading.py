@@ -1,0 +1,107 @@
+"""Base class of criteria on an actor and its leader: extreme of a quantity over time, compared with a limit."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from eidrive_scenario.api.common import RoadNetwork
+from eidrive_scenario.api.criteria import (
+    Criterion,
+    CriterionSettings,
+    Frame,
+    Relation,
+    Surroundings,
+    Verdict,
+    actor_never_present,
+)
+
+
+class LeaderSettings(CriterionSettings):
+    """Settings: `{of: Ego}` for the nearest actor ahead in the path of the actor, `{of: Ego, to: Lead}` for one actor
+    while it is ahead in that path.
+    """
+
+    of: str
+    to: str | None = None
+
+    @model_validator(mode="after")
+    def _two_actors(self) -> Self:
+        if self.of == self.to:
+            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
+        return self
+
+
+class LeaderCriterion(Criterion):
+    """Criterion on a quantity of an actor and its leader.
+
+    A criterion with a minimum fails below `limit`, one with a maximum above it. Without a leader it passes; its value
+    is then None.
+    """
+
+    quantity: ClassVar[str]
+    """Description of the quantity for reasons."""
+    largest: ClassVar[bool] = False
+    """Whether the extreme is a maximum."""
+
+    def __init__(self, settings: LeaderSettings, limit: float | None) -> None:
+        super().__init__(settings)
+        self.of, self.to, self.limit = settings.of, settings.to, limit
+        self.subjects = (settings.of,) if settings.to is None else (settings.of, settings.to)
+        self._surroundings = Surroundings(None)
+        self._missing = set(self.subjects)
+        self._extreme: float | None = None
+        self._when = math.nan
+        self._other = ""
+        self._violated: float | None = None
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        super().bind(roads)
+        self._surroundings = Surroundings(roads)
+
+    @abstractmethod
+    def measure(self, leader: Relation) -> float | None:
+        """Return the quantity with regard to the leader; None if it is not defined now."""
+
+    def observe(self, frame: Frame) -> None:
+        view = frame.view
+        if self._missing:
+            self._missing.difference_update(view.names)
+        leader = self._surroundings.leader(view, self.of, None if self.to is None else (self.to,))
+        value = self.measure(leader) if leader is not None else None
+        if value is None or leader is None:
+            return
+        if self._extreme is None or (value > self._extreme if self.largest else value < self._extreme):
+            self._extreme, self._when, self._other = value, view.time, leader.other
+        if self._violated is None and self.limit is not None:
+            exceeded = value > self.limit if self.largest else value < self.limit
+            self._violated = view.time if exceeded else None
+
+    def verdict(self) -> Verdict:
+        if self._missing:
+            reason = actor_never_present(self._missing)
+        elif self._extreme is None:
+            reason = f"{self.of} never had {self.to or 'an actor'} ahead in its path, so there is no {self.quantity}"
+        else:
+            value = f"{self._extreme:.2f} {self.unit}"
+            reason = f"{self.quantity} of {self.of} to {self._other} was {value} at {self._when:.2f} s"
+        return Verdict(
+            name=self.name,
+            passed=not self._missing and self._violated is None,
+            value=self._extreme,
+            limit=self.limit,
+            unit=self.unit,
+            first_violation=self._violated,
+            reason=reason,
+            fatal=self.fatal and self._violated is not None,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the extreme and its time [s]; empty without a value."""
+        if self._extreme is None:
+            return {}
+        return {f"{self.name}.{self.of}": self._extreme, f"{self.name}.{self.of}.time": self._when}

@@ -1,0 +1,154 @@
+"""Criterion: distances of Responsibility-Sensitive Safety (RSS)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from eidrive_scenario.api.common import RoadNetwork
+from eidrive_scenario.api.criteria import (
+    Criterion,
+    CriterionSettings,
+    Frame,
+    Relation,
+    SafeDistanceModel,
+    Surroundings,
+    Verdict,
+    actor_never_present,
+)
+
+STANDING = 0.1
+"""Maximum speed of a standing actor [m/s]."""
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class RssViolationSettings(CriterionSettings):
+    """Settings: `{of: Ego, to: Lead}`, or `{of: Ego}` for all actors; parameters of the model with CARLA's defaults.
+
+    reaction_time [s]; max_acceleration, min_braking, max_braking, min_braking_correct [m/s²];
+    lateral_acceleration, lateral_braking [m/s²]; lateral_margin [m]
+    share  share of the time in which the distances may be too small, 0 to 1
+    """
+
+    of: str
+    to: str | None = None
+    share: Annotated[float, Field(ge=0, le=1)] = 0.0
+    reaction_time: Annotated[float, Field(ge=0)] = 1.0
+    max_acceleration: Annotated[float, Field(ge=0)] = 3.5
+    min_braking: Positive = 4.0
+    max_braking: Positive = 8.0
+    min_braking_correct: Positive = 3.0
+    lateral_acceleration: Annotated[float, Field(ge=0)] = 0.2
+    lateral_braking: Positive = 0.8
+    lateral_margin: Annotated[float, Field(ge=0)] = 0.1
+
+    @model_validator(mode="after")
+    def _valid(self) -> Self:
+        if self.of == self.to:
+            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
+        if self.max_braking < self.min_braking:
+            raise ValueError(f"'max_braking' is less than 'min_braking' (got {self.max_braking} < {self.min_braking})")
+        return self
+
+    def model(self) -> SafeDistanceModel:
+        """Return the model of the minimum distances."""
+        return SafeDistanceModel(**self.model_dump(include=set(SafeDistanceModel.__dataclass_fields__)))
+
+
+class RssViolation(Criterion):
+    """Criterion that fails if the longitudinal and the lateral distance to an actor are both below those of RSS.
+
+    Excluded are actors behind, which have to keep the distance themselves, actors that cross the lane, for which RSS
+    has other rules, and the time in which the actor itself stands. The value is the share of the time with a violation;
+    a single violation fails the criterion unless `share` allows it.
+    """
+
+    settings_type = RssViolationSettings
+    name = "rss_violation"
+
+    def __init__(self, settings: RssViolationSettings) -> None:
+        super().__init__(settings)
+        self._settings, self._model = settings, settings.model()
+        self.subjects = (settings.of,) if settings.to is None else (settings.of, settings.to)
+        self._surroundings = Surroundings(None)
+        self._missing = set(self.subjects)
+        self._ticks = self._violations = 0
+        self._ratio, self._when, self._other = math.inf, math.nan, ""
+        self._first: float | None = None
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        super().bind(roads)
+        self._surroundings = Surroundings(roads)
+
+    def observe(self, frame: Frame) -> None:
+        view, settings = frame.view, self._settings
+        if self._missing:
+            self._missing.difference_update(view.names)
+        if settings.of not in view.rows:
+            return
+        self._ticks += 1
+        violated = False
+        for found in self._surroundings.relations(view, settings.of, None if settings.to is None else (settings.to,)):
+            behind = found.ahead < 0.0 and found.gap > 0.0
+            if behind or found.crosses or math.hypot(found.speed, found.side_speed) < STANDING:
+                continue
+            ratio = safety_ratio(self._model, found)
+            if ratio < self._ratio:
+                self._ratio, self._when, self._other = ratio, view.time, found.other
+            violated = violated or ratio < 1.0
+        if violated:
+            self._violations += 1
+            self._first = view.time if self._first is None else self._first
+
+    def verdict(self) -> Verdict:
+        of, share = self._settings.of, self._violations / self._ticks if self._ticks else None
+        passed = not self._missing and share is not None and share <= self._settings.share
+        if self._missing:
+            reason = actor_never_present(self._missing)
+        elif math.isfinite(self._ratio):
+            reason = (
+                f"{of} had {self._ratio:.2f} of the required distance to {self._other} at {self._when:.2f} s; the "
+                f"distance was too small in {share or 0.0:.1%} of the time"
+            )
+        else:
+            reason = f"{of} needed no distance from any actor"
+        return Verdict(
+            name=self.name,
+            passed=passed,
+            value=share,
+            limit=self._settings.share,
+            unit="",
+            first_violation=self._first if not passed else None,
+            reason=reason,
+            fatal=self.fatal and self._first is not None and self._settings.share == 0.0,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the share of the time with a violation, and the smallest ratio of distance to required distance."""
+        found = {f"{self.name}.share": self._violations / self._ticks} if self._ticks else {}
+        return found | ({f"{self.name}.ratio": self._ratio} if math.isfinite(self._ratio) else {})
+
+
+def safety_ratio(model: SafeDistanceModel, found: Relation) -> float:
+    """Return the larger ratio of distance to minimum distance, longitudinal and lateral; below 1 is dangerous.
+
+    It is infinite if a minimum distance is 0 at a distance above it.
+    """
+    if found.other_speed >= 0.0:
+        required = model.same_direction(max(found.speed, 0.0), found.other_speed) if found.gap > 0.0 else math.inf
+    else:
+        own, other = max(found.speed, 0.0), -found.other_speed
+        required = model.opposite(other, own) if found.wrong_way else model.opposite(own, other)
+    if found.left >= 0.0:
+        beside = model.lateral(-found.other_side_speed, -found.side_speed)
+    else:
+        beside = model.lateral(-found.side_speed, -found.other_side_speed)
+    return max(_ratio(found.gap, required), _ratio(found.side_gap, beside))
+
+
+def _ratio(distance: float, required: float) -> float:
+    return distance / required if required > 0.0 else math.inf

@@ -1,0 +1,244 @@
+"""Actors around one actor in the coordinates of its lane: gaps, speeds, the leader. Shared by criteria on pairs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from typing import NamedTuple
+
+from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
+from eidrive_scenario.world.view import WorldView
+
+RANGE = 200.0
+"""Maximum distance of the actors that are considered [m]."""
+CLOSE = 10.0
+"""Distance between bodies up to which straight coordinates apply to actors beside the lane [m]."""
+STANDING = 0.1
+"""Maximum speed of a standing actor [m/s]. Its heading is irrelevant for the role of a leader."""
+
+_Chain = Mapping[str, tuple[float, int, int]]
+
+
+class Relation(NamedTuple):
+    """Another actor in the coordinates of the lane of an actor: longitudinal forward, lateral to the left.
+
+    gap         longitudinal distance between the bodies [m]; 0 if they overlap longitudinally
+    ahead       longitudinal distance of the center of the other body [m], negative behind
+    side_gap    lateral distance between the bodies [m]; 0 if they overlap laterally
+    left        lateral distance of the center of the other body [m], negative to the right
+    speed, other_speed              along the lane [m/s], both positive in the direction of the actor
+    side_speed, other_side_speed    to the left [m/s]
+    wrong_way   whether the actor drives against the direction of its lane
+    """
+
+    other: str
+    gap: float
+    ahead: float
+    side_gap: float
+    left: float
+    speed: float
+    other_speed: float
+    side_speed: float
+    other_side_speed: float
+    wrong_way: bool = False
+
+    @property
+    def crosses(self) -> bool:
+        """Whether the other actor moves across the lane rather than along it."""
+        return abs(self.other_side_speed) > max(abs(self.other_speed), STANDING)
+
+    @property
+    def leads(self) -> bool:
+        """Whether the other actor is ahead in the path of the actor and does not approach it on its own."""
+        return self.ahead > 0.0 and self.side_gap == 0.0 and self.other_speed > -STANDING
+
+    @property
+    def closing_speed(self) -> float:
+        """Speed at which the gap to an actor ahead shrinks [m/s]."""
+        return self.speed - self.other_speed
+
+
+class _Body(NamedTuple):
+    """Extent and velocity of a body in a frame: position, half extents [m], velocity [m/s]."""
+
+    along: float
+    left: float
+    half_along: float
+    half_left: float
+    speed: float
+    side_speed: float
+
+
+class Surroundings:
+    """Relations of one actor to the others.
+
+    Along the lane of the actor up to the first fork, coordinates follow the lane. An actor on another road is placed in
+    straight coordinates if it is within CLOSE or beyond the fork; else it is ignored, as the road does not lead to it.
+    Without roads, or off the road, all coordinates are straight.
+    """
+
+    def __init__(self, roads: RoadNetwork | None) -> None:
+        self._roads = roads
+        self._chains: dict[tuple[LaneKey, int], tuple[_Chain, float]] = {}
+        self._hints: dict[str, LaneLocation | None] = {}
+
+    def relations(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Iterator[Relation]:
+        """Yield the relation to each other actor within RANGE, or to those named `to`; none if `of` is absent."""
+        row = view.rows.get(of)
+        if row is None:
+            return
+        boxes = view.plain_boxes
+        own = boxes[row]
+        near = [
+            other
+            for other, name in enumerate(view.names)
+            if other != row
+            and (to is None or name in to)
+            and abs(boxes[other][0] - own[0]) <= RANGE
+            and abs(boxes[other][1] - own[1]) <= RANGE
+            and abs(boxes[other][2] - own[2]) <= (boxes[other][5] + own[5]) / 2.0 + 2.0
+        ]
+        if not near:
+            return
+        lane = self._own_lane(view, row)
+        for other in near:
+            found = self._relation(view, row, other, lane)
+            if found is not None:
+                yield found
+
+    def leader(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Relation | None:
+        """Return the nearest actor ahead in the path of an actor, or None. `to` restricts the candidates."""
+        return min(
+            (found for found in self.relations(view, of, to) if found.leads), key=lambda each: each.gap, default=None
+        )
+
+    def _own_lane(self, view: WorldView, row: int) -> tuple[LaneLocation, int] | None:
+        """Return the location of an actor on its lane and its direction in s; None off the road."""
+        if self._roads is None:
+            return None
+        place, yaw = self._locate(view, row), view.plain_boxes[row][6]
+        if place is None or not self._roads.on_road(place):
+            return None
+        heading = self._roads.road_pose_at(place.road, place.s).h
+        return place, 1 if math.cos(yaw - heading) >= 0.0 else -1
+
+    def _relation(
+        self, view: WorldView, row: int, other: int, lane: tuple[LaneLocation, int] | None
+    ) -> Relation | None:
+        """Return the relation to another actor; None if the road bends away before it."""
+        found = self._straight(view, row, other) if lane is None else self._along_lane(view, row, other, *lane)
+        if found is None:
+            return None
+        a, b = found
+        ahead, left = b.along - a.along, b.left - a.left
+        return Relation(
+            other=view.names[other],
+            gap=max(abs(ahead) - a.half_along - b.half_along, 0.0),
+            ahead=ahead,
+            side_gap=max(abs(left) - a.half_left - b.half_left, 0.0),
+            left=left,
+            speed=a.speed,
+            other_speed=b.speed,
+            side_speed=a.side_speed,
+            other_side_speed=b.side_speed,
+            wrong_way=lane is not None and self._wrong_way(*lane),
+        )
+
+    def _wrong_way(self, place: LaneLocation, direction: int) -> bool:
+        assert self._roads is not None
+        return self._roads.driving_direction(place.road, place.lane) != direction
+
+    def _straight(self, view: WorldView, row: int, other: int) -> tuple[_Body, _Body]:
+        own, there = view.plain_boxes[row], view.plain_boxes[other]
+        dx, dy, yaw = there[0] - own[0], there[1] - own[1], own[6]
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return _body(view, row, 0.0, 0.0, yaw), _body(view, other, cos * dx + sin * dy, cos * dy - sin * dx, yaw)
+
+    def _along_lane(
+        self, view: WorldView, row: int, other: int, place: LaneLocation, direction: int
+    ) -> tuple[_Body, _Body] | None:
+        """Return both bodies in the coordinates of the lane."""
+        assert self._roads is not None
+        own, body = view.plain_boxes[row], view.plain_boxes[other]
+        there = self._locate(view, other)
+        roads, length = self._chain(place, direction)
+        begun = place.s if direction > 0 else self._roads.roads[place.road].length - place.s
+        if there is None or there.road not in roads:
+            distance = math.hypot(body[0] - own[0], body[1] - own[1]) - (own[3] + body[3]) / 2.0
+            bends_away = there is not None and CLOSE < distance < length - begun
+            return None if bends_away else self._straight(view, row, other)
+        start, way, lane = roads[there.road]
+        along = start + (there.s if way > 0 else self._roads.roads[there.road].length - there.s) - begun
+        if there.road == place.road:
+            left = (there.t - place.t) * direction
+        else:
+            left = (there.t - self._lane_t(there.road, lane, there.s)) * way - place.offset * direction
+        return (
+            _body(view, row, 0.0, 0.0, self._heading(place, direction)),
+            _body(view, other, along, left, self._heading(there, way)),
+        )
+
+    def _locate(self, view: WorldView, row: int) -> LaneLocation | None:
+        assert self._roads is not None
+        name = view.names[row]
+        x, y, z, *_ = view.plain_boxes[row]
+        place = self._roads.locate_at(x, y, self._hints.get(name), z)
+        self._hints[name] = place
+        return place
+
+    def _heading(self, place: LaneLocation, direction: int) -> float:
+        assert self._roads is not None
+        heading = self._roads.road_pose_at(place.road, place.s).h
+        return heading if direction > 0 else heading + math.pi
+
+    def _lane_t(self, road: str, lane: int, s: float) -> float:
+        """Return t of the center of a lane at s; that of the nearest lane of its side if it does not exist there."""
+        assert self._roads is not None
+        numbers = self._roads.lane_ids(road, s)
+        same = [number for number in numbers if (number > 0) == (lane > 0)] or list(numbers)
+        nearest = min(same, key=lambda number: abs(number - lane))
+        return self._roads.location(road, nearest, s).t
+
+    def _chain(self, place: LaneLocation, direction: int) -> tuple[_Chain, float]:
+        """Return the roads of the lane ahead up to a fork, and their length from the start of the first one [m].
+
+        Values are the distance of the start of the road, the direction in s and the lane at its start.
+        """
+        assert self._roads is not None
+        road = self._roads.roads[place.road]
+        key = LaneKey(place.road, road.section_at(place.s).index, place.lane)
+        known = self._chains.get((key, direction))
+        if known is not None:
+            return known
+        found = {place.road: (0.0, direction, place.lane)}
+        length, way, last = road.length, direction, key
+        while length - road.length <= RANGE:
+            ways = list(self._roads.links.beyond(last, way))
+            if len(ways) != 1:
+                break
+            (following, way), before = ways[0], last
+            if following.road != before.road:
+                if following.road in found:
+                    break
+                found[following.road] = (length, way, following.lane)
+                length += self._roads.roads[following.road].length
+            last = following
+        self._chains[key, direction] = found, length
+        return found, length
+
+
+def _body(view: WorldView, row: int, along: float, left: float, heading: float) -> _Body:
+    """Return an actor at a position of a frame whose longitudinal axis has the heading."""
+    _, _, _, length, width, _, yaw = view.plain_boxes[row]
+    state = view.states[row]
+    cos, sin = abs(math.cos(yaw - heading)), abs(math.sin(yaw - heading))
+    ahead, aside = math.cos(heading), math.sin(heading)
+    vx, vy = state.velocity_x, state.velocity_y
+    return _Body(
+        along,
+        left,
+        (length * cos + width * sin) / 2.0,
+        (length * sin + width * cos) / 2.0,
+        ahead * vx + aside * vy,
+        ahead * vy - aside * vx,
+    )

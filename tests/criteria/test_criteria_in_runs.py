@@ -1,0 +1,97 @@
+"""Every criterion in a run that passes it and in one that fails it, on the road of scenario 1.
+
+The Ego drives 40 m along its lane at 10 m/s behind a car at 8 m/s, 20 m ahead of it (bumper to bumper 16 m).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.registry import registry
+from eidrive_scenario.simulation import run_file
+
+ROAD = Path(__file__).parents[2] / "xosc" / "roads" / "coop_1.xodr"
+
+CAR = """<ScenarioObject name="{name}"><Vehicle name="car" vehicleCategory="car">
+<BoundingBox><Center x="0" y="0" z="0.75"/><Dimensions width="2" length="4" height="1.5"/></BoundingBox>
+<Performance maxSpeed="60" maxAcceleration="9" maxDeceleration="9"/>
+<Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="1.4" positionZ="0.3"/>
+<RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="-1.4" positionZ="0.3"/></Axles>
+<Properties/></Vehicle></ScenarioObject>"""
+
+START = """<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>
+<WorldPosition x="{x}" y="{y}" h="{h}"/></Position></TeleportAction></PrivateAction>
+<PrivateAction><LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
+</PrivateAction></Private>"""
+
+FILE = """<OpenSCENARIO>
+<FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" description="criteria" author="test"/>
+<CatalogLocations/><RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork><Entities>{cars}</Entities>
+<Storyboard><Init><Actions>
+<UserDefinedAction><CustomCommandAction type="eidrive.criterion">[{criteria}]</CustomCommandAction></UserDefinedAction>
+{starts}</Actions></Init>
+<StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
+<SimulationTimeCondition value="4" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup></StopTrigger>
+</Storyboard></OpenSCENARIO>"""
+
+ACTORS = {"Ego": (-70.0, 0.0, 0.0, 10.0), "Lead": (-50.0, 0.0, 0.0, 8.0), "Oncoming": (-10.0, 3.5, 3.14159265, 5.0)}
+
+CASES = {
+    "average_speed": ("{of: Ego, at_least: 9.9}", "{of: Lead, at_least: 9.9}"),
+    "collision": ("{of: Ego}", "{of: Rear}"),
+    "deceleration_to_avoid_crash": ("{of: Ego, at_most: 0.26}", "{of: Ego, at_most: 0.2}"),
+    "driven_distance": ("{of: Ego, at_least: 39}", "{of: Ego, at_least: 41}"),
+    "max_speed": ("{of: Ego, at_most: 10.1}", "{of: Ego, at_most: 9.9}"),
+    "min_distance": ("{of: Ego, to: Lead, at_least: 7.9}", "{of: Ego, to: Lead, at_least: 8.1}"),
+    "min_speed": ("{of: Ego, at_least: 9.9, after: 1}", "{of: Lead, at_least: 8.1, after: 1}"),
+    "post_encroachment_time": (
+        "{of: Ego, to: Oncoming, at_least: 1.5}",
+        "{of: Ego, to: Lead, at_least: 2.0}",
+    ),
+    "reach_position": ("{of: Ego, x: -40, y: 0}", "{of: Ego, x: -40, y: 9}"),
+    "reached_region": ("{of: Ego, region: [[-45, -2], [-35, 2]]}", "{of: Ego, region: [[-20, -2], [-10, 2]]}"),
+    "rss_violation": ("{of: Oncoming}", "{of: Ego}"),
+    "time_headway": ("{of: Ego, at_least: 0.79}", "{of: Ego, at_least: 0.81}"),
+    "time_limit": ("{within: 5}", "{within: 3, fatal: false}"),
+    "time_to_collision": ("{of: Ego, to: Lead, at_least: 3.9}", "{of: Ego, to: Lead, at_least: 4.1}"),
+}
+"""Settings with which a criterion passes and fails."""
+
+ELSEWHERE = {"monitor"}
+"""Criteria with runs in tests of their own."""
+
+
+def write_scenario(folder: Path, criteria: str, actors: dict[str, tuple[float, float, float, float]]) -> Path:
+    starts = "".join(START.format(name=name, x=x, y=y, h=h, speed=speed) for name, (x, y, h, speed) in actors.items())
+    path = folder / "criteria.xosc"
+    cars = "".join(CAR.format(name=name) for name in actors)
+    path.write_text(FILE.format(road=ROAD, cars=cars, starts=starts, criteria=criteria), encoding="utf-8")
+    return path
+
+
+def test_every_criterion_has_runs() -> None:
+    assert set(CASES) | ELSEWHERE == set(registry("criteria"))
+
+
+@pytest.mark.parametrize("index", [0, 1], ids=["passed", "failed"])
+def test_criteria_in_run(tmp_path: Path, index: int) -> None:
+    """A car 4 m behind the Ego, at 20 m/s, hits it: the criteria on the Ego are evaluated without it."""
+    chosen = {kind: cases[index] for kind, cases in CASES.items() if "Rear" not in cases[index]}
+    text = ", ".join(f"{kind}: {settings}" for kind, settings in chosen.items())
+    result = run_file(write_scenario(tmp_path, text, ACTORS))
+    assert {verdict.name: verdict.passed for verdict in result.criteria} == dict.fromkeys(chosen, index == 0)
+
+
+def test_collision_in_run(tmp_path: Path) -> None:
+    actors = {"Ego": (-50.0, 0.0, 0.0, 5.0), "Rear": (-60.0, 0.0, 0.0, 15.0)}
+    result = run_file(write_scenario(tmp_path, "collision: {of: Rear}", actors))
+    assert not result.passed
+
+
+def test_file_of_the_test_is_valid(tmp_path: Path) -> None:
+    assert not load_scenario(write_scenario(tmp_path, "collision: {of: Ego}", ACTORS)).warnings

@@ -1,0 +1,100 @@
+"""Relations of actors along lanes: a right turn with a known length."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.evaluation.surroundings import Surroundings
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world.view import WorldView
+
+ROADS = RoadNetwork.load(Path(__file__).parents[3] / "xosc" / "roads" / "coop_1.xodr")
+TURN = "105"
+"""Connecting road of the right turn from road 2 to road 3; 18.35 m long."""
+
+Pose = tuple[float, float, float, float]
+
+
+def view(**actors: Pose) -> WorldView:
+    """Return boxes 4 m by 2 m at x, y, yaw with a speed; the reference point is the center of the box."""
+    x, y, yaw, speed = np.array(list(actors.values())).T
+    count = len(actors)
+    zeros = np.zeros(count)
+    return WorldView(
+        time=0.0,
+        tick=0,
+        names=tuple(actors),
+        categories=("car",) * count,
+        position=np.stack([x, y, zeros], axis=1),
+        yaw=yaw,
+        pitch=zeros,
+        roll=zeros,
+        velocity=np.stack([speed * np.cos(yaw), speed * np.sin(yaw), zeros], axis=1),
+        acceleration=np.zeros((count, 3)),
+        yaw_rate=zeros,
+        speed=speed,
+        size=np.ones((count, 1)) * (4.0, 2.0, 1.5),
+        offset=np.ones((count, 1)) * (0.0, 0.0, 0.75),
+    )
+
+
+def at(road: str, lane: int, s: float, speed: float = 5.0) -> Pose:
+    """Return the pose at the center of a lane in its driving direction."""
+    pose = ROADS.lane_pose_at(road, lane, s)
+    return pose.x, pose.y, pose.h + (0.0 if ROADS.driving_direction(road, lane) > 0 else math.pi), speed
+
+
+def test_gap_to_leader_follows_the_lane_around_a_bend() -> None:
+    """10 m from the start of the turn to its end, 6 m on the next road: 24.35 m - 4 m along the reference line."""
+    length = ROADS.roads[TURN].length
+    following = next(ROADS.links.beyond_road(TURN, 1))[0]
+    assert following == "3"
+    lane = next(lane for lane in (-2, -1) if math.dist(at("3", lane, 0.0)[:2], at(TURN, -1, length)[:2]) < 0.5)
+    cars = view(Ego=at(TURN, -1, 2.0), Lead=at("3", lane, 6.0, speed=3.0))
+    leader = Surroundings(ROADS).leader(cars, "Ego")
+    assert leader is not None
+    assert leader.gap == pytest.approx(length - 2.0 + 6.0 - 4.0, abs=0.01)
+    assert leader.speed == pytest.approx(5.0)
+    assert leader.other_speed == pytest.approx(3.0)
+    assert leader.left == pytest.approx(0.0, abs=0.05)
+    assert Surroundings(None).leader(cars, "Ego") is None, "a straight path misses the car around the corner"
+
+
+def test_car_on_the_other_side_is_oncoming_beside() -> None:
+    cars = view(Ego=at("1", -1, 20.0), Other=at("1", 1, 60.0, speed=4.0))
+    (found,) = Surroundings(ROADS).relations(cars, "Ego")
+    assert found.gap == pytest.approx(36.0)
+    assert found.side_gap == pytest.approx(1.5)
+    assert found.other_speed == pytest.approx(-4.0)
+    assert not found.leads
+    assert not found.wrong_way
+
+
+def test_actor_in_the_wrong_lane_is_recognized() -> None:
+    x, y, yaw, speed = at("1", 1, 20.0)
+    cars = view(Ego=(x, y, yaw + math.pi, speed), Other=at("1", 1, 60.0))
+    (found,) = Surroundings(ROADS).relations(cars, "Ego")
+    assert found.wrong_way
+    assert found.gap == pytest.approx(36.0)
+
+
+def test_car_straight_across_the_junction_leads() -> None:
+    cars = view(Ego=at("1", -1, 90.0), Lead=at("2", -1, 10.0))
+    leader = Surroundings(ROADS).leader(cars, "Ego")
+    assert leader is not None
+    assert leader.gap == pytest.approx(10.0 + 34.5 + 10.0 - 4.0, abs=0.05)
+
+
+def test_actor_off_all_roads_has_straight_coordinates() -> None:
+    cars = view(Ego=(-500.0, -500.0, 0.0, 5.0), Lead=(-480.0, -500.0, 0.0, 0.0))
+    leader = Surroundings(ROADS).leader(cars, "Ego")
+    assert leader is not None
+    assert leader.gap == pytest.approx(16.0)
+
+
+def test_absent_actor_has_no_relations() -> None:
+    assert list(Surroundings(ROADS).relations(view(Lead=at("1", -1, 20.0)), "Ego")) == []
