@@ -13,6 +13,7 @@ from eidrive_scenario.openscenario.model.document import *
 from eidrive_scenario.openscenario.model.element import Element as Element
 from eidrive_scenario.openscenario.model.entities import *
 from eidrive_scenario.openscenario.model.entity_conditions import *
+from eidrive_scenario.openscenario.model.entity_enumerations import *
 from eidrive_scenario.openscenario.model.enumeration import Enumeration as Enumeration
 from eidrive_scenario.openscenario.model.enumerations import *
 from eidrive_scenario.openscenario.model.environment import *

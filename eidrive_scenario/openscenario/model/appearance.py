@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from eidrive_scenario.openscenario.model.content import CHOICE, SEQUENCE, Changed
 from eidrive_scenario.openscenario.model.element import Element, attribute, child
-from eidrive_scenario.openscenario.model.enumerations import (
+from eidrive_scenario.openscenario.model.entity_enumerations import (
     ColorType,
     LightMode,
     PedestrianGestureType,

@@ -8,7 +8,8 @@ from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Changed, Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, attribute, child
-from eidrive_scenario.openscenario.model.enumerations import AutomaticGearType, ControllerType
+from eidrive_scenario.openscenario.model.entity_enumerations import ControllerType
+from eidrive_scenario.openscenario.model.enumerations import AutomaticGearType
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.scalars import ControllerName
 

@@ -10,7 +10,12 @@ from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, Choice, choice, sequence
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
-from eidrive_scenario.openscenario.model.enumerations import MiscObjectCategory, ObjectType, PedestrianCategory, Role
+from eidrive_scenario.openscenario.model.entity_enumerations import (
+    MiscObjectCategory,
+    ObjectType,
+    PedestrianCategory,
+    Role,
+)
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.scalars import EntityName
 from eidrive_scenario.openscenario.model.sensors import Sensor

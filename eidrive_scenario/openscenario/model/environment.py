@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, attribute, child
-from eidrive_scenario.openscenario.model.enumerations import (
+from eidrive_scenario.openscenario.model.entity_enumerations import (
     CloudState,
     FractionalCloudCover,
     PrecipitationType,

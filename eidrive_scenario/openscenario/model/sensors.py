@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, attribute
-from eidrive_scenario.openscenario.model.enumerations import SensorCategory
+from eidrive_scenario.openscenario.model.entity_enumerations import SensorCategory
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.scalars import SensorName
 

@@ -9,7 +9,7 @@ from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
 from eidrive_scenario.openscenario.model.controllers import ControllerDistribution
 from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
 from eidrive_scenario.openscenario.model.entities import ScenarioObjectTemplate
-from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
+from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
 from eidrive_scenario.openscenario.model.positions import Position
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.scalars import EntityName, UnsignedInt

@@ -9,7 +9,7 @@ from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, attribute, child
-from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
+from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.sensors import SensorAttachments
 
