@@ -53,7 +53,7 @@ class Agent:
         fusion: FusionMethod,
         planner: Planner | None,
         controller: VehicleController | None,
-        speaker: MessageGenerator,
+        message_generator: MessageGenerator,
         dt: float,
         receives_messages: bool = True,
         points: PointCloudSharing | None = None,
@@ -70,7 +70,7 @@ class Agent:
         self.receives_messages = receives_messages
         """Whether the station receives messages; a station that does not drive may only transmit."""
         self.points = points
-        self._speaker = speaker
+        self._message_generator = message_generator
         self._clock = settings.clock
         self._partial: dict[str, PartialReportAssembler] = {}
         self._detections = Detections(0.0)
@@ -145,7 +145,7 @@ class Agent:
             fused=fused,
             plan=plan,
             control=self._control(ego, plan),
-            outbox=self._speaker.generate(
+            outbox=self._message_generator.generate(
                 state,
                 detections,
                 now,

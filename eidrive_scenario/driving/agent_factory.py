@@ -131,7 +131,7 @@ def build_agent(
         if planner == NO_PLANNER
         else construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed),
         controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
-        speaker=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
+        message_generator=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
         receives_messages=listens,
         points=points,

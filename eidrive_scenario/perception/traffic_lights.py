@@ -78,7 +78,7 @@ class SignalsAhead:
         """Set the path (M, 2) along which distances count."""
         self._on_path = sorted(_along(self._lines, path)) if self._lines else []
 
-    def see(self, readings: Iterable[SignalReading]) -> None:
+    def update(self, readings: Iterable[SignalReading]) -> None:
         """Update the states of signals in sight."""
         self._states.update((reading.id, reading.state) for reading in readings)
 

@@ -93,7 +93,7 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
             street_image(bodies, roads, view, pose, without=EGO),
         )
     )
-    for sender in dict.fromkeys(heard.message.sender for heard in snapshot.heard):
+    for sender in dict.fromkeys(report.message.sender for report in snapshot.received):
         pose = helper_view(view, sender, HIDDEN)
         png = street_image(bodies, roads, view, pose, without=sender)
         images.append(PageImage(f"View of {sender}", f"at {view.time:.2f} s, towards {HIDDEN}", png))

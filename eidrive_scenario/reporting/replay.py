@@ -192,8 +192,8 @@ def replay_data(
     """Return the data of the script of the page as plain lists, with lengths in cm and angles in mrad resolution.
 
     actors    category and size by name; poses[frame][name] = x, y, yaw of the box center, speed
-    stations  by name, for each frame: own and heard boxes [x, y, l, w, yaw], with the probability of existence as sixth
-              entry if it is estimated; links [sender, delivered]; reason of the plan
+    stations  by name, for each frame: own and received boxes [x, y, l, w, yaw], with the probability of existence as
+              sixth entry if it is estimated; links [sender, delivered]; reason of the plan
     changes   [time, path, after, why] of the storyboard transitions
 
     With a `report`, a frame that cannot be drawn is skipped and reported. `settings` of stations, by name, define the
@@ -267,7 +267,7 @@ def _size(part: Mapping[str, Any]) -> int:
         60
         if station is None
         else 120
-        + 40 * (len(station["own"]) + len(station["heard"]) + len(station["links"]))
+        + 40 * (len(station["own"]) + len(station["received"]) + len(station["links"]))
         + sum(len(sender) for sender, _ in station["links"])
         + len(station["plan"])
         for station in part["stations"].values()
@@ -279,7 +279,7 @@ def _station(snapshot: StationSnapshot) -> dict[str, Any]:
     plan = snapshot.step.plan if snapshot.step else None
     return {
         "own": _boxes(snapshot.own),
-        "heard": [box for heard in snapshot.heard for box in _boxes(heard.message.detections)],
+        "received": [box for report in snapshot.received for box in _boxes(report.message.detections)],
         "links": [[event.sender, event.outcome == "delivered"] for event in snapshot.links],
         "plan": plan.reason if plan else "",
     }

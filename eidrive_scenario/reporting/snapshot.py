@@ -23,17 +23,17 @@ LINK_LIFETIME = 0.15
 
 @dataclass(frozen=True)
 class StationSnapshot:
-    """Own detections (`own`), received messages (`heard`), fused detections and incoming links of a station.
+    """Own detections (`own`), received messages (`received`), fused detections and incoming links of a station.
 
-    own    detections that the station uses; if they pass the channel, those that have been delivered
-    heard  newest message per sender and kind, completed by earlier reports on objects that it omits
-    links  newest message outcome per sender
+    own       detections that the station uses; if they pass the channel, those that have been delivered
+    received  newest message per sender and kind, completed by earlier reports on objects that it omits
+    links     newest message outcome per sender
     """
 
     station: str
     view: WorldView
     own: Detections
-    heard: tuple[ReceivedMessage, ...]
+    received: tuple[ReceivedMessage, ...]
     fused: Detections
     links: tuple[LinkEvent, ...]
     step: AgentStep | None
@@ -50,7 +50,7 @@ class SnapshotBuilder:
     def __init__(self, station: str, settings: AgentSettings = DEFAULT_SETTINGS) -> None:
         self.station = station
         self._settings = settings
-        self._heard: dict[tuple[str, str], ReceivedMessage] = {}
+        self._newest: dict[tuple[str, str], ReceivedMessage] = {}
         self._partial: dict[str, PartialReportAssembler] = {}
         self._links: dict[str, LinkEvent] = {}
         self._own_travels = False
@@ -65,9 +65,9 @@ class SnapshotBuilder:
             if event.receiver == self.station:
                 self._links[event.sender] = event
                 self._own_travels |= event.sender == self.station
-        self._heard = {
+        self._newest = {
             key: held
-            for key, held in self._heard.items()
+            for key, held in self._newest.items()
             if now - held.message.detections.time <= self._lifetime(held.message) + TIME_TOLERANCE
         }
         oldest = now - LINK_LIFETIME - TIME_TOLERANCE
@@ -76,7 +76,7 @@ class SnapshotBuilder:
             station=self.station,
             view=frame.view,
             own=self._own(step, now),
-            heard=tuple(held for (name, _), held in self._heard.items() if name != self.station),
+            received=tuple(held for (name, _), held in self._newest.items() if name != self.station),
             fused=step.fused if step else Detections(now),
             links=tuple(event for name, event in self._links.items() if name != self.station),
             step=step,
@@ -89,16 +89,16 @@ class SnapshotBuilder:
             complete = self._partial.setdefault(message.sender, PartialReportAssembler(lifetime)).update(message)
             received = replace(received, message=replace(message, detections=complete))
         key = message.sender, message.kind
-        held = self._heard.get(key)
+        held = self._newest.get(key)
         if held is None or received.message.detections.time >= held.message.detections.time:
-            self._heard[key] = received
+            self._newest[key] = received
 
     def _own(self, step: AgentStep | None, now: float) -> Detections:
         if step is None:
             return Detections(now)
         if not self._own_travels:
             return step.detections
-        held = self._heard.get((self.station, "cpm"))
+        held = self._newest.get((self.station, "cpm"))
         return held.message.detections if held is not None else Detections(now)
 
     def _lifetime(self, message: Message) -> float:

@@ -28,7 +28,7 @@ STRIDE = 10
 """Number of lane points that are computed in one step on a continuous lane."""
 TURNS = 50.0
 """Maximum length of a road that may lead into itself within a stride [m]."""
-STRAYED = 2.5
+MAX_LATERAL_OFFSET = 2.5
 """Distance from the followed lane above which the vehicle was teleported, and its lane is located again [m]."""
 BEHIND = 5
 """Number of points behind the vehicle that are kept when the path is extended."""
@@ -53,17 +53,17 @@ class RoutePlanner(Planner):
         self._lane: list[LaneLocation] = []
         self._first_speed: float | None = None
         self._stops = SignalStops(roads, spec) if settings.obey_signals else None
-        self._laid: PlannedPath | None = None
+        self._path_of_stops: PlannedPath | None = None
 
     def observe_signals(self, signals: Sequence[SignalReading]) -> None:
         if self._stops is not None:
-            self._stops.signals.see(signals)
+            self._stops.signals.update(signals)
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
         path = self._current_path(x, y, ego.yaw, goal)
         self._progress = path.project(x, y, self._progress)
-        if self._way[0] is None and self._way[1] is None and path.distance(x, y, self._progress) > STRAYED:
+        if self._way[0] is None and self._way[1] is None and path.distance(x, y, self._progress) > MAX_LATERAL_OFFSET:
             self._lane = []
             path = self._path = self._lane_ahead(x, y, ego.yaw)
             self._progress = path.project(x, y)
@@ -89,8 +89,8 @@ class RoutePlanner(Planner):
         """Return the stop point of the next traffic light or stop sign, or None."""
         if self._stops is None:
             return None
-        if self._laid is not path:
-            self._laid = path
+        if self._path_of_stops is not path:
+            self._path_of_stops = path
             self._stops.follow(path.points)
         return self._stops.next(self._stops.place_of(self._progress, path.points, x, y), ego.speed, now)
 
@@ -110,10 +110,10 @@ class RoutePlanner(Planner):
         way = (None, None, None) if goal is None else (goal.path, goal.waypoints, goal.lap)
         if self._path is None or not all(map(_same, way, self._way)):
             self._way, self._progress, self._lane = way, 0, []
-            self._path = self._laid_out(x, y, yaw, *way)
+            self._path = self._build_path(x, y, yaw, *way)
         return self._path
 
-    def _laid_out(
+    def _build_path(
         self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None, lap: Array | None
     ) -> PlannedPath:
         line: Array | None = None

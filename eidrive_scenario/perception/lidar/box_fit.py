@@ -26,7 +26,7 @@ HEADING_DEVIATION = 0.4
 """Standard deviation of an assumed heading [rad]."""
 NEGLIGIBLE = 12.0
 """Excess cost above which a hypothesis is neglected."""
-DOUBTFUL = 9.0
+POOR_FIT = 9.0
 """Sum of squared size deviations of a fit above which its points may be a part of an object, or several objects. With
 three sizes, three in a hundred objects of the class exceed it."""
 ABOVE_TOP = 0.3

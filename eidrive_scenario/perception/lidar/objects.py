@@ -13,7 +13,7 @@ from eidrive_scenario.arrays import Integers
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
-from eidrive_scenario.perception.lidar.box_fit import DOUBTFUL, Fit
+from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
 
@@ -41,16 +41,16 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
     A cluster that fits no class is split at its gaps. Clusters with overlapping boxes are merged if one box fits both.
     """
     found = _fit_clusters(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
-    merged = [one for one in found if one.fit.deviation <= DOUBTFUL]
-    for doubtful in (one for one in found if one.fit.deviation > DOUBTFUL):
-        parts = clusters(scan.points[doubtful.rows], scan.pattern.azimuth, grazing=False)
-        part_rows = [doubtful.rows[part] for part in parts]
+    merged = [one for one in found if one.fit.deviation <= POOR_FIT]
+    for poor in (one for one in found if one.fit.deviation > POOR_FIT):
+        parts = clusters(scan.points[poor.rows], scan.pattern.azimuth, grazing=False)
+        part_rows = [poor.rows[part] for part in parts]
         good = [
             one
             for one in (_fit_clusters(scan, surroundings, part_rows, min_points) if len(parts) > 1 else [])
-            if one.fit.deviation <= DOUBTFUL
+            if one.fit.deviation <= POOR_FIT
         ]
-        merged += good or [doubtful]
+        merged += good or [poor]
     return [one for one in _merge_parts(scan, merged) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
 
 
@@ -92,7 +92,7 @@ def _merge_parts(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
             if overlap(_enlarge(one.fit.box), other.fit.box):
                 rows = np.concatenate([one.rows, other.rows])
                 fit = scan.fit(rows, tuple(PRIORS))
-                if fit is not None and fit.deviation <= DOUBTFUL:
+                if fit is not None and fit.deviation <= POOR_FIT:
                     merged = [kept for kept in merged if kept is not one and kept is not other]
                     merged.append(FittedObject(rows, fit))
                     again = True

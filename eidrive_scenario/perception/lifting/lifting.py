@@ -17,7 +17,7 @@ from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.geometry.size_priors import prior_of
-from eidrive_scenario.perception.lidar.box_fit import DOUBTFUL, Fit
+from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.perception.lifting.ground import AT_BORDER, ByGround, lift_by_ground
@@ -194,10 +194,10 @@ def _foreground(scan: Scan, camera: CameraReading, target: Target, places: Array
             fit = _merge_parts(scan, candidate, fit, candidates, target)
             image_overlap = _image_overlap(fit, scan, target.box, camera)
             count = candidate.inside if target.cut else candidate.weight
-            score = count * target.agreement(fit) * image_overlap / (1.0 + fit.deviation / DOUBTFUL)
+            score = count * target.agreement(fit) * image_overlap / (1.0 + fit.deviation / POOR_FIT)
             if fit.deviation <= UNLIKELY and score > 0.0 and (best is None or score > best[0]):
                 best = score, fit
-        if best is not None and best[1].deviation <= DOUBTFUL:
+        if best is not None and best[1].deviation <= POOR_FIT:
             break  # otherwise parts of a grazed surface may be separate clusters
         tried.update(group.tobytes() for group in groups)
     return None if best is None else best[1]
@@ -224,10 +224,10 @@ def _merge_parts(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_
         if not np.intersect1d(other.rows, candidate.rows).size:
             part_fit = scan.fit(other.rows, target.classes, target.heading, target.heading_cost)
             near = part_fit is not None and overlap(fit.box, part_fit.box)
-            if near or fit.deviation > DOUBTFUL:
+            if near or fit.deviation > POOR_FIT:
                 rows = np.concatenate([candidate.rows, other.rows])
                 merged = scan.fit(rows, target.classes, target.heading, target.heading_cost)
-                limit = max(fit.deviation, DOUBTFUL) if near else DOUBTFUL
+                limit = max(fit.deviation, POOR_FIT) if near else POOR_FIT
                 if merged is not None and merged.deviation <= limit:
                     candidate = _Candidate(rows, candidate.inside + other.inside, candidate.weight)
                     fit = merged

@@ -26,7 +26,7 @@ class Moment:
     """Key frame: its kind, title and snapshot; None if the event did not occur."""
 
     kind: str
-    """Kind of the event: heard or hidden, entered, braked, closest."""
+    """Kind of the event: received or hidden, entered, braked, closest."""
     title: str
     snapshot: StationSnapshot | None
 
@@ -62,11 +62,11 @@ class Story:
 class KeyFrames:
     """Observer of a run that stores its key frames.
 
-    heard    only messages of others contain the car; without such a frame:
-    hidden   other stations detect the car, and the ego does not
-    entered  the center of the car enters a conflict area, if there are any
-    braked   the ego brakes with a deceleration of its plan
-    closest  minimum distance between the bodies, or their first contact
+    received  only messages of others contain the car; without such a frame:
+    hidden    other stations detect the car, and the ego does not
+    entered   the center of the car enters a conflict area, if there are any
+    braked    the ego brakes with a deceleration of its plan
+    closest   minimum distance between the bodies, or their first contact
 
     `areas` are the conflict areas, polygons (M, 2) [m].
     """
@@ -103,7 +103,7 @@ class KeyFrames:
     def story(self) -> Story:
         """Return the key frames and series of the frames so far."""
         moments = []
-        first = "heard" if "heard" in self._found else "hidden"
+        first = "received" if "received" in self._found else "hidden"
         for kind, absent in (
             (first, f"{self.hidden} is never detected by others only"),
             ("entered", f"{self.hidden} never enters the conflict area"),
@@ -152,11 +152,11 @@ class KeyFrames:
                         f"{self.ego} does not"
                     )
                     self._found["hidden"] = (title, snapshot)
-            if "heard" not in self._found:
-                senders = [held.message.sender for held in snapshot.heard if self._shows(held.message.detections)]
+            if "received" not in self._found:
+                senders = [held.message.sender for held in snapshot.received if self._shows(held.message.detections)]
                 if senders:
                     title = f"{self.ego} receives {self.hidden} only from {' and '.join(dict.fromkeys(senders))}"
-                    self._found["heard"] = (title, snapshot)
+                    self._found["received"] = (title, snapshot)
         if "entered" not in self._found and self.areas:
             at = snapshot.view.centers[snapshot.view.row(self.hidden), :2]
             if any(points_in_polygon(at, area) for area in self.areas):

@@ -108,7 +108,7 @@ def top_view(
         for area in conflict_areas
     )
     parts.extend(_links(snapshot))
-    for received in snapshot.heard:
+    for received in snapshot.received:
         parts.extend(_boxes(received.message.detections, "received", RECEIVED, 0.55))
     parts.extend(_boxes(snapshot.own, "own", OWN, 0.25))
     parts.extend(_truth(snapshot))

@@ -116,7 +116,7 @@ function draw() {
     trace([poses[sender], poses[self]]); pen.stroke();
   }
   pen.setLineDash([]);
-  if (station) for (const heard of station.heard) perceived(heard, C.received, 0.5);
+  if (station) for (const box of station.received) perceived(box, C.received, 0.5);
   if (station) for (const own of station.own) perceived(own, C.own, 0.25);
   for (const [name, [x, y, yaw]] of Object.entries(poses)) {
     const [length, width] = data.actors[name].size, filled = name === self;
@@ -149,7 +149,7 @@ function show(next) {
   element("clock").textContent = data.times[index].toFixed(2) + " s";
   const known = element("known"), station = (data.stations[element("station").value] || [])[index];
   known.textContent = "";
-  for (const [key, value] of station ? [["own detections", station.own.length], ["received objects", station.heard.length], ["plan", station.plan || "none"]] : [["", "absent"]]) {
+  for (const [key, value] of station ? [["own detections", station.own.length], ["received objects", station.received.length], ["plan", station.plan || "none"]] : [["", "absent"]]) {
     make("dt", key, known); make("dd", value, known);
   }
   let last = null;

@@ -68,12 +68,12 @@ class Locator:
         s, t, beyond = self._refine(road, s, x, y)
         row, outside = self._tables.lane_beside(road, s, t)
         outside = np.hypot(outside, beyond)
-        doubtful = np.flatnonzero(outside > 0.0)
-        if doubtful.size and len(self._s) > 1:
-            height = None if z is None else z[doubtful]
-            limit = outside[doubtful] + self._from_samples if z is None else np.full(len(doubtful), np.inf)
-            best = self._compare(tree, points[doubtful], x[doubtful], y[doubtful], height, limit)
-            road[doubtful], s[doubtful], t[doubtful], row[doubtful], outside[doubtful] = best
+        uncertain = np.flatnonzero(outside > 0.0)
+        if uncertain.size and len(self._s) > 1:
+            height = None if z is None else z[uncertain]
+            limit = outside[uncertain] + self._from_samples if z is None else np.full(len(uncertain), np.inf)
+            best = self._compare(tree, points[uncertain], x[uncertain], y[uncertain], height, limit)
+            road[uncertain], s[uncertain], t[uncertain], row[uncertain], outside[uncertain] = best
         heading = self._tables.curves.at(road, s)[2]
         far = outside > reach
         center, _ = self._tables.lane_t(row, s)

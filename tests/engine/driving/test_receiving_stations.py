@@ -54,12 +54,12 @@ def test_mast_with_cooperates_with_fuses_received_and_sends_own_detections(tmp_p
     assert links(hearing) == {("RSU", "Ego"), ("Ego", "RSU")}
     learned = 0
     for before, after in zip(deaf, hearing, strict=True):
-        unit, heard = after.steps["RSU"], after.steps["RSU"].inbox
+        unit, received = after.steps["RSU"], after.steps["RSU"].inbox
         assert after.view.position.tobytes() == before.view.position.tobytes(), "the knowledge of a mast moves no actor"
         assert after.steps["Ego"].fused.boxes.tobytes() == before.steps["Ego"].fused.boxes.tobytes()
         for message in unit.outbox:
             assert message.detections.boxes.tobytes() == unit.detections.boxes.tobytes()
-        of_others = {place for item in heard for place in places(item.message.detections.boxes)}
+        of_others = {place for item in received for place in places(item.message.detections.boxes)}
         learned += len(of_others - places(unit.detections.boxes) & of_others)
         assert len(unit.fused) >= len(unit.detections)
         mast = after.view.position[after.view.row("RSU")]
@@ -137,12 +137,12 @@ def test_planner_without_wheels_is_reported_with_line_before_run(tmp_path: Path)
         play(wrong)
 
 
-@pytest.mark.parametrize(("names", "hears"), [(None, False), ("none", False), ("all", True), ("Ego", True)])
-def test_station_without_wheels_receives_only_with_selected_senders(names: str | None, hears: bool) -> None:
+@pytest.mark.parametrize(("names", "receives"), [(None, False), ("none", False), ("all", True), ("Ego", True)])
+def test_station_without_wheels_receives_only_with_selected_senders(names: str | None, receives: bool) -> None:
     given = {} if names is None else {"cooperates_with": names}
     settings = AgentSettings.model_validate({"detector": "lidar", "fusion": "early", **given})
     station = build_agent(settings, MAST, None, seed=0, dt=0.05)
-    assert station.receives_messages is hears
-    assert station.receives_from("Ego", own_perception=False) is hears
-    assert station.receives_from(MAST.name, own_perception=True) is hears
+    assert station.receives_messages is receives
+    assert station.receives_from("Ego", own_perception=False) is receives
+    assert station.receives_from(MAST.name, own_perception=True) is receives
     assert not station.receives_from(MAST.name, own_perception=False)

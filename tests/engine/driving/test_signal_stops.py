@@ -116,7 +116,7 @@ def test_car_stops_and_waits_at_stop_sign() -> None:
 def test_interrupted_wait_at_stop_sign_restarts() -> None:
     stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
     stops.follow(EAST)
-    stops.signals.see([SignalReading("stop", "")])
+    stops.signals.update([SignalReading("stop", "")])
     at_line = 100.0 - CAR.offset[0] - CAR.size[0] / 2.0 - BEFORE_LINE
     assert stops.next(at_line, 0.0, 0.0) is not None
     assert stops.next(at_line, 0.0, WAIT - 0.1) is not None
@@ -129,7 +129,7 @@ def test_stop_sign_applies_on_every_lap() -> None:
     """The wait of the first lap does not count on the second."""
     stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
     stops.follow(np.concatenate([ROUND, ROUND[1:]]))
-    stops.signals.see([SignalReading("stop", "")])
+    stops.signals.update([SignalReading("stop", "")])
     at_line = 60.0 - CAR.offset[0] - CAR.size[0] / 2.0 - BEFORE_LINE
     for lap, now in ((0.0, 0.0), (320.0, 60.0)):
         assert stops.next(lap + at_line - 20.0, 8.0, now) is not None

@@ -81,7 +81,7 @@ def test_signals_ahead_require_stop_only_after_sight() -> None:
     signals.follow(EAST)
     assert [one.must_stop for one in signals.ahead(0.0)] == [False, False]
     for state, stops in (("red", True), ("green", False), ("on;off;off", True), ("", False)):
-        signals.see([SignalReading("east", state), SignalReading("stop", "")])
+        signals.update([SignalReading("east", state), SignalReading("stop", "")])
         assert [one.must_stop for one in signals.ahead(0.0)] == [stops, True]
 
 

@@ -58,8 +58,8 @@ def test_hidden_frame_is_first_detection_of_helper(street: Play) -> None:
 @pytest.mark.parametrize("delay", [1, 3, 6])
 def test_reception_frame_follows_after_message_delay(street: Play, delay: int) -> None:
     story = story_of(street(delay))
-    assert time_of(story, "heard") == pytest.approx(1.40 + 0.05 * delay)
-    assert time_of(story, "braked") == time_of(story, "heard")
+    assert time_of(story, "received") == pytest.approx(1.40 + 0.05 * delay)
+    assert time_of(story, "braked") == time_of(story, "received")
 
 
 def test_hidden_frame_requires_missing_detection_of_ego(street: Play) -> None:
@@ -79,7 +79,7 @@ def test_hidden_frame_requires_missing_detection_of_ego(street: Play) -> None:
 
 def test_reception_frame_is_delayed_by_lost_messages(street: Play) -> None:
     story = story_of(street(1, frozenset({28, 29, 30})))
-    assert time_of(story, "heard") == pytest.approx(1.60)
+    assert time_of(story, "received") == pytest.approx(1.60)
 
 
 def test_story_without_messages_has_no_braked_frame(street: Play) -> None:
@@ -111,7 +111,7 @@ def test_story_without_conflict_area_has_no_entered_frame(street: Play) -> None:
     observer = KeyFrames("Ego", "Incoming")
     for frame in street(1):
         observer.observe(frame)
-    assert [moment.kind for moment in observer.story().moments] == ["heard", "braked", "closest"]
+    assert [moment.kind for moment in observer.story().moments] == ["received", "braked", "closest"]
 
 
 def test_story_contains_distances_of_centers_and_bodies(street: Play) -> None:

@@ -43,7 +43,7 @@ def test_replay_data_contains_pose_per_frame_and_actor(street: Play) -> None:
 def test_replay_data_separates_own_and_received_boxes(street: Play) -> None:
     ego = replay_data(street(6))["stations"]["Ego"][40]
     assert ego["own"] == [[25.4, 5.6, 8.47, 2.89, -1.571]]
-    assert sorted(box[:2] for box in ego["heard"]) == [[25.4, 5.6], [29.5, 15.7]]
+    assert sorted(box[:2] for box in ego["received"]) == [[25.4, 5.6], [29.5, 15.7]]
     assert ego["links"] == [["RSU", True]]
     assert ego["plan"] == "conflict area"
 
@@ -147,5 +147,5 @@ def test_replay_report_timeout_of_station_ends_received_boxes(
     recorder.close()
     page = make_replay(read_recording(tmp_path / "run.mcap"), tmp_path / "replay.html").page.read_text(encoding="utf-8")
     data = json.loads(html.fromstring(page).findtext(".//script[@id='data']") or "")
-    heard = [tick for tick, ego in enumerate(data["stations"]["Ego"]) if ego["heard"]]
-    assert heard[-1] == last
+    received = [tick for tick, ego in enumerate(data["stations"]["Ego"]) if ego["received"]]
+    assert received[-1] == last

@@ -89,8 +89,8 @@ def test_top_view_without_channel_has_no_received_boxes(street: Play) -> None:
 def test_snapshot_keeps_message_for_report_timeout(street: Play) -> None:
     """All messages from tick 30 are lost. The last one was measured at 1.45 s and expires after 1 s."""
     frames = street(1, frozenset(range(30, 100)))
-    assert len(snapshot_at(frames, 49).heard) == 1
-    assert len(snapshot_at(frames, 50).heard) == 0
+    assert len(snapshot_at(frames, 49).received) == 1
+    assert len(snapshot_at(frames, 50).received) == 0
 
 
 def test_snapshot_of_own_detections_over_channel_has_channel_delay(street: Play) -> None:
@@ -107,16 +107,16 @@ def test_snapshot_of_own_detections_over_channel_has_channel_delay(street: Play)
     assert len(snapshot_at(traveling, 5).own) == 0
     snapshot = snapshot_at(traveling, 40)
     assert snapshot.own is sent[34]
-    assert (snapshot.heard, snapshot.links) == ((), ())
+    assert (snapshot.received, snapshot.links) == ((), ())
 
 
-def heard_by_ego(frames: list[Frame], *messages: Message) -> tuple[ReceivedMessage, ...]:
+def received_by_ego(frames: list[Frame], *messages: Message) -> tuple[ReceivedMessage, ...]:
     """Return the messages that Ego holds after it has received these in consecutive frames."""
     builder = SnapshotBuilder("Ego")
     for frame, message in zip(frames, messages, strict=False):
         step = msgspec.structs.replace(frame.steps["Ego"], inbox=(ReceivedMessage(message, frame.view.time),))
         snapshot = builder.observe(Frame(frame.view, {"Ego": step}))
-    return snapshot.heard
+    return snapshot.received
 
 
 def test_snapshot_keeps_cpm_after_cam_of_same_sender(street: Play) -> None:
@@ -126,8 +126,8 @@ def test_snapshot_keeps_cpm_after_cam_of_same_sender(street: Play) -> None:
     seen = frames[0].steps["Ego"].detections
     report = Message("Rsu", 0, 0.0, state, seen, 100)
     itself = Message("Rsu", 1, 0.05, state, msgspec.structs.replace(seen.subset([0]), time=0.05), 100, "cam")
-    heard = heard_by_ego(frames, report, itself)
-    assert [(held.message.kind, len(held.message.detections)) for held in heard] == [("cpm", len(seen)), ("cam", 1)]
+    received = received_by_ego(frames, report, itself)
+    assert [(held.message.kind, len(held.message.detections)) for held in received] == [("cpm", len(seen)), ("cam", 1)]
 
 
 def test_snapshot_completes_partial_messages(street: Play) -> None:
@@ -139,7 +139,7 @@ def test_snapshot_completes_partial_messages(street: Play) -> None:
         Message("Rsu", n, now, state, held, 100, objects=(n,))
         for n, (now, held) in enumerate([(0.0, one), (0.05, other)])
     ]
-    (known,) = heard_by_ego(frames, *parts)
+    (known,) = received_by_ego(frames, *parts)
     assert known.message.detections.tracks == (0, 1)
 
 
