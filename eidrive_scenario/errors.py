@@ -46,6 +46,8 @@ class Diagnostic:
     """Name of the rule of `eidrive check` that is violated (see docs/checks.md); "" for errors outside of rules."""
 
     def __post_init__(self) -> None:
+        if self.line == 0:  # an element that no file contains
+            object.__setattr__(self, "line", None)
         if len(self.message) > MAX_TEXT or len(self.hint) > MAX_TEXT:
             object.__setattr__(self, "message", shortened(self.message))
             object.__setattr__(self, "hint", shortened(self.hint))

@@ -38,6 +38,8 @@ class ResolvedSettings:
     varied           names of the parameters that a parameter value distribution assigns
     controllers      controller models, by name of the controller
     user_values      values of UserDefinedValueConditions, by name
+    drive            entities that an option gives a driving stack, sorted; its settings are in `stations`
+    criteria         criteria that an option adds, each a mapping of its name to its settings
     dt, time_limit   time step and maximum simulated time [s]
     files            role, name and SHA-256 of each input file; the scenario is the first
     versions         versions of the packages that affect the result
@@ -60,6 +62,8 @@ class ResolvedSettings:
     varied: tuple[str, ...] = ()
     controllers: Mapping[str, str] = field(default_factory=dict)
     user_values: Mapping[str, str] = field(default_factory=dict)
+    drive: tuple[str, ...] = ()
+    criteria: tuple[Mapping[str, Any], ...] = ()
     dt: float = 0.05
     time_limit: float = 120.0
     files: tuple[tuple[str, str, str], ...] = ()

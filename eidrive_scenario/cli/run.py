@@ -53,6 +53,19 @@ def run(
         list[str] | None,
         typer.Option(metavar="K=V", help="Model V, such as alks, of controller K of another tool; repeatable."),
     ] = None,
+    drive: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[=STACK]",
+            help="Give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable.",
+        ),
+    ] = None,
+    criterion: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="YAML|FILE", help="Add criteria, such as '{collision: {of: Ego}}', or those of a file; repeatable."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with consecutive seeds from --seed.")] = 1,
     max_runs: Annotated[
@@ -97,6 +110,7 @@ def run(
     from eidrive_scenario.recording import Explanation
     from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
     from eidrive_scenario.simulation import RunSettings
+    from eidrive_scenario.simulation.added_settings import parse_drive
 
     if json and log == STANDARD_OUTPUT:
         raise SettingError(Diagnostic("--log - and --json both write to standard output", "give a file to --log"))
@@ -109,6 +123,7 @@ def run(
         report = partial(failures.report_dump, wall_limit)
         supervise(failures.end_hung_run, report, publish=failures.share)
     parameters = parse_assignments("--param", param or [])
+    stacks = parse_drive("--drive", drive or [])
     settings = RunSettings(
         channel=channel,
         detector=detector,
@@ -117,6 +132,8 @@ def run(
         parameters=parameters,
         user_values=parse_assignments("--user-value", user_value or []),
         controllers=parse_assignments("--controller", controller or []),
+        drive=stacks,
+        criteria=criterion,
         dt=dt,
         time_limit=time_limit,
         allow_torchscript=allow_torchscript,
@@ -162,7 +179,8 @@ def run(
         return codes
 
     path = resolve_scenario(scenario)
-    check_output_paths({"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}, (path, channel, weather))
+    written = {"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}
+    check_output_paths(written, (path, channel, weather, *stacks.values(), *(criterion or ())))
     if definition(path) == "distribution":
         raise typer.Exit(
             run_distribution(path, run_seeds, seed=seed, repeat=repeat, max_runs=max_runs, parameters=parameters)

@@ -25,7 +25,7 @@ from eidrive_scenario.sensing.settings import MAX_RANGE, MountSetting, SensorSet
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.messages.clock import StationClock
 
-_TEXTS = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})
+NAME_PROPERTIES = frozenset({"module", "detector", "fusion", "planner", "vehicle_controller"})
 """Properties whose values are names, not YAML."""
 
 _SELECTED = {
@@ -111,6 +111,7 @@ class AgentSettings(Settings):
     clock_offset    lead of the station clock; clock_drift  its rate error [parts per million]
     asn1_files      ASN.1 modules that determine the sizes of messages, relative to the scenario file
     target_speed    speed without a request of the storyboard; None keeps the initial speed
+    follow_speed_limit  whether the speed limit of the lane replaces the initial speed; 13.9 m/s without a stated limit
     vehicle_controller  name of the controller that follows the trajectories of the planner
     vehicle_controller_settings  settings of the vehicle controller
     planner_settings  settings of the selected planner; a property with the name of a setting is accepted as well
@@ -145,6 +146,7 @@ class AgentSettings(Settings):
     clock_drift: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
     asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names)] = ()
     target_speed: Annotated[float, Field(ge=0.0, le=1e4)] | None = None
+    follow_speed_limit: bool = False
     planner_settings: SerializeAsAny[PlannerSettings] = PlannerSettings()
 
     @field_validator("sensors")
@@ -228,7 +230,7 @@ def agent_settings(controller: Controller) -> AgentSettings:
             continue
         lines[entry.name] = entry.line
         try:
-            value = entry.value if entry.name in _TEXTS else load_yaml(entry.value, source=source)
+            value = entry.value if entry.name in NAME_PROPERTIES else load_yaml(entry.value, source=source)
         except SettingError as error:
             what = error.diagnostics[0].message
             message = f"property {entry.name!r} is {entry.value!r}, which is {what}"

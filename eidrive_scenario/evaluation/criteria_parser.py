@@ -30,6 +30,9 @@ from eidrive_scenario.storyboard.state.commands import CustomCommand
 EXITS = {"exitSuccess": True, "exitFailure": False}
 """Verdict of each exit command of scenario_simulator_v2: True for passed."""
 
+CRITERION = "eidrive.criterion"
+"""Type of the CustomCommandAction that declares criteria."""
+
 _EXAMPLE = "min_distance: {of: Ego, to: Incoming, at_least: 1.5}"
 
 
@@ -71,13 +74,47 @@ def parse_criteria(
     Raise SettingError with file and line of every error.
     """
     data = load_yaml(text, source=source, line=line)
+    known = key_lines(text, 1 if line is None else line)
+    return declare_criteria(
+        data,
+        known,
+        source=source,
+        line=line,
+        entities=entities,
+        monitors=monitors,
+        scope=scope,
+        command=CRITERION,
+        shown=repr(text.strip()),
+    )
+
+
+def declare_criteria(
+    data: Any,
+    known_lines: Mapping[str, int],
+    *,
+    source: str = "",
+    line: int | None = None,
+    entities: Collection[str] | None = None,
+    monitors: Collection[str] | None = None,
+    scope: Scope | None = None,
+    command: str = "",
+    shown: str = "",
+) -> tuple[CriterionDeclaration, ...]:
+    """Return the criteria that parsed YAML declares: a mapping, or a list of mappings.
+
+    known_lines  lines of the keys as returned by `key_lines`
+    command      type of the command that contains them, for messages
+    shown        text of the data in messages; the other arguments are those of `parse_criteria`
+
+    Raise SettingError with file and line of every error.
+    """
     entries = [data] if isinstance(data, dict) else data
-    if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        message = f"eidrive.criterion: no criterion is declared (got {text.strip()!r})"
+    if not isinstance(entries, list) or not any(entries) or not all(isinstance(entry, dict) for entry in entries):
+        message = f"{command}{': ' * bool(command)}no criterion is declared (got {shown})"
         raise SettingError(Diagnostic(message, f"write {_EXAMPLE}", source, line))
     declarations = []
     diagnostics: list[Diagnostic] = []
-    for kind, settings, lines in _items(entries, text, line):
+    for kind, settings, lines in _items(entries, known_lines, several=isinstance(data, list)):
         here = lines.get("", line)
         try:
             settings = resolve_references(settings, scope, source=source, line=here, lines=lines)
@@ -107,10 +144,10 @@ def build_criteria(declarations: Iterable[CriterionDeclaration], taken: Collecti
     return criteria
 
 
-def _items(entries: list[dict[Any, Any]], text: str, line: int | None) -> Iterator[tuple[str, Any, Mapping[str, int]]]:
+def _items(
+    entries: list[dict[Any, Any]], known: Mapping[str, int], *, several: bool
+) -> Iterator[tuple[str, Any, Mapping[str, int]]]:
     """Yield kind and settings of each criterion, and the lines of its settings; the empty key has its own line."""
-    known = key_lines(text, 1 if line is None else line)
-    several = "0" in known
     paths = {
         f"{index}.{kind}" if several else str(kind): (str(kind), settings)
         for index, entry in enumerate(entries)

@@ -11,6 +11,7 @@ from typing import Any
 
 from eidrive_scenario.library import library_path, name_of
 from eidrive_scenario.openscenario.values.parameters import Assignment
+from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.run import RunResult, RunSettings
 from eidrive_scenario.v2x.profile import SUFFIXES
 
@@ -29,13 +30,17 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
         ("--cooperate", None if settings.cooperate is None else ",".join(settings.cooperate) or "none"),
     ):
         if value is not None:
-            words += [f"{option}={value}"] if value.startswith("-") else [option, value]
+            words += _option(option, value)
     for option, values in (
         ("--param", settings.parameters),
         ("--user-value", settings.user_values),
         ("--controller", settings.controllers),
     ):
         words += _assignments(option, values)
+    for name, stack in drive_sources(settings.drive).items():
+        words += _option("--drive", name if stack is None else f"{name}={_file_or_name(stack)}")
+    for criterion in criteria_sources(settings.criteria):
+        words += _option("--criterion", str(_file_or_name(criterion)))
     words += ["--seed", str(seed)]
     for option, number, default in (
         ("--dt", settings.dt, defaults.dt),
@@ -76,6 +81,9 @@ def _file_or_name(value: str | Path | None) -> str | None:
 def _assignments(option: str, values: Mapping[str, str | Assignment]) -> list[str]:
     words = []
     for name, value in values.items():
-        assignment = f"{name}={value.text if isinstance(value, Assignment) else value}"
-        words += [f"{option}={assignment}"] if assignment.startswith("-") else [option, assignment]
+        words += _option(option, f"{name}={value.text if isinstance(value, Assignment) else value}")
     return words
+
+
+def _option(option: str, value: str) -> list[str]:
+    return [f"{option}={value}"] if value.startswith("-") else [option, value]

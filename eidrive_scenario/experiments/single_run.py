@@ -22,6 +22,7 @@ from eidrive_scenario.recording.run_files import RECORDING
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
+from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.run import checked_seed
 from eidrive_scenario.wall_limit import limit_wall_time
 
@@ -168,6 +169,10 @@ def _given_settings(scenario: Scenario, seed: int, run: int | None, settings: Ru
     if settings.cooperate is not None:
         given["cooperate"] = ",".join(settings.cooperate) or "none"
     given["controllers"] = json.dumps(settings.controllers) if settings.controllers else None
+    drive = {name: None if stack is None else str(stack) for name, stack in drive_sources(settings.drive).items()}
+    given["drive"] = json.dumps(drive) if drive else None
+    criteria = [str(one) for one in criteria_sources(settings.criteria)]
+    given["criteria"] = json.dumps(criteria) if criteria else None
     given["user_values"] = json.dumps(settings.user_values) if settings.user_values else None
     texts = {name: str(value) for name, value in given.items() if value is not None}
     return {"scenario": scenario.name, "seed": str(seed), **texts, "parameters": json.dumps(scenario.parameters)}

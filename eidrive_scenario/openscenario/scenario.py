@@ -67,6 +67,7 @@ class Scenario:
     digest       SHA-256 of the content, as hexadecimal digits
     catalogs     SHA-256 of each used catalog file, by its path
     scope        parameters with their types, for references in settings outside the file
+    driven       entities to which the settings of a run give a driving stack; actions cannot switch its controller
     """
 
     name: str
@@ -87,6 +88,7 @@ class Scenario:
     digest: str = ""
     catalogs: Mapping[str, str] = field(default_factory=dict)
     scope: Scope | None = field(repr=False, default=None)
+    driven: frozenset[str] = frozenset()
 
     @property
     def storyboard(self) -> Storyboard:

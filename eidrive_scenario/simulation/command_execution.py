@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from eidrive_scenario.driving.stack import DrivingStack, StackInputs
-from eidrive_scenario.evaluation.criteria_parser import EXITS, build_criteria, exit_verdict, parse_criteria
+from eidrive_scenario.evaluation.criteria_parser import (
+    CRITERION,
+    EXITS,
+    CriterionDeclaration,
+    build_criteria,
+    exit_verdict,
+    parse_criteria,
+)
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.commands import CHANNEL, CRITERION, PREFIX, DeclaredCriteria, command_key
+from eidrive_scenario.simulation.commands import CHANNEL, PREFIX, DeclaredCriteria, command_key
 from eidrive_scenario.simulation.run_setup import RunSetup
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.world import World
@@ -117,7 +124,7 @@ def select_channel(command: CustomCommand, run: RunState) -> None:
     run.warnings += map(str, warnings)
 
 
-def add_criteria(command: CustomCommand, run: RunState) -> None:
+def declare(command: CustomCommand, run: RunState) -> None:
     """Add the criteria of a command `eidrive.criterion`."""
     declarations = run.declared.get(command_key(command))
     if declarations is None:  # A command that an action of an extension has created
@@ -129,6 +136,11 @@ def add_criteria(command: CustomCommand, run: RunState) -> None:
             scope=command.scope,
             has_roads=run.roads is not None,
         )
+    add_criteria(declarations, run)
+
+
+def add_criteria(declarations: Iterable[CriterionDeclaration], run: RunState) -> None:
+    """Add new criteria. The name of another criterion is not used again."""
     added = build_criteria(declarations, [criterion.name for criterion in run.criteria])
     for criterion in added:
         bind_roads(criterion, run.roads)
@@ -153,7 +165,7 @@ HANDLERS: tuple[Callable[[Commands, RunState], None], ...] = (
 
 CUSTOM_HANDLERS: dict[str, Callable[[CustomCommand, RunState], None]] = {
     CHANNEL: select_channel,
-    CRITERION: add_criteria,
+    CRITERION: declare,
     **dict.fromkeys(EXITS, end_run),
 }
 """Handlers of CustomCommandActions by type. No command starts a program."""

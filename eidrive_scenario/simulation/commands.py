@@ -1,11 +1,21 @@
-"""Check of this project's CustomCommandActions before a run, so that errors in late events are reported at once."""
+"""Check of this project's CustomCommandActions and of added criteria before a run.
+
+Errors in late events are thus reported at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 
-from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, suggestion
-from eidrive_scenario.evaluation.criteria_parser import CriterionDeclaration, parse_criteria
+from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, SettingError, quoted, suggestion
+from eidrive_scenario.evaluation.criteria_parser import (
+    CRITERION,
+    CriterionDeclaration,
+    declare_criteria,
+    parse_criteria,
+)
+from eidrive_scenario.files.yaml_sources import read_yaml_source
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import CustomCommandAction
@@ -16,7 +26,7 @@ from eidrive_scenario.v2x.profile import ChannelProfile, load_profile
 
 PREFIX = "eidrive."
 CHANNEL = "eidrive.channel"
-CRITERION = "eidrive.criterion"
+CRITERION_OPTION = "--criterion"
 
 CommandKey = tuple[str, str, int | None, int]
 DeclaredCriteria = Mapping[CommandKey, tuple[CriterionDeclaration, ...]]
@@ -36,8 +46,6 @@ def channel_profile(command: CustomCommandAction) -> ChannelProfile | None:
 
 def check_commands(scenario: Scenario) -> DeclaredCriteria:
     """Parse all commands of this project and return the declared criteria. Raise ScenarioError with all diagnostics."""
-    declared = scenario.document.monitor_declarations
-    monitors = [one.name for one in declared.monitor_declaration] if declared is not None else []
     criteria: dict[CommandKey, tuple[CriterionDeclaration, ...]] = {}
 
     def read_criteria(command: CustomCommandAction) -> None:
@@ -46,7 +54,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
             source=command.source,
             line=command.line,
             entities=scenario.entities,
-            monitors=monitors,
+            monitors=_monitors(scenario),
             scope=command.scope,
             has_roads=scenario.road_file is not None,
         )
@@ -72,3 +80,34 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
     if diagnostics:
         raise ScenarioError(list(dict.fromkeys(diagnostics)))
     return criteria
+
+
+def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> tuple[CriterionDeclaration, ...]:
+    """Parse the criteria that the settings of a run add, YAML texts and files.
+
+    Raise SettingError with all diagnostics.
+    """
+    found: list[CriterionDeclaration] = []
+    diagnostics: list[Diagnostic] = []
+    for source in sources:
+        try:
+            content = read_yaml_source(source, option=CRITERION_OPTION)
+            found += declare_criteria(
+                content.data,
+                content.lines,
+                source=content.source,
+                entities=scenario.entities,
+                monitors=_monitors(scenario),
+                scope=scenario.scope,
+                shown=quoted(content.data),
+            )
+        except InputError as error:
+            diagnostics += error.diagnostics
+    if diagnostics:
+        raise SettingError(list(dict.fromkeys(diagnostics)))
+    return tuple(found)
+
+
+def _monitors(scenario: Scenario) -> list[str]:
+    declared = scenario.document.monitor_declarations
+    return [one.name for one in declared.monitor_declaration] if declared is not None else []

@@ -17,6 +17,7 @@ from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.resolved_settings import ResolvedSettings
+from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.result_views import result_html, result_row
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
@@ -38,6 +39,9 @@ class RunSettings:
     time_limit      maximum simulated time [s], above 0, for scenarios without an end
     weather         preset or file; it overrides weather and road condition of the scenario
     user_values     of UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
+    drive           entities that get a driving stack, which replaces their controllers: names, or a mapping of names to
+                    the properties of the stack (mapping, YAML text, file; None: defaults); see docs/scenario_files.md
+    criteria        further criteria: a mapping, a YAML text, a file, or a list of these
     allow_torchscript  whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
     """
 
@@ -50,6 +54,8 @@ class RunSettings:
     controllers: Mapping[str, str] = field(default_factory=dict)
     weather: str | Path | None = None
     user_values: Mapping[str, str] = field(default_factory=dict)
+    drive: Mapping[str, Any] | Iterable[str] | None = None
+    criteria: str | Path | Mapping[str, Any] | Iterable[str | Path | Mapping[str, Any]] | None = None
     allow_torchscript: bool = False
 
     def __post_init__(self) -> None:
@@ -63,6 +69,8 @@ class RunSettings:
             if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
                 raise SettingError(Diagnostic(f"{name} is {quoted(value)}", f"give {expected}"))
         object.__setattr__(self, "cooperate", _senders(self.cooperate))
+        object.__setattr__(self, "drive", drive_sources(self.drive))
+        object.__setattr__(self, "criteria", criteria_sources(self.criteria))
         for name in ("parameters", "user_values", "controllers"):
             object.__setattr__(self, name, _texts(name, getattr(self, name)))
         if not self.time_limit > 0.0:

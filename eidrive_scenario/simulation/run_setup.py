@@ -8,12 +8,18 @@ from dataclasses import dataclass
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory, build_stack
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
-from eidrive_scenario.evaluation.criteria_parser import stop_trigger_criteria, unsupported_criteria
+from eidrive_scenario.evaluation.criteria_parser import (
+    CriterionDeclaration,
+    stop_trigger_criteria,
+    unsupported_criteria,
+)
 from eidrive_scenario.evaluation.criterion import Criterion, bind_roads
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.commands import DeclaredCriteria, check_commands
+from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
+from eidrive_scenario.simulation.commands import DeclaredCriteria, check_added_criteria, check_commands
+from eidrive_scenario.simulation.driven_entities import drive_entities
 from eidrive_scenario.simulation.run import RunSettings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world import World
@@ -26,6 +32,7 @@ class RunSetup:
 
     criteria           criteria of the StopTrigger; commands of the storyboard add the others
     declared_criteria  criteria that commands of the storyboard declare
+    added_criteria     criteria that the settings of the run add to those of the scenario
     weather            option that overrides the scenario; None uses the weather of the scenario
     warnings           warnings that are known before the run
     """
@@ -36,6 +43,7 @@ class RunSetup:
     stack: DrivingStack
     criteria: tuple[Criterion, ...]
     declared_criteria: DeclaredCriteria
+    added_criteria: tuple[CriterionDeclaration, ...]
     weather: Weather | None
     world: World
     warnings: tuple[str, ...]
@@ -60,9 +68,15 @@ def set_up_run(
     roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     criteria: tuple[Criterion, ...] = ()
     declared: DeclaredCriteria = {}
+    added: tuple[CriterionDeclaration, ...] = ()
+    replaced: tuple[Diagnostic, ...] = ()
     weather: Weather | None = None
     with collector:
+        scenario, replaced = drive_entities(scenario, drive_sources(settings.drive))
+    with collector:
         declared = check_commands(scenario)
+    with collector:
+        added = check_added_criteria(scenario, criteria_sources(settings.criteria))
     with collector:
         storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=seed, controllers=settings.controllers)
     with collector:
@@ -75,11 +89,11 @@ def set_up_run(
         if settings.weather is not None:
             weather = load_weather(settings.weather, origin="--weather")
     collector.raise_if_any()
-    warnings = tuple(map(str, _warnings(scenario, roads, driving)))
+    warnings = tuple(map(str, [*replaced, *_warnings(scenario, roads, driving)]))
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
     if weather is not None:
         world.set_weather(weather)
-    return RunSetup(scenario, roads, storyboard, driving, criteria, declared, weather, world, warnings)
+    return RunSetup(scenario, roads, storyboard, driving, criteria, declared, added, weather, world, warnings)
 
 
 def _stack_context(

@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.bounded import is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario
@@ -24,21 +23,25 @@ from eidrive_scenario.resolved_settings import (
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation.commands import CHANNEL, channel_profile
 from eidrive_scenario.simulation.run import RunSettings
-from eidrive_scenario.world.weather import Weather
+from eidrive_scenario.simulation.run_setup import RunSetup
 
 _LARGEST = 1024 * 2**20
 """Maximum size of a file whose digest is computed [bytes]."""
 
 
-def resolve_settings(
-    scenario: Scenario, seed: int, settings: RunSettings, stack: DrivingStack, weather: Weather | None
-) -> ResolvedSettings:
+def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> ResolvedSettings:
     """Return all settings that determine a run, before its first tick."""
-    resolved = stack.resolved_settings()
+    scenario, weather, added = setup.scenario, setup.weather, setup.added_criteria
+    resolved = setup.stack.resolved_settings()
     profile, stations = resolved.channel_profile, dict(resolved.stations)
     later = () if settings.channel is not None else tuple(_later_channels(scenario))
     files = [*_scenario_files(scenario), *_setting_files((profile, *later, *stations.values()), scenario)]
-    models = distributions(("controllers", name) for name in settings.controllers.values())
+    models = distributions(
+        [
+            *(("controllers", name) for name in settings.controllers.values()),
+            *(("criteria", one.kind) for one in added),
+        ]
+    )
     return ResolvedSettings(
         scenario=name_of(scenario.path) if scenario.path is not None else scenario.name,
         seed=seed,
@@ -54,6 +57,8 @@ def resolve_settings(
         drawn=_drawn(scenario, seed, settings),
         controllers=dict(settings.controllers),
         user_values=dict(settings.user_values),
+        drive=tuple(sorted(scenario.driven)),
+        criteria=tuple({one.kind: without_folders(_dump(one.settings))} for one in added),
         dt=float(settings.dt),
         time_limit=float(settings.time_limit),
         files=tuple(dict.fromkeys(files)),

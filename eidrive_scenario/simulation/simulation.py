@@ -19,7 +19,7 @@ from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.simulation.attribution import attributed, report_extension, wall_limit_error
-from eidrive_scenario.simulation.command_execution import RunState, execute
+from eidrive_scenario.simulation.command_execution import RunState, add_criteria, execute
 from eidrive_scenario.simulation.observers import Observers
 from eidrive_scenario.simulation.run import (
     DEFAULT_SEED,
@@ -81,7 +81,8 @@ class Simulation:
             commands = self.storyboard.initial()
             self._environment: Environment | None = commands.environment
             execute(commands, self._state)
-            resolved = resolve_settings(self.scenario, seed, self.settings, self.stack, setup.weather)
+            add_criteria(setup.added_criteria, self._state)
+            resolved = resolve_settings(setup, seed, self.settings)
         except BaseException:
             self.world.close()
             raise

@@ -34,7 +34,9 @@ class ActivateControllerAction(ActionBehaviour):
     action: model.ActivateControllerAction
 
     def update(self) -> Status:
-        """Switch the domains."""
+        """Switch the domains, unless the settings of the run determine the controller."""
+        if self.actor.keeps_controller:
+            return _without_effect(self)
         lateral, longitudinal = self.action.lateral, self.action.longitudinal
         if self._names_other_controller() and any(
             is_agent_controller(controller) for controller in self.actor.controllers
@@ -90,6 +92,8 @@ class AssignControllerAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Assign the controller. Its activation in a domain deactivates the eidrive controller there."""
+        if self.actor.keeps_controller:
+            return _without_effect(self)
         if self._controller is not None and self._controller not in self.actor.controllers:
             self.actor.assign(self._controller)
         switch(self, *_yielded_domains(self.action.activate_lateral, self.action.activate_longitudinal))
@@ -156,6 +160,13 @@ class OverrideControllerValueAction(ActionBehaviour):
         """Describe the controls and their values."""
         words = [f"{o.control} {o.value:g}" if o.active else f"{o.control} free" for o in self._overrides()]
         return f"override {', '.join(words)}"
+
+
+def _without_effect(behaviour: ActionBehaviour) -> Status:
+    """Warn that the settings of the run determine the controller of the actor."""
+    what = f"no effect: the driving stack of the run drives {behaviour.actor.name!r} from its start to its end"
+    behaviour.context.warn(*behaviour.error(what, "remove --drive for it, if the scenario shall drive it").diagnostics)
+    return Status.SUCCESS
 
 
 def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool | None) -> None:

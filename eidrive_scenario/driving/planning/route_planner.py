@@ -17,6 +17,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads.routing.costs import assumed_speed
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -54,6 +55,7 @@ class RoutePlanner(Planner):
         self._first_speed: float | None = None
         self._stops = SignalStops(roads, spec) if settings.obey_signals else None
         self._path_of_stops: PlannedPath | None = None
+        self._place: LaneLocation | None = None
 
     def observe_signals(self, signals: Sequence[SignalReading]) -> None:
         if self._stops is not None:
@@ -99,9 +101,19 @@ class RoutePlanner(Planner):
             return goal.speed
         if self.settings.target_speed is not None:
             return self.settings.target_speed
+        if self.settings.follow_speed_limit and self.roads is not None:
+            return self._speed_limit(ego, self.roads)
         if self._first_speed is None:
             self._first_speed = max(ego.speed, 0.0)
         return self._first_speed
+
+    def _speed_limit(self, ego: EgoState, roads: RoadNetwork) -> float:
+        """Return the speed limit of the lane at the vehicle [m/s], within the limit of the vehicle."""
+        x, y, _ = ego.position.tolist()
+        self._place = roads.locate_at(x, y, self._place)
+        here = self._place
+        limit = None if here is None else roads.speed_limit(here.road, here.s, here.lane)
+        return min(assumed_speed(limit), self.spec.max_speed)
 
     def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> PlannedPath:
         if self._path is not None and goal is self._goal:

@@ -75,6 +75,9 @@ def run_facts(settings: Mapping[str, Any]) -> dict[str, str]:
     for key in ("controllers", "user_values"):
         for name, value in _entries(settings.get(key)):
             facts[f"{key.removesuffix('s').replace('_', ' ')} {name}"] = shorten(flow_text(value))
+    for key in ("drive", "criteria"):
+        if settings.get(key):
+            facts[key] = shorten(flow_text(settings[key]))
     for name, value in _entries(settings.get("parameters")):
         facts[f"${name}"] = shorten(short_number(str(value)))
     for key in ("versions", "extensions"):

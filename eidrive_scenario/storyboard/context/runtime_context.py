@@ -75,7 +75,9 @@ class RuntimeContext:
         """First condition that requests each user-defined value, by the name of the value."""
         self.commands = Commands()
         self.actors: dict[str, Actor] = {
-            name: Actor(name, entity, scenario.controllers.get(name, ()), roads)
+            name: Actor(
+                name, entity, scenario.controllers.get(name, ()), roads, keeps_controller=name in scenario.driven
+            )
             for name, entity in scenario.entities.items()
         }
         self.traffic = BackgroundTrafficPort(self._build_traffic)

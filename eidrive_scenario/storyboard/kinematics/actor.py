@@ -23,6 +23,7 @@ class Actor:
 
     An eidrive controller drives it while the controller is active in both domains; otherwise its motion is scripted.
 
+    keeps_controller  whether actions cannot assign or switch its controllers
     present    whether it is in the world; `RuntimeContext.add_actor` and `remove_actor` set it
     traveled   distance covered without teleports [m]
     standing_since, end_of_road_since, off_road_since  start of the state [s], None outside of it; `off_road_since` is
@@ -35,8 +36,11 @@ class Actor:
         entity: Entity,
         controllers: tuple[model.Controller, ...],
         roads: RoadNetwork | None,
+        *,
+        keeps_controller: bool = False,
     ) -> None:
         self.name = name
+        self.keeps_controller = keeps_controller
         self.entity = entity
         self._controllers: tuple[model.Controller, ...] = ()
         self._has_agent_controller = False
