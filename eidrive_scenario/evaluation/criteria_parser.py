@@ -83,6 +83,7 @@ def parse_criteria(
         entities=entities,
         monitors=monitors,
         scope=scope,
+        has_roads=has_roads,
         command=CRITERION,
         shown=repr(text.strip()),
     )
@@ -97,6 +98,7 @@ def declare_criteria(
     entities: Collection[str] | None = None,
     monitors: Collection[str] | None = None,
     scope: Scope | None = None,
+    has_roads: bool = True,
     command: str = "",
     shown: str = "",
 ) -> tuple[CriterionDeclaration, ...]:

@@ -99,6 +99,7 @@ def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> t
                 entities=scenario.entities,
                 monitors=_monitors(scenario),
                 scope=scenario.scope,
+                has_roads=scenario.road_file is not None,
                 shown=quoted(content.data),
             )
         except InputError as error:

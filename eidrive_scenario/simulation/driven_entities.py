@@ -102,6 +102,10 @@ def _stack(scenario: Scenario, name: str, source: YamlSource | None) -> Controll
     if not isinstance(content.data, Mapping):
         message = f"a driving stack is a mapping of properties (got {quoted(content.data)})"
         raise SettingError(Diagnostic(message, f"write {_EXAMPLE}", content.source))
+    if content.data.get("module", MODULE) != MODULE:
+        message = f"property 'module' is {quoted(content.data['module'])}"
+        hint = f"remove it, or write {MODULE}"
+        raise SettingError(Diagnostic(message, hint, content.source, content.lines.get("module")))
     data: dict[Any, Any] = {"module": MODULE, **content.data}
     if not any(key in data for key in _OF_SPEED):
         data["follow_speed_limit"] = True

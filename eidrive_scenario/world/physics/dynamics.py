@@ -140,10 +140,9 @@ class SingleTrack:
         if demand.throttle > 0.0:
             direction = demand.direction
             ahead = direction * forward
-            drive = self._full_drive
+            drive = self._full_drive * demand.throttle
             if drive * ahead > p.power:
                 drive = p.power / ahead
-            drive *= demand.throttle
             to_top = self._stop * (p.max_speed - ahead) - direction * free
             if drive > to_top:
                 drive = max(to_top, 0.0)

@@ -83,6 +83,14 @@ def test_drive_force_is_bounded_by_force_then_power_then_speed(car: CarFactory) 
     assert rows[-1, 4] == pytest.approx(30.0, abs=1e-3)
 
 
+def test_throttle_is_a_share_of_the_force_that_the_power_bounds(car: CarFactory) -> None:
+    """Files of CARLA have 200 m/s². A throttle of 1 % is 2 m/s² up to the speed P / (m a) = 20 m/s, not a hundredth."""
+    spec = replace(car(power=60_000, **LOSSLESS), max_acceleration=200.0)
+    rows = np.array(drive(spec, Control(throttle=0.01), 8.0))
+    assert rows[99, 4] == pytest.approx(2.0 * 5.0, rel=0.01)
+    assert rows[159, 4] == pytest.approx(2.0 * 8.0, rel=0.01)
+
+
 def test_top_speed_is_bounded_by_air_drag(car: CarFactory) -> None:
     """The power equals the drag at P = rho / 2 cA v³."""
     spec = car(power=40_000, drag_area=0.7, rolling_resistance=0)
