@@ -8,14 +8,28 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_scenario.api.common import RoadNetwork, WorldView
+from eidrive_scenario.api.criteria import (
+    Criterion,
+    CriterionSettings,
+    Frame,
+    Impact,
+    LaneTracker,
+    Verdict,
+    actor_never_present,
+    judge_impact,
+)
 
 
 class CollisionSettings(CriterionSettings):
-    """Settings: `{of: Ego}` for contact with any body, `{of: Ego, with: Incoming}` or `{of: Ego, with: [A, B]}`."""
+    """Settings: `{of: Ego}` for contact with any body, `{of: Ego, with: Incoming}` or `{of: Ego, with: [A, B]}`.
+
+    only_at_fault  whether contacts count only if the actor is at fault
+    """
 
     of: str
     others: str | tuple[str, ...] | None = Field(default=None, alias="with")
+    only_at_fault: bool = False
 
     @model_validator(mode="after")
     def _not_itself(self) -> Self:
@@ -25,20 +39,22 @@ class CollisionSettings(CriterionSettings):
 
 
 @dataclass(frozen=True)
-class Impact:
-    """Start of a contact at `time` [s] at `x`, `y` [m], with closing speed `speed` [m/s]."""
+class Hit:
+    """Start of a contact at `time` [s] at `x`, `y` [m], with relative speed `speed` [m/s]."""
 
     time: float
     other: str
     x: float
     y: float
     speed: float
+    impact: Impact | None
 
 
 class Collision(Criterion):
     """Criterion that fails at the first contact.
 
-    The reason states actors, time, position and speed. The value is the number of contacts.
+    The reason states actors, time, position, speed, the side of `of` that was hit, and whether `of` is at fault. The
+    value is the number of contacts.
     """
 
     settings_type = CollisionSettings
@@ -51,7 +67,14 @@ class Collision(Criterion):
         self._others = (others,) if isinstance(others, str) else others
         self.subjects = (self._of, *(self._others or ()))
         self._missing = set(self.subjects)
-        self._impacts: list[Impact] = []
+        self._only_at_fault = settings.only_at_fault
+        self._hits: list[Hit] = []
+        self._before: WorldView | None = None
+        self._lanes: LaneTracker | None = None
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        super().bind(roads)
+        self._lanes = LaneTracker(roads) if roads is not None else None
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
@@ -63,24 +86,32 @@ class Collision(Criterion):
             other = contact.second if contact.first == self._of else contact.first
             if self._others is None or other in self._others:
                 x, y, _ = contact.position
-                self._impacts.append(Impact(view.time, other, x, y, contact.impact_speed))
+                impact = None
+                if self._of in view.rows:  # A recording may lack it.
+                    impact = judge_impact(view, self._before, self._of, other, x, y, self._lanes)
+                if not self._only_at_fault or (impact is not None and impact.at_fault):
+                    self._hits.append(Hit(view.time, other, x, y, contact.impact_speed, impact))
+        self._before = view
 
     def verdict(self) -> Verdict:
-        first = self._impacts[0] if self._impacts else None
+        first = self._hits[0] if self._hits else None
         if first is not None:
             reason = (
                 f"{self._of} and {first.other} hit each other at {first.time:.2f} s at "
                 f"({first.x:.1f}, {first.y:.1f}) m at a relative speed of {first.speed:.1f} m/s"
             )
+            if first.impact is not None:
+                fault = "at fault" if first.impact.at_fault else "not at fault"
+                reason += f"; {self._of} with its {first.impact.side}, {fault} as {first.impact.rule}"
         elif self._missing:
             reason = actor_never_present(self._missing)
         else:
             touched = f"did not touch {' or '.join(self._others)}" if self._others else "touched nothing"
-            reason = f"{self._of} {touched}"
+            reason = f"{self._of} {touched}" + (" by its own fault" if self._only_at_fault else "")
         return Verdict(
             name=self.name,
             passed=first is None and not self._missing,
-            value=float(len(self._impacts)),
+            value=float(len(self._hits)),
             limit=0.0,
             unit="",
             first_violation=first.time if first is not None else None,
@@ -89,9 +120,12 @@ class Collision(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """Return the number of contacts, and time [s] and relative speed [m/s] of the first one."""
-        found = {f"{self.name}.count": float(len(self._impacts))}
-        if self._impacts:
-            found[f"{self.name}.time"] = self._impacts[0].time
-            found[f"{self.name}.impact_speed"] = self._impacts[0].speed
+        """Return the numbers of contacts and of those by own fault, and time [s] and speed [m/s] of the first one."""
+        found = {f"{self.name}.count": float(len(self._hits))}
+        if self._hits:
+            found[f"{self.name}.time"] = self._hits[0].time
+            found[f"{self.name}.impact_speed"] = self._hits[0].speed
+            found[f"{self.name}.at_fault"] = float(
+                sum(hit.impact is not None and hit.impact.at_fault for hit in self._hits)
+            )
         return found

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from eidrive_scenario.api.common import Contact, WorldView
+from eidrive_scenario.api.common import Contact, RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import Frame
 
 
@@ -27,6 +28,16 @@ MakeFrame = Callable[..., Frame]
 @pytest.fixture
 def car() -> type[Car]:
     return Car
+
+
+@pytest.fixture
+def roads() -> RoadNetwork:
+    """Return the roads of scenario 1. Road 1 is along x from -80 m to the junction at 20 m.
+
+    Lanes of road 1: driving at y = 0 (along x) and 3.5 m (against x), 3.5 m wide; parking until -5.25 m, shoulder until
+    -6.38 m, sidewalk until -8.38 m.
+    """
+    return RoadNetwork.load(Path(__file__).parents[2] / "xosc" / "roads" / "coop_1.xodr")
 
 
 @pytest.fixture

@@ -22,9 +22,15 @@ def test_collision_first_contact_is_the_verdict(frame: Any, car: Any) -> None:
     assert not verdict.passed
     assert (verdict.value, verdict.limit, verdict.first_violation) == (2.0, 0.0, 6.35)
     assert verdict.reason == (
-        "Ego and Incoming hit each other at 6.35 s at (29.8, 7.1) m at a relative speed of 11.2 m/s"
+        "Ego and Incoming hit each other at 6.35 s at (29.8, 7.1) m at a relative speed of 11.2 m/s; "
+        "Ego with its left, not at fault as it had stopped"
     )
-    assert collision.metrics() == {"collision.count": 2.0, "collision.time": 6.35, "collision.impact_speed": 11.24}
+    assert collision.metrics() == {
+        "collision.count": 2.0,
+        "collision.time": 6.35,
+        "collision.impact_speed": 11.24,
+        "collision.at_fault": 0.0,
+    }
 
 
 @pytest.mark.parametrize(("others", "passed"), [(None, False), ("Bus", False), ("Van", True), (["Van", "Bus"], False)])
@@ -62,3 +68,54 @@ def test_collision_actor_may_be_added_later(frame: Any, car: Any) -> None:
     frames = [frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(0), "Incoming": car(9)}), frame(2.0, {"Ego": car(0)})]
     (verdict,) = evaluate_criteria(frames, [criterion(**{"with": "Incoming"})])
     assert verdict.passed
+
+
+@pytest.mark.parametrize(
+    ("speed", "other", "point", "side", "at_fault"),
+    [
+        (0.0, (4.0, 0.0, 0.0, -5.0), (2, 0), "front", False),  # standing
+        (5.0, (4.0, 0.0, 0.0, 0.0), (2, 0), "front", True),  # into a standing car
+        (5.0, (4.0, 0.5, 0.0, 3.0), (2, 0.5), "front", True),  # into a slower car
+        (5.0, (-4.0, 0.0, 0.0, 9.0), (-2, 0), "rear", False),  # hit from behind
+        (5.0, (0.0, 2.0, 0.0, 9.0), (0.5, 1), "left", False),  # at the side, without roads
+        (5.0, (0.0, -2.0, 0.0, 9.0), (0.5, -1), "right", False),
+    ],
+)
+def test_collision_side_and_fault_by_the_rules_of_nuplan(
+    frame: Any, car: Any, speed: float, other: Any, point: Any, side: str, at_fault: bool
+) -> None:
+    cars = {"Ego": car(0, speed=speed), "Bus": car(*other)}
+    frames = [frame(0.0, cars), frame(0.05, cars, [Contact("Bus", "Ego", (*point, 0.5), 5.0)])]
+    collision = criterion()
+    (verdict,) = evaluate_criteria(frames, [collision])
+    assert f"Ego with its {side}, {'at fault' if at_fault else 'not at fault'} as" in verdict.reason
+    assert collision.metrics()["collision.at_fault"] == at_fault
+    (only,) = evaluate_criteria(frames, [criterion(only_at_fault=True)])
+    assert (only.passed, only.value) == (not at_fault, float(at_fault))
+
+
+@pytest.mark.parametrize(("y", "at_fault"), [(0.0, False), (1.2, True), (-5.0, True)])
+def test_collision_at_the_side_is_a_fault_outside_one_lane(
+    frame: Any, car: Any, roads: Any, y: float, at_fault: bool
+) -> None:
+    """The lane has a width of 3.5 m around y = 0, parking and shoulder begin at -1.75 m."""
+    cars = {"Ego": car(-50, y, speed=5.0), "Bus": car(-50, y + 2.0, speed=9.0)}
+    collision = criterion()
+    evaluate_criteria([frame(0.0, cars, [Contact("Ego", "Bus", (-50, y + 1.0, 0), 1.0)])], [collision], roads)
+    assert collision.metrics()["collision.at_fault"] == at_fault
+
+
+def test_collision_speeds_before_the_contact_count(frame: Any, car: Any) -> None:
+    """The crash itself stops the Ego."""
+    before = {"Ego": car(0, speed=9.0), "Bus": car(4.1, speed=2.0)}
+    after = {"Ego": car(0.1, speed=0.0), "Bus": car(4.1, speed=6.0)}
+    collision = criterion()
+    evaluate_criteria([frame(0.0, before), frame(0.05, after, [Contact("Ego", "Bus", (2.1, 0, 0), 7.0)])], [collision])
+    assert collision.metrics()["collision.at_fault"] == 1.0
+
+
+def test_collision_with_a_wall_is_a_fault(frame: Any, car: Any) -> None:
+    """A wall is no actor of the view."""
+    collision = criterion()
+    evaluate_criteria([frame(0.0, {"Ego": car(0, speed=5.0)}, [Contact("Ego", "Wall", (2, 0, 0), 5.0)])], [collision])
+    assert collision.metrics()["collision.at_fault"] == 1.0

@@ -34,14 +34,43 @@ FILE = """<OpenSCENARIO>
 <CatalogLocations/><RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork><Entities>{cars}</Entities>
 <Storyboard><Init><Actions>
 <UserDefinedAction><CustomCommandAction type="eidrive.criterion">[{criteria}]</CustomCommandAction></UserDefinedAction>
-{starts}</Actions></Init>
+{starts}</Actions></Init>{story}
 <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
 <SimulationTimeCondition value="4" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup></StopTrigger>
 </Storyboard></OpenSCENARIO>"""
 
-ACTORS = {"Ego": (-70.0, 0.0, 0.0, 10.0), "Lead": (-50.0, 0.0, 0.0, 8.0), "Oncoming": (-10.0, 3.5, 3.14159265, 5.0)}
+STORY = """<Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="Changer"/></Actors><Maneuver name="maneuver">
+<Event name="event" priority="parallel"><Action name="change"><PrivateAction><LateralAction><LaneChangeAction>
+<LaneChangeActionDynamics dynamicsShape="sinusoidal" dynamicsDimension="time" value="2"/>
+<LaneChangeTarget><RelativeTargetLane entityRef="Changer" value="1"/></LaneChangeTarget>
+</LaneChangeAction></LateralAction></PrivateAction></Action>
+<Action name="brake"><PrivateAction><LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="rate" value="6"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="2"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
+</PrivateAction></Action>
+<StartTrigger><ConditionGroup><Condition name="start" delay="0" conditionEdge="none"><ByValueCondition>
+<SimulationTimeCondition value="1" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup></StartTrigger>
+</Event></Maneuver></ManeuverGroup><StartTrigger/></Act></Story>"""
+"""A change to the lane of the oncoming traffic, from 8 to 2 m/s at 6 m/s²."""
+
+ACTORS = {
+    "Ego": (-70.0, 0.0, 0.0, 10.0),
+    "Lead": (-50.0, 0.0, 0.0, 8.0),
+    "Oncoming": (-10.0, 3.5, 3.14159265, 5.0),
+    "Sidewalk": (-30.0, -7.2, 0.0, 0.0),
+    "Changer": (60.0, 0.0, 0.0, 8.0),
+    "Last": (131.0, 0.0, 0.0, 0.0),
+}
 
 CASES = {
+    "actor_blocked": ("{of: Sidewalk, at_most: 4.1}", "{of: Sidewalk, at_most: 3.9}"),
+    "comfort": ("{of: Ego}", "{of: Changer}"),
+    "end_of_road": ("{of: Ego}", "{of: Last, within: 1.6}"),
+    "keep_lane": ("{of: Ego}", "{of: Changer}"),
+    "off_road": ("{of: Ego}", "{of: Sidewalk}"),
+    "on_sidewalk": ("{of: Ego}", "{of: Sidewalk}"),
+    "wrong_lane": ("{of: Ego}", "{of: Changer}"),
     "average_speed": ("{of: Ego, at_least: 9.9}", "{of: Lead, at_least: 9.9}"),
     "collision": ("{of: Ego}", "{of: Rear}"),
     "deceleration_to_avoid_crash": ("{of: Ego, at_most: 0.26}", "{of: Ego, at_most: 0.2}"),
@@ -70,7 +99,9 @@ def write_scenario(folder: Path, criteria: str, actors: dict[str, tuple[float, f
     starts = "".join(START.format(name=name, x=x, y=y, h=h, speed=speed) for name, (x, y, h, speed) in actors.items())
     path = folder / "criteria.xosc"
     cars = "".join(CAR.format(name=name) for name in actors)
-    path.write_text(FILE.format(road=ROAD, cars=cars, starts=starts, criteria=criteria), encoding="utf-8")
+    story = STORY if "Changer" in actors else ""
+    text = FILE.format(road=ROAD, cars=cars, starts=starts, criteria=criteria, story=story)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

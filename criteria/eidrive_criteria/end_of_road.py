@@ -1,0 +1,47 @@
+"""Criterion: time at the end of the road."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from eidrive_criteria.summed import SummedCriterion, SummedSettings
+from eidrive_scenario.api.common import WorldView
+
+
+class EndOfRoadSettings(SummedSettings):
+    """Settings: `{of: Ego, within: 1.0, at_most: 0}` with distance [m] and time [s]."""
+
+    within: Annotated[float, Field(ge=0)] = 1.0
+
+
+class EndOfRoad(SummedCriterion):
+    """Criterion that fails if the front of the actor is at an end of its lane without continuation.
+
+    The distance to the end is at most `within`, for longer than `at_most`. An actor that stands with its back to the
+    end is not at the end.
+    """
+
+    settings_type = EndOfRoadSettings
+    name = "end_of_road"
+    unit = "s"
+    state = "was at the end of its road"
+
+    def __init__(self, settings: EndOfRoadSettings) -> None:
+        super().__init__(settings)
+        self._within = settings.within
+
+    def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
+        place, roads = self.lanes.center(view, row), self.lanes.roads
+        if place is None:
+            return None
+        road, key = roads.road(place.road), self.lanes.key(place)
+        _, _, _, length, _, _, yaw = view.plain_boxes[row]
+        direction = 1 if math.cos(yaw - roads.road_pose_at(place.road, place.s).h) >= 0.0 else -1
+        section = road.sections[key.section]
+        left = section.end - place.s if direction > 0 else place.s - section.s
+        if left - length / 2.0 > self._within:
+            return None
+        return None if any(True for _ in roads.links.beyond(key, direction)) else duration

@@ -1,0 +1,51 @@
+"""Criterion: number of lane changes."""
+
+from __future__ import annotations
+
+from eidrive_criteria.summed import SummedCriterion, SummedSettings
+from eidrive_scenario.api.common import LaneLocation, WorldView
+
+
+class KeepLaneSettings(SummedSettings):
+    """Settings: `{of: Ego, at_most: 0}` lane changes."""
+
+
+class KeepLane(SummedCriterion):
+    """Criterion that fails if the center of the actor crosses the edge of its lane more than `at_most` times.
+
+    Leaving all lanes and coming back counts once each. The end of a lane, and the choice of a branch in a junction, do
+    not count.
+    """
+
+    settings_type = KeepLaneSettings
+    name = "keep_lane"
+    state = "crossed the edge of its lane"
+
+    def __init__(self, settings: KeepLaneSettings) -> None:
+        super().__init__(settings)
+        self._before: LaneLocation | None = None
+        self._known = False
+
+    def interrupt(self) -> None:
+        self._known = False
+
+    def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
+        place = self.lanes.center(view, row)
+        before, known = self._before, self._known
+        self._before, self._known = place, True
+        if not known or self._same_lane(before, place):
+            return None
+        return 1.0
+
+    def _same_lane(self, before: LaneLocation | None, now: LaneLocation | None) -> bool:
+        if before is None or now is None:
+            return before is now
+        one, other = self.lanes.key(before), self.lanes.key(now)
+        if one == other:
+            return True
+        roads = self.lanes.roads
+        if any(other == following for way in (1, -1) for following, _ in roads.links.beyond(one, way)):
+            return True
+        if one.road == other.road:
+            return abs(one.section - other.section) > 1
+        return any(roads.road(key.road).junction_id is not None for key in (one, other))

@@ -1,0 +1,40 @@
+"""Criterion: distance driven against the direction of the lane."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_criteria.summed import SummedCriterion, SummedSettings
+from eidrive_scenario.api.common import WorldView
+
+AGAINST = math.cos(math.radians(120.0))
+"""Cosine of the angle between an actor and its lane from which on the lane is the wrong one."""
+STILL = 0.02
+"""Movements of one step that are ignored [m]."""
+
+
+class WrongLaneSettings(SummedSettings):
+    """Settings: `{of: Ego, at_most: 0}` [m]."""
+
+
+class WrongLane(SummedCriterion):
+    """Criterion that fails if the actor drives farther than `at_most` in a lane of the opposite direction.
+
+    Its heading and the direction of the lane under its center differ by more than 120°. Junctions and lanes for both
+    directions are excluded.
+    """
+
+    settings_type = WrongLaneSettings
+    name = "wrong_lane"
+    unit = "m"
+    state = "drove against the direction of its lane"
+
+    def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
+        place = self.lanes.center(view, row)
+        if place is None or distance < STILL or self.lanes.roads.road(place.road).junction_id is not None:
+            return None
+        lane = self.lanes.lane(place)
+        if not lane.drivable or lane.type == "bidirectional" or lane.direction == "both":
+            return None
+        turn = math.cos(view.states[row].yaw - self.lanes.roads.pose(place).h)
+        return distance if turn < AGAINST else None

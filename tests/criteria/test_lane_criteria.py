@@ -1,0 +1,149 @@
+"""Criteria on lanes, on road 1 of scenario 1 (see the fixture `roads`); boxes 4 m by 2 m."""
+
+import math
+from typing import Any
+
+import pytest
+from eidrive_criteria.end_of_road import EndOfRoad, EndOfRoadSettings
+from eidrive_criteria.keep_lane import KeepLane, KeepLaneSettings
+from eidrive_criteria.off_road import OffRoad, OffRoadSettings
+from eidrive_criteria.on_sidewalk import OnSidewalk, OnSidewalkSettings
+from eidrive_criteria.wrong_lane import WrongLane, WrongLaneSettings
+
+from eidrive_scenario.api.common import RoadNetwork, SettingError
+from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
+
+ALL = [
+    OffRoad(OffRoadSettings(of="Ego")),
+    OnSidewalk(OnSidewalkSettings(of="Ego")),
+    WrongLane(WrongLaneSettings(of="Ego")),
+    KeepLane(KeepLaneSettings(of="Ego")),
+    EndOfRoad(EndOfRoadSettings(of="Ego")),
+]
+
+
+def judge(criterion: Criterion, frames: list[Any], roads: RoadNetwork) -> Verdict:
+    (verdict,) = evaluate_criteria(frames, [criterion], roads)
+    return verdict
+
+
+def along(frame: Any, car: Any, *ys: float, x: float = -60.0, speed: float = 5.0, yaw: float = 0.0) -> list[Any]:
+    """Return frames each 0.5 s with the center of the Ego at these y, while it drives along its heading."""
+    step = speed * 0.5 * math.cos(yaw)
+    return [frame(0.5 * n, {"Ego": car(x + n * step, y, yaw, speed)}) for n, y in enumerate(ys)]
+
+
+@pytest.mark.parametrize(
+    ("ys", "value"),
+    [
+        ((0.0, -3.5, -5.2), 0.0),
+        ((0.0, -2.0, -4.0, -5.5, -5.5, -3.0), 1.0),
+        ((0.0, 2.0, 3.5), 0.0),
+        ((-7.0, -7.0, -7.0), 1.0),
+    ],
+)
+def test_off_road_time(frame: Any, car: Any, roads: RoadNetwork, ys: tuple[float, ...], value: float) -> None:
+    frames = along(frame, car, *ys)
+    verdict = judge(OffRoad(OffRoadSettings(of="Ego")), frames, roads)
+    assert verdict.passed is (value == 0.0)
+    assert verdict.value == pytest.approx(value)
+    assert judge(OffRoad(OffRoadSettings(of="Ego", at_most=1.0)), frames, roads).passed
+
+
+@pytest.mark.parametrize(
+    ("ys", "value"),
+    [
+        ((0.0, -3.0, -5.0), 0.0),
+        ((-3.0, -5.0, -7.0, -7.0, -5.0), 1.0),
+        ((-3.0, -4.5, -5.5, -5.5), 1.0),  # the right corners at -6.5 m
+    ],
+)
+def test_on_sidewalk_time(frame: Any, car: Any, roads: RoadNetwork, ys: tuple[float, ...], value: float) -> None:
+    verdict = judge(OnSidewalk(OnSidewalkSettings(of="Ego")), along(frame, car, *ys), roads)
+    assert verdict.passed is (value == 0.0)
+    assert verdict.value == pytest.approx(value)
+
+
+@pytest.mark.parametrize("criterion", [OffRoad(OffRoadSettings(of="Ego")), OnSidewalk(OnSidewalkSettings(of="Ego"))])
+def test_single_frame_in_the_state_fails(frame: Any, car: Any, roads: RoadNetwork, criterion: Criterion) -> None:
+    verdict = judge(criterion, along(frame, car, -7.0), roads)
+    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 0.0, 0.0)
+
+
+def test_wrong_lane_distance(frame: Any, car: Any, roads: RoadNetwork) -> None:
+    """2.5 m per frame; three of them in the lane of the oncoming traffic."""
+    frames = along(frame, car, 0.0, 1.5, 3.5, 3.5, 3.5, 0.0)
+    verdict = judge(WrongLane(WrongLaneSettings(of="Ego")), frames, roads)
+    assert (verdict.passed, verdict.first_violation) == (False, 1.0)
+    assert verdict.value == pytest.approx(math.hypot(2.5, 2.0) + 5.0)
+    assert judge(WrongLane(WrongLaneSettings(of="Ego", at_most=9.0)), frames, roads).passed
+
+
+def test_wrong_lane_excludes_the_right_direction_reversing_and_junctions(
+    frame: Any, car: Any, roads: RoadNetwork
+) -> None:
+    against = along(frame, car, 3.5, 3.5, 3.5, x=0.0, yaw=math.pi)
+    reversing = along(frame, car, 0.0, 0.0, 0.0, x=0.0, speed=-5.0)
+    junction = along(frame, car, 0.0, 0.0, 0.0, x=36.0, yaw=math.pi)
+    for frames in (against, reversing, junction):
+        verdict = judge(WrongLane(WrongLaneSettings(of="Ego")), frames, roads)
+        assert (verdict.passed, verdict.value) == (True, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("ys", "value"), [((0.0, 1.0, 2.5, 3.5, 1.0), 2.0), ((0.0, 1.5, -1.5), 0.0), ((0.0, -3.0), 1.0)]
+)
+def test_keep_lane_counts_crossings(
+    frame: Any, car: Any, roads: RoadNetwork, ys: tuple[float, ...], value: float
+) -> None:
+    frames = along(frame, car, *ys)
+    verdict = judge(KeepLane(KeepLaneSettings(of="Ego")), frames, roads)
+    assert (verdict.passed, verdict.value) == (value == 0.0, value)
+    assert judge(KeepLane(KeepLaneSettings(of="Ego", at_most=2)), frames, roads).passed
+
+
+def test_keep_lane_excludes_junctions_and_teleports(frame: Any, car: Any, roads: RoadNetwork) -> None:
+    straight = along(frame, car, *[0.0] * 60, x=-70.0)
+    assert judge(KeepLane(KeepLaneSettings(of="Ego")), straight, roads).value == 0.0
+    jump = [*along(frame, car, 0.0, 0.0), frame(1.0, {"Ego": car(0, 3.5, math.pi, 5.0)})]
+    assert judge(KeepLane(KeepLaneSettings(of="Ego")), jump, roads).value == 0.0
+
+
+@pytest.mark.parametrize(
+    ("x", "yaw", "value"),
+    [
+        (-77.5, math.pi, 1.0),  # front 0.5 m before the end
+        (-76.0, math.pi, 0.0),  # front 2 m before it
+        (-77.5, 0.0, 0.0),  # with its back to the end
+        (17.5, 0.0, 0.0),  # before the junction
+    ],
+)
+def test_end_of_road_time(frame: Any, car: Any, roads: RoadNetwork, x: float, yaw: float, value: float) -> None:
+    y = 3.5 if yaw else 0.0
+    frames = along(frame, car, y, y, y, x=x, speed=0.0, yaw=yaw)
+    verdict = judge(EndOfRoad(EndOfRoadSettings(of="Ego")), frames, roads)
+    assert verdict.passed is (value == 0.0)
+    assert verdict.value == pytest.approx(value)
+    assert judge(EndOfRoad(EndOfRoadSettings(of="Ego", at_most=2.0)), frames, roads).passed
+
+
+@pytest.mark.parametrize("criterion", ALL, ids=lambda each: each.name)
+def test_absent_actor_fails_and_missing_roads_are_an_error(
+    frame: Any, car: Any, roads: RoadNetwork, criterion: Criterion
+) -> None:
+    verdict = judge(criterion, [frame(0.0, {"Bus": car(0)})], roads)
+    assert (verdict.passed, verdict.value) == (False, None)
+    assert verdict.reason == "Ego was never present, so nothing was measured"
+    with pytest.raises(SettingError, match="requires roads"):
+        evaluate_criteria([], [criterion])
+
+
+@pytest.mark.parametrize("criterion_type", [type(each) for each in ALL], ids=lambda each: each.name)
+def test_absence_and_one_frame_on_the_lane_pass(
+    frame: Any, car: Any, roads: RoadNetwork, criterion_type: type[Criterion]
+) -> None:
+    criterion = criterion_type(criterion_type.settings_type.model_validate({"of": "Ego"}))
+    frames = [*along(frame, car, 0.0), frame(0.5, {"Bus": car(0)}), frame(1.0, {"Ego": car(-60, 0.0, 0.0, 5.0)})]
+    verdict = judge(criterion, frames, roads)
+    assert (verdict.passed, verdict.value) == (True, 0.0)
+    assert verdict.reason.startswith("Ego never ")
