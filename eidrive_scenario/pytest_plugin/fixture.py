@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -13,14 +13,14 @@ import pytest
 from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.library import definition, library_path, resolve_scenario
-from eidrive_scenario.pytest_plugin.options import RunVariant, run_variants
-from eidrive_scenario.pytest_plugin.outcome import explain, properties, run_variant
+from eidrive_scenario.pytest_plugin.options import MarkerSettings, RunVariant, run_variants
+from eidrive_scenario.pytest_plugin.outcome import explain, path_beside, properties, run_variant
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import Source
     from eidrive_scenario.simulation import RunResult
 
-_KEYWORDS = ("channel", "seeds")
+_KEYWORDS = ("channel", "seeds", "drive", "criteria")
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         if sum(own.name == marker.name for own in metafunc.definition.own_markers) > 1:
             raise ValueError('several markers scenario (expected one with all patterns: scenario("a.xosc", "b.xosc"))')
         channels, seeds = _read_marker(marker)
+        added = _added(marker, metafunc.definition.path.parent)
         paths = [path for pattern in marker.args for path in _matches(pattern, metafunc)]
     except ValueError as error:
         raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {error}", pytrace=False) from None
-    cases = [Case(path, variant) for path in paths for variant in run_variants(metafunc.config, channels, seeds)]
+    cases = [Case(path, variant) for path in paths for variant in run_variants(metafunc.config, channels, seeds, added)]
     metafunc.parametrize(
         "run_scenario", cases, indirect=True, ids=[f"{case.source.stem}-{case.variant}" for case in cases]
     )
@@ -85,6 +86,16 @@ def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]
     if seeds is not None and (not isinstance(seeds, int) or isinstance(seeds, bool) or seeds < 1):
         raise ValueError(f"seeds: not a positive number of seeds (got {seeds!r})")
     return channels, seeds
+
+
+def _added(marker: pytest.Mark, folder: Path) -> MarkerSettings:
+    """Return driving stacks and criteria of the marker; files may be beside the test file."""
+    drive, criteria = marker.kwargs.get("drive"), marker.kwargs.get("criteria")
+    if isinstance(drive, Mapping):
+        drive = {name: path_beside(stack, folder) for name, stack in drive.items()}
+    if isinstance(criteria, list | tuple):
+        criteria = [path_beside(one, folder) for one in criteria]
+    return MarkerSettings(drive, path_beside(criteria, folder))
 
 
 def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
@@ -128,7 +139,10 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
         variant = case.variant if case is not None else RunVariant(None, 1)
         replaced = variant.replaced if channel is None and seed is None else ()
         variant = RunVariant(
-            variant.channel if channel is None else channel, variant.seed if seed is None else seed, replaced
+            variant.channel if channel is None else channel,
+            variant.seed if seed is None else seed,
+            replaced,
+            added=variant.added,
         )
         try:
             source = resolve_scenario(source) if isinstance(source, str | Path) else source

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentTypeError
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,34 @@ import pytest
 from eidrive_scenario.pytest_plugin import hung_runs
 
 MARKER = (
-    "scenario(pattern, channel=None, seeds=None): run the test once for every scenario that matches the pattern "
-    "(beside the test file, below the root, or in the library), channel and seed, through the fixture run_scenario"
+    "scenario(pattern, channel=None, seeds=None, drive=None, criteria=None): run the test once for every scenario that "
+    "matches the pattern (beside the test file, below the root, or in the library), channel and seed, through the "
+    "fixture run_scenario; drive and criteria are those of RunSettings"
 )
 _DEFAULT_MAX_RUNS = 100
 _MAX_LENGTH = 80
 """Maximum number of characters of a channel in the name of a test."""
+_SHOWN = ("channel", "drive", "criterion", "detector", "seeds", "out")
+"""Options that the header of a report lists."""
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _WORKER_KEY = "eidrive_given"
+
+
+@dataclass(frozen=True)
+class MarkerSettings:
+    """Settings `drive` and `criteria` of a marker, as in RunSettings."""
+
+    drive: Any = None
+    criteria: Any = None
+
+    @property
+    def driven(self) -> list[str]:
+        """Names of the entities that get a driving stack."""
+        names = [self.drive] if isinstance(self.drive, str) else self.drive
+        return [name for name in names if isinstance(name, str)] if isinstance(names, Iterable) else []
+
+
+_NOTHING = MarkerSettings()
 
 
 @dataclass(frozen=True)
@@ -30,12 +50,14 @@ class RunVariant:
 
     replaced  warnings about options that replace lists of the marker of the test
     label     channel in the name of the test, if its short name is not unique
+    added     driving stacks and criteria of the marker of the test
     """
 
     channel: str | None
     seed: int
     replaced: tuple[str, ...] = ()
     label: str = ""
+    added: MarkerSettings = _NOTHING
 
     def __str__(self) -> str:
         channel = [] if self.channel is None else [self.label or _short(self.channel)]
@@ -61,6 +83,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--eidrive-seeds", metavar="N", type=_count, help="run each scenario with the seeds 1 to N (default: 1)"
     )
+    group.addoption(
+        "--eidrive-drive",
+        metavar="NAME[=STACK]",
+        action="append",
+        type=_entity,
+        help="give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable",
+    )
+    group.addoption(
+        "--eidrive-criterion",
+        metavar="YAML|FILE",
+        action="append",
+        help="add criteria to those of each scenario, such as '{collision: {of: Ego}}', or those of a file; repeatable",
+    )
     group.addoption("--eidrive-detector", metavar="NAME", help="detector of all stations (default: the file's own)")
     group.addoption(
         "--eidrive-max-runs",
@@ -71,6 +106,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption("--eidrive-out", metavar="DIR", help="keep recording.mcap and result.json of every run below DIR")
     hung_runs.pytest_addoption(parser)
+    parser.addini("eidrive_drive", "values of --eidrive-drive for all scenarios, one per line", type="linelist")
+    parser.addini("eidrive_criteria", "values of --eidrive-criterion for all scenarios, one per line", type="linelist")
     parser.addini(
         "eidrive_paths",
         "folders whose .xosc files are tests (default: folders of the command line)",
@@ -87,6 +124,14 @@ def _count(text: str) -> int:
 
 def _count_or_all(text: str) -> int | None:
     return None if text == "all" else _count(text)
+
+
+def _entity(text: str) -> str:
+    """Return the text of an option with an entity, and a stack after an equals sign."""
+    name, equals, stack = text.partition("=")
+    if not name.strip() or (equals and not stack.strip()):
+        raise ArgumentTypeError(f"no entity or stack is given (got {text!r})")
+    return text
 
 
 def _listed_channels(text: str) -> str:
@@ -117,14 +162,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_report_header(config: pytest.Config) -> str | None:
     """Return the options with a value, or None."""
-    options = {name: config.getoption(f"eidrive_{name}") for name in ("channel", "detector", "seeds", "out")}
-    options["channel"] = ",".join(options["channel"]) if options["channel"] is not None else None
+    options = {name: config.getoption(f"eidrive_{name}") for name in _SHOWN}
+    options = {name: ",".join(value) if isinstance(value, list) else value for name, value in options.items()}
     given = [f"{name} {value}" for name, value in options.items() if value is not None]
     return f"eidrive: {', '.join(given)}" if given else None
 
 
 def run_variants(
-    config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None
+    config: pytest.Config,
+    channels: Sequence[str] | None = None,
+    seeds: int | None = None,
+    added: MarkerSettings = _NOTHING,
 ) -> Iterator[RunVariant]:
     """Yield every channel with every seed. The command line overrides `channels` and `seeds` of the marker."""
     given = config.getoption("eidrive_channel")
@@ -136,10 +184,14 @@ def run_variants(
         replaced.append(f"--eidrive-channel {','.join(map(str, names))} replaces the marker's channel=[{listed}]")
     if option and seeds is not None and option != seeds:
         replaced.append(f"--eidrive-seeds {option} replaces the marker's seeds={seeds}")
+    driven = [text.partition("=")[0].strip() for text in config.getoption("eidrive_drive") or ()]
+    for name in driven:
+        if name in added.driven:
+            replaced.append(f"--eidrive-drive {name} replaces the driving stack of {name!r} in the marker")
     chosen = names or channels or (None,)
     for channel, label in zip(chosen, _labels(chosen), strict=True):
         for seed in range(1, (option or seeds or 1) + 1):
-            yield RunVariant(channel, seed, tuple(replaced), label)
+            yield RunVariant(channel, seed, tuple(replaced), label, added)
 
 
 def _labels(channels: Sequence[str | None]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import fields
@@ -12,7 +13,7 @@ import pytest
 
 from eidrive_scenario.errors import Diagnostic, EidriveError, ExtensionError, InputError, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.hung_runs import wall_limit_of
-from eidrive_scenario.pytest_plugin.options import RunVariant
+from eidrive_scenario.pytest_plugin.options import MarkerSettings, RunVariant
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
 if TYPE_CHECKING:
@@ -61,6 +62,9 @@ def pytest_command(item: pytest.Item) -> str:
         value = item.config.getoption(f"eidrive_{name}")
         if value is not None:
             words += [f"--eidrive-{name}", ",".join(value) if isinstance(value, list) else str(value)]
+    for name in ("drive", "criterion"):
+        for value in item.config.getoption(f"eidrive_{name}") or ():
+            words += [f"--eidrive-{name}", value]
     return shlex.join(words)
 
 
@@ -85,6 +89,7 @@ def _run_and_report(
     settings: dict[str, Any] = {
         "channel": variant.channel,
         "detector": config.getoption("eidrive_detector"),
+        **added_settings(config, variant.added),
         **overrides,
     }
     folder = config.getoption("eidrive_out")
@@ -97,6 +102,32 @@ def _run_and_report(
         wall_limit=wall_limit,
         command=command,
     )
+
+
+def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, Any]:
+    """Return `drive` and `criteria` of a run: of the ini file, the marker and the command line.
+
+    A stack of the command line replaces that of the marker for the same entity, and this one that of the ini file.
+    Criteria are added. Raise SettingError for an invalid value.
+    """
+    from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources, parse_drive
+
+    root = config.rootpath
+    listed = parse_drive("eidrive_drive", config.getini("eidrive_drive"))
+    in_file = {name: stack and path_beside(stack, root) for name, stack in listed.items()}
+    by_option = parse_drive("--eidrive-drive", config.getoption("eidrive_drive") or ())
+    criteria = [path_beside(one, root) for one in config.getini("eidrive_criteria")]
+    return {
+        "drive": {**in_file, **drive_sources(marker.drive), **by_option},
+        "criteria": [*criteria, *criteria_sources(marker.criteria), *(config.getoption("eidrive_criterion") or ())],
+    }
+
+
+def path_beside(source: Any, folder: Path) -> Any:
+    """Return the path of a file relative to a folder, or any other value unchanged."""
+    if isinstance(source, str | Path) and os.path.isfile(folder / source):
+        return folder / source
+    return source
 
 
 def _subfolders(config: pytest.Config, source: Path) -> tuple[str, ...]:
