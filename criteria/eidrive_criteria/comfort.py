@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from eidrive_scenario.api.common import Array
-from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_scenario.api.criteria import Continuity, Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 Limit = Annotated[float, Field(gt=0)]
 
@@ -20,8 +19,6 @@ JERK_WINDOW = 1.5
 """Length of the filter of jerks, yaw rates and yaw accelerations [s]: 15 samples of nuPlan."""
 FEWEST = 3
 """Minimum number of frames for a filter of order 2."""
-JUMP = 1.0
-"""Displacement beyond the one at twice the speed that is a teleport [m]."""
 
 
 class ComfortSettings(CriterionSettings):
@@ -76,22 +73,17 @@ class Comfort(Criterion):
         self.subjects = (settings.of,)
         self._parts: list[list[Sample]] = []
         """Frames without a gap or teleport."""
-        self._place: tuple[float, float] | None = None
+        self._continuity = Continuity()
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
         row = view.rows.get(self._settings.of)
+        step = self._continuity.step(view, row)
         if row is None:
-            self._place = None
             return
-        state = view.states[row]
-        place = self._place
-        self._place = state.x, state.y
-        if place is not None:
-            reach = 2.0 * abs(state.speed) * (view.time - self._parts[-1][-1].time) + JUMP
-            place = place if math.dist(place, self._place) <= reach else None
-        if place is None:
+        if step is None:
             self._parts.append([])
+        state = view.states[row]
         self._parts[-1].append(Sample(view.time, state.velocity_x, state.velocity_y, state.yaw))
 
     def _extremes(self) -> dict[str, Worst]:

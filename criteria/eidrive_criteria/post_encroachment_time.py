@@ -9,12 +9,10 @@ from typing import NamedTuple
 
 from eidrive_criteria.pair import PairCriterion, PairSettings
 from eidrive_scenario.api.common import WorldView, overlap
-from eidrive_scenario.api.criteria import Frame
+from eidrive_scenario.api.criteria import Continuity, Frame
 
 HORIZON = 10.0
 """Maximum post-encroachment time that is measured [s]."""
-JUMP = 1.0
-"""Displacement beyond the one at twice the speed that is a teleport [m]."""
 STEPS = 20
 """Bisections of a time step; the times are exact to 1e-6 of it."""
 
@@ -38,27 +36,14 @@ class Trail:
 
     def __init__(self) -> None:
         self.past: deque[Trace] = deque()
-        self._present = False
+        self._continuity = Continuity()
 
-    def add(self, view: WorldView, row: int) -> None:
-        """Add the body of this frame."""
-        time, body, speed = view.time, view.plain_boxes[row], abs(float(view.speed[row]))
-        moved = bool(self.past) and self._present
-        if moved:
-            last = self.past[-1]
-            moved = math.dist(last.body[:2], body[:2]) <= 2.0 * speed * (time - last.time) + JUMP
-        self.past.append(Trace(time, body, moved))
-        self.forget(time)
-        self._present = True
-
-    def leave(self, time: float) -> None:
-        """Note that the actor is absent."""
-        self._present = False
-        self.forget(time)
-
-    def forget(self, time: float) -> None:
-        """Delete the bodies before the horizon."""
-        while self.past and self.past[0].time < time - HORIZON:
+    def add(self, view: WorldView, row: int | None) -> None:
+        """Add the body of this frame, if the actor is present; delete the bodies before the horizon."""
+        step = self._continuity.step(view, row)
+        if row is not None:
+            self.past.append(Trace(view.time, view.plain_boxes[row], step is not None))
+        while self.past and self.past[0].time < view.time - HORIZON:
             self.past.popleft()
 
     def last_over(self, body: Body) -> int | None:
@@ -91,11 +76,9 @@ class PostEncroachmentTime(PairCriterion):
         view = frame.view
         for name, trail in self._trails.items():
             row = view.rows.get(name)
-            if row is None:
-                trail.leave(view.time)
-            else:
+            trail.add(view, row)
+            if row is not None:
                 self._missing.discard(name)
-                trail.add(view, row)
         self._together = not self._missing
         value = self.measure(view, 0, 0)
         if value < self.smallest:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, ClassVar
@@ -11,6 +10,7 @@ from pydantic import Field
 
 from eidrive_scenario.api.common import RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import (
+    Continuity,
     Criterion,
     CriterionSettings,
     Frame,
@@ -18,9 +18,6 @@ from eidrive_scenario.api.criteria import (
     Verdict,
     actor_never_present,
 )
-
-JUMP = 1.0
-"""Displacement beyond the one at twice the speed that is a teleport [m]."""
 
 
 class SummedSettings(CriterionSettings):
@@ -46,8 +43,7 @@ class SummedCriterion(Criterion):
         self._first: float | None = None
         """First time in the state [s]."""
         self._violated: float | None = None
-        self._last: tuple[float, float, float] | None = None
-        """Time and position in the frame before; None if the actor was absent."""
+        self._continuity = Continuity()
 
     def bind(self, roads: RoadNetwork | None) -> None:
         super().bind(roads)
@@ -67,21 +63,14 @@ class SummedCriterion(Criterion):
     def observe(self, frame: Frame) -> None:
         view = frame.view
         row = view.rows.get(self.of)
-        if row is None:
-            self._last = None
+        step = self._continuity.step(view, row)
+        if step is None:
+            self.lanes.forget()
             self.interrupt()
+        if row is None:
             return
         self._was_present = True
-        x, y, *_ = view.plain_boxes[row]
-        duration = distance = 0.0
-        if self._last is not None:
-            duration, distance = view.time - self._last[0], math.hypot(x - self._last[1], y - self._last[2])
-            if distance > 2.0 * abs(float(view.speed[row])) * duration + JUMP:
-                duration = distance = 0.0
-                self.lanes.forget()
-                self.interrupt()
-        self._last = view.time, x, y
-        added = self.increment(view, row, duration, distance)
+        added = self.increment(view, row, *(step or (0.0, 0.0)))
         if added is None:
             return
         self._first = view.time if self._first is None else self._first

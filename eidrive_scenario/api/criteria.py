@@ -3,6 +3,7 @@
 Stable: all names.
 """
 
+from eidrive_scenario.evaluation.continuity import Continuity, Step
 from eidrive_scenario.evaluation.criterion import (
     Criterion,
     CriterionSettings,
@@ -13,22 +14,32 @@ from eidrive_scenario.evaluation.criterion import (
 from eidrive_scenario.evaluation.fault import Impact, judge_impact
 from eidrive_scenario.evaluation.lane_tracking import SIDEWALKS, LaneTracker, corners
 from eidrive_scenario.evaluation.safe_distance import SafeDistanceModel
+from eidrive_scenario.evaluation.stop_line_crossings import Crossing, StopLineCrossings, along, beside
 from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.roads.model.signal_states import lamp_colors, shows_red
 
 __all__ = [
     "SIDEWALKS",
+    "Continuity",
     "Criterion",
     "CriterionSettings",
+    "Crossing",
     "Frame",
     "Impact",
     "LaneTracker",
     "Relation",
     "SafeDistanceModel",
+    "Step",
+    "StopLineCrossings",
     "Surroundings",
     "Verdict",
     "actor_never_present",
+    "along",
+    "beside",
     "corners",
     "evaluate_criteria",
     "judge_impact",
+    "lamp_colors",
+    "shows_red",
 ]

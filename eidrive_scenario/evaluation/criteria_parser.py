@@ -10,12 +10,13 @@ A command is parsed once, before the run. `build_criteria` then creates new crit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
+from eidrive_scenario.evaluation.scenario_runner_criteria import CLASSES, translation
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
@@ -236,33 +237,34 @@ def stop_trigger_criteria(scenario: Scenario) -> list[Criterion]:
     """
     declarations = []
     for condition in criteria_of(scenario.storyboard):
-        translated = _TRANSLATIONS.get(condition.name.removeprefix(CRITERION_PREFIX))
-        if translated is None:
+        translated = translation(condition)
+        if translated is None or _lacks_roads(translated[0], scenario):
             continue
-        kind, settings_of = translated
-        settings = {"of": _ego(scenario, condition), **settings_of(_value(condition))}
+        kind, settings = translated
+        settings = {"of": _ego(scenario, condition), **settings}
         declarations.append(_declare(kind, settings, condition.source, condition.line, {}))
     return build_criteria(declarations)
 
 
 def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
-    """Return warnings about criteria of ScenarioRunner that this engine does not support."""
-    return [
-        Diagnostic(
-            f"criterion {condition.name.removeprefix(CRITERION_PREFIX)!r} is not evaluated",
-            f"supported criteria: {', '.join(sorted(_TRANSLATIONS))}",
-            condition.source,
-            condition.line,
-        )
-        for condition in criteria_of(scenario.storyboard)
-        if condition.name.removeprefix(CRITERION_PREFIX) not in _TRANSLATIONS
-    ]
+    """Return warnings about criteria of ScenarioRunner that this engine does not evaluate."""
+    found = []
+    for condition in criteria_of(scenario.storyboard):
+        translated = translation(condition)
+        if translated is None:
+            hint = f"supported criteria: {', '.join(sorted(CLASSES))}"
+        elif _lacks_roads(translated[0], scenario):
+            hint = "it requires roads, and the scenario has none"
+        else:
+            continue
+        message = f"criterion {condition.name.removeprefix(CRITERION_PREFIX)!r} is not evaluated"
+        found.append(Diagnostic(message, hint, condition.source, condition.line))
+    return found
 
 
-def _value(condition: Condition) -> str:
-    by_value = condition.by_value_condition
-    parameter = by_value.parameter_condition if by_value is not None else None
-    return parameter.value if parameter is not None else ""
+def _lacks_roads(kind: str, scenario: Scenario) -> bool:
+    needs_roads: bool = registry("criteria").load(kind, Criterion).needs_roads
+    return needs_roads and scenario.road_file is None
 
 
 def _ego(scenario: Scenario, condition: Condition) -> str:
@@ -282,18 +284,3 @@ def _ego(scenario: Scenario, condition: Condition) -> str:
             condition.line,
         )
     )
-
-
-def _number(value: str) -> Any:
-    try:
-        return float(value)
-    except ValueError:
-        return value
-
-
-_TRANSLATIONS: Mapping[str, tuple[str, Callable[[str], dict[str, Any]]]] = {
-    "CollisionTest": ("collision", lambda _: {}),
-    "DrivenDistanceTest": ("driven_distance", lambda value: {"at_least": _number(value)}),
-    "MaxVelocityTest": ("max_speed", lambda value: {"at_most": _number(value)}),
-}
-"""Criterion and its settings from the value of the condition, by class of ScenarioRunner (SI units on both sides)."""

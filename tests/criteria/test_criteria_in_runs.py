@@ -5,6 +5,7 @@ The Ego drives 40 m along its lane at 10 m/s behind a car at 8 m/s, 20 m ahead o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,8 @@ import pytest
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import run_file
+
+Actors = Mapping[str, tuple[float, float, float, float]]
 
 ROAD = Path(__file__).parents[2] / "xosc" / "roads" / "coop_1.xodr"
 
@@ -32,7 +35,7 @@ START = """<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>
 FILE = """<OpenSCENARIO>
 <FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" description="criteria" author="test"/>
 <CatalogLocations/><RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork><Entities>{cars}</Entities>
-<Storyboard><Init><Actions>
+<Storyboard><Init><Actions>{init}
 <UserDefinedAction><CustomCommandAction type="eidrive.criterion">[{criteria}]</CustomCommandAction></UserDefinedAction>
 {starts}</Actions></Init>{story}
 <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
@@ -59,6 +62,7 @@ ACTORS = {
     "Lead": (-50.0, 0.0, 0.0, 8.0),
     "Oncoming": (-10.0, 3.5, 3.14159265, 5.0),
     "Sidewalk": (-30.0, -7.2, 0.0, 0.0),
+    "Runner": (5.0, 0.0, 0.0, 6.0),
     "Changer": (60.0, 0.0, 0.0, 8.0),
     "Last": (131.0, 0.0, 0.0, 0.0),
 }
@@ -84,6 +88,7 @@ CASES = {
     ),
     "reach_position": ("{of: Ego, x: -40, y: 0}", "{of: Ego, x: -40, y: 9}"),
     "reached_region": ("{of: Ego, region: [[-45, -2], [-35, 2]]}", "{of: Ego, region: [[-20, -2], [-10, 2]]}"),
+    "running_stop_sign": ("{of: Oncoming}", "{of: Runner}"),
     "rss_violation": ("{of: Oncoming}", "{of: Ego}"),
     "time_headway": ("{of: Ego, at_least: 0.79}", "{of: Ego, at_least: 0.81}"),
     "time_limit": ("{within: 5}", "{within: 3, fatal: false}"),
@@ -91,16 +96,16 @@ CASES = {
 }
 """Settings with which a criterion passes and fails."""
 
-ELSEWHERE = {"monitor"}
+ELSEWHERE = {"monitor", "running_red_light"}
 """Criteria with runs in tests of their own."""
 
 
-def write_scenario(folder: Path, criteria: str, actors: dict[str, tuple[float, float, float, float]]) -> Path:
+def write_scenario(folder: Path, criteria: str, actors: Actors, road: Path = ROAD, init: str = "") -> Path:
     starts = "".join(START.format(name=name, x=x, y=y, h=h, speed=speed) for name, (x, y, h, speed) in actors.items())
     path = folder / "criteria.xosc"
     cars = "".join(CAR.format(name=name) for name in actors)
     story = STORY if "Changer" in actors else ""
-    text = FILE.format(road=ROAD, cars=cars, starts=starts, criteria=criteria, story=story)
+    text = FILE.format(road=road, cars=cars, starts=starts, init=init, criteria=criteria, story=story)
     path.write_text(text, encoding="utf-8")
     return path
 
@@ -122,6 +127,24 @@ def test_collision_in_run(tmp_path: Path) -> None:
     actors = {"Ego": (-50.0, 0.0, 0.0, 5.0), "Rear": (-60.0, 0.0, 0.0, 15.0)}
     result = run_file(write_scenario(tmp_path, "collision: {of: Rear}", actors))
     assert not result.passed
+
+
+LIGHT = """<GlobalAction><InfrastructureAction><TrafficSignalAction>
+<TrafficSignalStateAction name="10" state="{state}"/></TrafficSignalAction></InfrastructureAction></GlobalAction>"""
+
+
+@pytest.mark.parametrize(("state", "passed"), [("red", False), ("green", True)])
+def test_red_light_in_run(tmp_path: Path, state: str, passed: bool) -> None:
+    """The sign at the end of road 1 is replaced by a light."""
+    sign = 'id="10" name="stop near" dynamic="no" orientation="+" zOffset="2.4" country="DE" type="206"'
+    text = ROAD.read_text(encoding="utf-8")
+    assert sign in text
+    road = tmp_path / "lights.xodr"
+    road.write_text(text.replace(sign, sign.replace('"no"', '"yes"').replace("206", "1000001")), encoding="utf-8")
+    actors = {"Ego": (0.0, 0.0, 0.0, 6.0)}
+    path = write_scenario(tmp_path, "running_red_light: {of: Ego}", actors, road, LIGHT.format(state=state))
+    (verdict,) = run_file(path).criteria
+    assert (verdict.passed, verdict.value) == (passed, float(not passed))
 
 
 def test_file_of_the_test_is_valid(tmp_path: Path) -> None:

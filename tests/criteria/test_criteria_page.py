@@ -10,7 +10,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "criteria.md"
 
 
 def test_page_defines_every_criterion_with_its_settings() -> None:
-    rows = dict(re.findall(r"^\| `(\w+)` \| (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
+    rows = dict(re.findall(r"^\| `([a-z_]+)` \| (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
     assert set(rows) == set(registry("criteria"))
     for name, unit, settings, _ in describe_criteria():
         text = rows[name] + (PAGE.read_text(encoding="utf-8") if "parameters below" in rows[name] else "")

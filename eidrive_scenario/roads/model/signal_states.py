@@ -69,6 +69,11 @@ def must_stop(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> bool:
     return red != OFF or (yellow == ON and green == OFF)
 
 
+def shows_red(state: str, colors: tuple[str, ...] = DEFAULT_LAMPS) -> bool:
+    """Return whether a light in this state shows red, also together with yellow or flashing."""
+    return dict(lamps(state, colors)).get(RED, OFF) != OFF
+
+
 def _listed(state: str) -> list[str] | None:
     """Return the modes of a list of lamps, or None if the state is not such a list."""
     words = [word.strip().lower() for word in re.split("[;,]", state)]

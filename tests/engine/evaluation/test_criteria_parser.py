@@ -208,8 +208,15 @@ CONDITION = """
 </Condition>"""
 
 
-def written_for_scenario_runner(*conditions: tuple[str, str, str], ego: bool = True) -> Scenario:
+ROAD = Path(__file__).parents[3] / "xosc" / "roads" / "coop_1.xodr"
+
+
+def written_for_scenario_runner(
+    *conditions: tuple[str, str, str], ego: bool = True, road: Path | None = None
+) -> Scenario:
     text = PASSING_BY.read_text(encoding="utf-8")
+    if road is not None:
+        text = text.replace("<RoadNetwork/>", f'<RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork>')
     written = "".join(CONDITION.format(name=n, parameter=p, value=v) for n, p, v in conditions)
     text = text.replace("<ConditionGroup>", f"<ConditionGroup>{written}", 1)
     if ego:
@@ -224,15 +231,42 @@ def test_stop_trigger_criteria_translates_supported_conditions() -> None:
         ("criteria_CollisionTest", "", ""),
         ("criteria_DrivenDistanceTest", "distance_success", "100"),
         ("criteria_MaxVelocityTest", "max_velocity", "13.5"),
+        ("criteria_AverageVelocityTest", "velocity", "5"),
+        ("criteria_ActorBlockedTest", "max_time", "60"),
+        ("criteria_ActorBlockedTest", "min_speed", "0.5"),
+        ("criteria_RouteCompletionTest", "", ""),
         ("criteria_KeepLaneTest", "", ""),
     )
     criteria = stop_trigger_criteria(scenario)
-    assert [criterion.name for criterion in criteria] == ["collision", "driven_distance", "max_speed"]
-    assert [criterion.verdict().limit for criterion in criteria] == [0.0, 100.0, 13.5]
+    assert [criterion.name for criterion in criteria] == [
+        *("collision", "driven_distance", "max_speed", "average_speed", "actor_blocked", "actor_blocked_2"),
+    ]
+    assert [criterion.verdict().limit for criterion in criteria] == [0.0, 100.0, 13.5, 5.0, 60.0, 180.0]
     assert {criterion.subjects for criterion in criteria} == {("Ego",)}
-    (warning,) = unsupported_criteria(scenario)
-    assert warning.message == "criterion 'KeepLaneTest' is not evaluated"
-    assert warning.line is not None
+    unknown, without_roads = unsupported_criteria(scenario)
+    assert unknown.message == "criterion 'RouteCompletionTest' is not evaluated"
+    assert unknown.line is not None
+    assert without_roads.message == "criterion 'KeepLaneTest' is not evaluated"
+    assert without_roads.hint == "it requires roads, and the scenario has none"
+
+
+def test_stop_trigger_criteria_on_lanes_and_signals_are_evaluated_with_roads() -> None:
+    names = ["KeepLane", "WrongLane", "OnSidewalk", "OffRoad", "EndofRoad", "RunningRedLight", "RunningStop"]
+    scenario = written_for_scenario_runner(*((f"criteria_{name}Test", "", "") for name in names), road=ROAD)
+    assert unsupported_criteria(scenario) == []
+    assert [criterion.name for criterion in stop_trigger_criteria(scenario)] == [
+        *("keep_lane", "wrong_lane", "on_sidewalk", "off_road", "end_of_road", "running_red_light"),
+        "running_stop_sign",
+    ]
+    with Simulation(scenario) as simulation:
+        result = simulation.run()
+    assert len(result.criteria) >= len(names)
+
+
+def test_stop_trigger_criterion_with_a_duration_has_it_as_limit() -> None:
+    scenario = written_for_scenario_runner(("criteria_OffRoadTest", "duration", "2.5"), road=ROAD)
+    (criterion,) = stop_trigger_criteria(scenario)
+    assert criterion.verdict().limit == 2.5
 
 
 def test_stop_trigger_criteria_ignores_other_conditions() -> None:

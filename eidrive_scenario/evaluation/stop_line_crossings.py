@@ -1,0 +1,117 @@
+"""Crossings of stop lines of traffic lights and stop signs by a point of an actor."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, Kind, StopLine, stop_lines
+from eidrive_scenario.roads import RoadNetwork
+
+NEAR = 30.0
+"""Distance from a point within which stop lines are considered [m]."""
+PAST = 10.0
+"""Distance driven beyond the point on a route with a signal after which another route has been chosen [m]."""
+
+Point = tuple[float, float]
+
+
+class Crossing(NamedTuple):
+    """Crossing of the stop line of a signal, at a time [s]."""
+
+    signal: str
+    time: float
+
+
+class _Pending(NamedTuple):
+    """Crossing of a line that is valid for one route of several: remaining distance to decide it [m]."""
+
+    line: StopLine
+    time: float
+    left: float
+
+
+class StopLineCrossings:
+    """Crossings of the stop lines of one kind of signal, in the direction of their traffic.
+
+    A line at the entry of a junction that is valid for one connecting road only counts once the point reaches the
+    middle of that road, with the time at which it crossed the line.
+    """
+
+    def __init__(self, roads: RoadNetwork, kind: Kind) -> None:
+        self.lines = tuple(line for line in stop_lines(roads) if line.kind == kind)
+        self._places = np.array([(line.x, line.y) for line in self.lines]).reshape(-1, 2)
+        self._pending: list[_Pending] = []
+
+    def interrupt(self) -> None:
+        """Forget undecided crossings, after an absence or a teleport."""
+        self._pending.clear()
+
+    def near(self, point: Point, reach: float = NEAR) -> list[StopLine]:
+        """Return the stop lines within a distance of a point in x and y."""
+        if not self.lines:
+            return []
+        rows = np.flatnonzero(np.abs(self._places - point).max(axis=1) <= reach)
+        return [self.lines[row] for row in rows.tolist()]
+
+    def crossings(self, before: Point, now: Point, heading: float, time: float) -> list[Crossing]:
+        """Return the crossings that are certain now, at most one per signal.
+
+        before, now  position of the point in the previous frame and in this one; heading  of the actor [rad]
+        """
+        found = self._decide(before, now)
+        for line in self.near(now):
+            if not crosses(line, before, now, heading):
+                continue
+            if line.beyond is None:
+                found.append(Crossing(line.signal, time))
+            else:
+                left = math.dist(now, line.beyond) + PAST
+                self._pending.append(_Pending(line, time, left))
+        return list({crossing.signal: crossing for crossing in reversed(found)}.values())
+
+    def _decide(self, before: Point, now: Point) -> list[Crossing]:
+        """Return the crossings whose route has become certain; drop those of other routes."""
+        found: list[Crossing] = []
+        kept: list[_Pending] = []
+        for pending in self._pending:
+            assert pending.line.beyond is not None
+            left = pending.left - math.dist(before, now)
+            if _distance(before, now, pending.line.beyond) <= ON_PATH:
+                found.append(Crossing(pending.line.signal, pending.time))
+            elif left > 0.0:
+                kept.append(pending._replace(left=left))
+        decided = {crossing.signal for crossing in found}
+        self._pending = [pending for pending in kept if pending.line.signal not in decided]
+        return found
+
+
+def crosses(line: StopLine, before: Point, now: Point, heading: float) -> bool:
+    """Whether a point passes a stop line within half a lane of its center, in the direction of its traffic."""
+    first, last = along(line, before), along(line, now)
+    if not first < 0.0 <= last or math.cos(heading - line.heading) < SAME_WAY:
+        return False
+    share = first / (first - last)
+    x, y = before[0] + share * (now[0] - before[0]), before[1] + share * (now[1] - before[1])
+    return math.hypot(x - line.x, y - line.y) <= ON_PATH
+
+
+def along(line: StopLine, point: Point) -> float:
+    """Return the distance of a point beyond a stop line, negative before it [m]."""
+    return (point[0] - line.x) * math.cos(line.heading) + (point[1] - line.y) * math.sin(line.heading)
+
+
+def beside(line: StopLine, point: Point) -> float:
+    """Return the lateral distance of a point from the center of the lane at a stop line [m]."""
+    return abs((point[1] - line.y) * math.cos(line.heading) - (point[0] - line.x) * math.sin(line.heading))
+
+
+def _distance(a: Point, b: Point, point: Point) -> float:
+    """Return the distance of a point from the segment between two others [m]."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    square = dx * dx + dy * dy
+    share = ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / square if square > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(a[0] + share * dx - point[0], a[1] + share * dy - point[1])

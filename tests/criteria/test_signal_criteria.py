@@ -1,0 +1,165 @@
+"""Criteria on stop lines, on road 1 of scenario 1: a stop sign with its line at x = 15.6 m; boxes 4 m by 2 m."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from eidrive_criteria.running_red_light import RunningRedLight, RunningRedLightSettings
+from eidrive_criteria.running_stop_sign import RunningStopSign, RunningStopSignSettings
+from lxml import etree
+
+from eidrive_scenario.api.common import RoadNetwork, SettingError
+from eidrive_scenario.api.criteria import Criterion, Frame, Verdict, evaluate_criteria
+
+ROAD = Path(__file__).parents[2] / "xosc" / "roads" / "coop_1.xodr"
+LINE = 15.6
+
+
+def judge(criterion: Criterion, frames: list[Frame], roads: RoadNetwork) -> Verdict:
+    (verdict,) = evaluate_criteria(frames, [criterion], roads)
+    return verdict
+
+
+def light(**settings: Any) -> RunningRedLight:
+    return RunningRedLight(RunningRedLightSettings(of="Ego", **settings))
+
+
+def sign(**settings: Any) -> RunningStopSign:
+    return RunningStopSign(RunningStopSignSettings(of="Ego", **settings))
+
+
+def lights(road: str = "1") -> RoadNetwork:
+    """Return the roads with a traffic light `10` instead of the stop sign, on road 1 or on a connecting road."""
+    root = etree.parse(ROAD).getroot()
+    signal = next(element for element in root.iter("signal") if element.get("id") == "10")
+    signal.set("dynamic", "yes")
+    signal.set("type", "1000001")
+    if road != "1":
+        target = next(element for element in root.iter("road") if element.get("id") == road)
+        signal.set("s", "1.0")
+        for old in target.findall("signals"):
+            target.remove(old)
+        etree.SubElement(target, "signals").append(signal)
+    return RoadNetwork.parse(etree.tostring(root))
+
+
+def driving(frame: Any, car: Any, states: list[str], y: float = 0.0, start: float = 5.0) -> list[Frame]:
+    """Return frames each 0.2 s, 2 m apart, with a state of light 10 in each; the front is 2 m ahead of the center."""
+    return [
+        frame(0.2 * n, {"Ego": car(start + 2.0 * n, y, speed=10.0)}, signals={"10": state} if state else {})
+        for n, state in enumerate(states)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("states", "part", "time"),
+    [
+        (["red"] * 12, "front", 1.0),  # the front is at 15 m after 0.8 s and at 17 m after 1.0 s
+        (["red"] * 12, "rear", 1.4),  # the rear is at 15 m after 1.2 s
+        (["green"] * 12, "front", None),
+        (["yellow"] * 12, "front", None),
+        ([""] * 12, "front", None),
+        (["green"] * 5 + ["red"] * 7, "front", None),  # changes at 1.0 s, behind the line
+        (["green"] * 5 + ["red"] * 7, "rear", 1.4),
+        (["red"] * 4 + ["green"] * 8, "front", None),  # changes before the line
+        (["on;off;off"] * 12, "front", 1.0),
+        (["red"] * 5, "front", None),  # ends before the line
+    ],
+)
+def test_red_light_is_judged_at_the_stop_line(
+    frame: Any, car: Any, states: list[str], part: str, time: float | None
+) -> None:
+    criterion = light(part=part)
+    verdict = judge(criterion, driving(frame, car, states), lights())
+    assert (verdict.passed, verdict.value) == (time is None, float(time is not None))
+    assert verdict.first_violation == (None if time is None else pytest.approx(time))
+    assert criterion.metrics()["running_red_light.count"] == float(time is not None)
+
+
+@pytest.mark.parametrize("y", [3.5, -3.5], ids=["oncoming lane", "parking lane"])
+def test_red_light_of_another_lane_is_no_violation(frame: Any, car: Any, y: float) -> None:
+    assert judge(light(), driving(frame, car, ["red"] * 12, y=y), lights()).passed
+
+
+def test_red_light_against_the_direction_and_teleport_are_no_violations(frame: Any, car: Any) -> None:
+    back = [frame(0.2 * n, {"Ego": car(25.0 - 2 * n, 0.0, math.pi, 10.0)}, signals={"10": "red"}) for n in range(12)]
+    assert judge(light(), back, lights()).passed
+    jump = [frame(0.05 * n, {"Ego": car(x, speed=1.0)}, signals={"10": "red"}) for n, x in enumerate([5, 18, 18.1])]
+    assert judge(light(), jump, lights()).passed
+
+
+@pytest.mark.parametrize(("route", "passed"), [("101", False), ("103", True)], ids=["straight", "left"])
+def test_light_on_a_connecting_road_is_valid_for_its_route(frame: Any, car: Any, route: str, passed: bool) -> None:
+    """Both routes begin at the same stop line at x = 20 m; the light is on road 101."""
+    roads = lights("101")
+    poses = [(10.0 + s, 0.0, 0.0) for s in range(10)]
+    for s in range(0, int(roads.roads[route].length)):
+        pose = roads.lane_pose_at(route, -1, float(s))
+        poses.append((pose.x, pose.y, pose.h))
+    frames = [frame(0.1 * n, {"Ego": car(*pose, 10.0)}, signals={"10": "red"}) for n, pose in enumerate(poses)]
+    verdict = judge(light(), frames, roads)
+    assert (verdict.passed, verdict.value) == (passed, 0.0 if passed else 1.0)
+    if not passed:
+        assert verdict.first_violation == pytest.approx(0.8), "the front reaches the line when the center is at 18 m"
+
+
+def approach(frame: Any, car: Any, stop: float | None, ticks: int = 1, speed: float = 0.0) -> list[Frame]:
+    """Return frames with the center from x = 0 to 24 m in steps of 2 m; with a stop of `ticks` s at `stop`."""
+    places = [(2.0 * n, 10.0) for n in range(13)]
+    if stop is not None:
+        index = sum(x < stop for x, _ in places)
+        places[index:index] = [(stop, speed)] * (ticks + 1)
+    return [frame(float(n), {"Ego": car(x, 0.0, 0.0, v)}) for n, (x, v) in enumerate(places)]
+
+
+@pytest.mark.parametrize(
+    ("stop", "settings", "passed"),
+    [
+        (None, {}, False),
+        (13.0, {}, True),  # front 0.6 m before the line
+        (9.7, {}, True),  # 3.9 m
+        (9.5, {}, False),  # 4.1 m
+        (9.5, {"within": 5.0}, True),
+        (14.0, {}, False),  # 0.4 m behind the line
+        (13.0, {"duration": 2.0}, True),
+        (13.0, {"duration": 3.0}, False),
+    ],
+)
+def test_stop_sign_requires_a_stop_before_the_line(
+    frame: Any, car: Any, roads: RoadNetwork, stop: float | None, settings: dict[str, Any], passed: bool
+) -> None:
+    verdict = judge(sign(**settings), approach(frame, car, stop, ticks=2), roads)
+    assert (verdict.passed, verdict.value) == (passed, 0.0 if passed else 1.0)
+    assert ("all legally" if passed else "did not stop at the stop sign 10") in verdict.reason
+
+
+@pytest.mark.parametrize(("speed", "passed"), [(0.05, True), (0.2, False)])
+def test_stop_sign_speed_of_a_stop(frame: Any, car: Any, roads: RoadNetwork, speed: float, passed: bool) -> None:
+    assert judge(sign(), approach(frame, car, 13.0, speed=speed), roads).passed is passed
+
+
+def test_stop_sign_requires_a_stop_in_each_lap(frame: Any, car: Any, roads: RoadNetwork) -> None:
+    laps = [approach(frame, car, 13.0), approach(frame, car, None)]
+    places = [(*each.view.position[0, :2], 0.0, each.view.speed[0]) for lap in laps for each in lap]
+    frames = [frame(float(n), {"Ego": car(*place)}) for n, place in enumerate(places)]
+    verdict = judge(sign(), frames, roads)
+    assert (verdict.passed, verdict.value) == (False, 1.0)
+
+
+@pytest.mark.parametrize("criterion", [light, sign])
+def test_absent_actor_one_frame_and_missing_signals(frame: Any, car: Any, roads: RoadNetwork, criterion: Any) -> None:
+    absent = judge(criterion(), [frame(0.0, {"Bus": car(0)})], roads)
+    assert (absent.passed, absent.value, absent.reason) == (
+        False,
+        None,
+        "Ego was never present, so nothing was measured",
+    )
+    assert judge(criterion(), [frame(0.0, {"Ego": car(14.0, speed=5.0)})], roads).passed
+    with pytest.raises(SettingError, match="requires roads"):
+        evaluate_criteria([], [criterion()])
+
+
+def test_map_without_lights_passes(frame: Any, car: Any, roads: RoadNetwork) -> None:
+    verdict = judge(light(), driving(frame, car, ["red"] * 12), roads)
+    assert (verdict.passed, verdict.reason) == (True, "the map has no traffic light")
