@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, largest_curvature
+from eidrive_behaviors.actions.lane_paths import LanePath, lane_path
 from eidrive_behaviors.actions.speed import describe_dynamics
 from eidrive_scenario.api.actions import (
     STEEPEST,
@@ -30,8 +30,13 @@ SHIFTED = 1e-3
 """Offset change above which the offset refers to a neighboring lane after the lane has ended [m]."""
 NEAR = 0.2
 """Maximum distance to the target in the new lane at which a driven vehicle has arrived [m]."""
-LOOKOUT = 100.0
-"""Length of the path on the new lane that is handed to a driven vehicle [m]."""
+LOOKOUT, LOOKOUT_TIME = 100.0, 20.0
+"""Length of the path on the new lane that is handed to a driven vehicle without a route: distance [m], and time [s] at
+its speed. The vehicle reaches the new lane before it brakes for the end of the path."""
+SLOWEST = 1.0
+"""Minimum speed for which the path of a driven vehicle is planned [m/s]."""
+STRAYED = 5.0
+"""Distance from the path above which a driven vehicle was teleported, and its path is planned again [m]."""
 
 
 class LaneChangeAction(ActionBehaviour):
@@ -62,6 +67,7 @@ class LaneChangeAction(ActionBehaviour):
             raise self.error(f"the target lane is not a number (got {target.value!r}; expected the id of a lane)")
         self._roads = self.require_roads()
         self._lane = 0
+        self._path: LanePath | None = None
         self._limited_offset: RateLimitedValue | None = None
 
     def initialise(self) -> None:
@@ -81,16 +87,19 @@ class LaneChangeAction(ActionBehaviour):
         moved = self.actor.motion.set_reference_lane(self._lane) or here
         way = self._roads.driving_direction(moved.road, self._lane)
         start, target = moved.offset * way, (self.action.target_lane_offset or 0.0) * way
-        shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
-        if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
-            self._transition = TransitionProfile.from_rate(shape, start, target, value)
-        else:
-            self._transition = TransitionProfile(shape, start, target, value)
+        self._transition = self._build_transition(start, target)
+        self._path = None
         self._offset = start
         self._followed_lane = moved.road, self._lane
         if is_follow_mode(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
             sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
             self._limited_offset = RateLimitedValue(start, sideways, up=math.inf, down=math.inf)
+
+    def _build_transition(self, start: float, target: float) -> TransitionProfile:
+        shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
+        if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
+            return TransitionProfile.from_rate(shape, start, target, value)
+        return TransitionProfile(shape, start, target, value)
 
     def update(self) -> Status:
         """Set the offset at the end of the step."""
@@ -170,22 +179,58 @@ class LaneChangeAction(ActionBehaviour):
         return count_lanes(reference.lane, target.relative_target_lane.value * left)
 
     def _set_driver_goal(self) -> Status:
-        here = self.context.location(self.actor.name)
+        """Hand the path of the transition to the driver. It is complete when the vehicle drives in the new lane.
+
+        A vehicle without a route then follows the new lane; a route continues in it, and an offset is kept.
+        """
+        here, pose = self.context.location(self.actor.name), self.actor.motion.pose
         if here is None:
             return Status.RUNNING
-        target = self.action.target_lane_offset or 0.0
-        if here.lane == self._lane and abs(here.offset - target) < NEAR:
-            return Status.SUCCESS
-        lane: LaneLocation | None = self._roads.location(here.road, self._lane, here.s, target)
-        points: list[tuple[float, float, float]] = []
-        while lane is not None and 5.0 * len(points) < LOOKOUT:
-            lane = self._roads.advance(lane, 5.0, route=self.actor.motion.route)
-            if lane is not None:
-                points.append(self._roads.pose(lane)[:3])
-        if points:
-            goal = self.actor.goal
-            self.actor.set_goal(replace(goal or Goal(), path=np.array(points), lap=None))
+        if self._path is not None:
+            error, beyond = self._path.errors(pose)
+            if beyond and error < NEAR:
+                if not self._needs_path(here):
+                    self.actor.set_goal(replace(self.actor.goal or Goal(), path=None, lap=None))
+                return Status.SUCCESS
+            if error < STRAYED:
+                return Status.RUNNING
+        self._path = self._plan_path(here)
+        if self._path is not None:
+            goal = self.actor.goal or Goal()
+            lap = None if self.actor.motion.route is None else goal.lap
+            self.actor.set_goal(replace(goal, path=self._path.points, lap=lap))
         return Status.RUNNING
+
+    def _plan_path(self, here: LaneLocation) -> LanePath | None:
+        """Return the path of the transition from a location; None if the target lane is not beside it, or ends."""
+        if self._lane not in self._roads.lane_ids(here.road, here.s):
+            return None
+        center = self._roads.location(here.road, self._lane, here.s)
+        way = self._roads.driving_direction(here.road, self._lane)
+        transition = self._build_transition((here.t - center.t) * way, (self.action.target_lane_offset or 0.0) * way)
+        goal, pose, route = self.actor.goal, self.actor.motion.pose, self.actor.motion.route
+        speed = max(self.context.speed(self.actor.name), (goal.speed if goal is not None else None) or 0.0, SLOWEST)
+        by_distance = self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE
+        per_meter = 1.0 if by_distance else 1.0 / speed
+        if route is None:
+            length = transition.extent / per_meter + LOOKOUT + LOOKOUT_TIME * speed
+        else:
+            length = route.length - route.project(pose.x, pose.y)[0]
+        return lane_path(
+            self._roads,
+            center,
+            transition,
+            per_meter=per_meter,
+            heading=pose.h,
+            length=length,
+            route=route,
+        )
+
+    def _needs_path(self, here: LaneLocation) -> bool:
+        """Whether the vehicle cannot follow its lane from now on: a route, an offset, or an oncoming lane."""
+        motion = self.actor.motion
+        oncoming = math.cos(self._roads.pose(here).h - motion.pose.h) < 0.0
+        return motion.route is not None or bool(self.action.target_lane_offset) or oncoming
 
     def describe(self) -> str:
         """Describe target and dynamics."""

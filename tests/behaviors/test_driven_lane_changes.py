@@ -1,0 +1,98 @@
+"""Lane changes of driven vehicles: path of the transition, completion, and the drive after it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
+from openscenario_xml import object_xml, road_file_xml, scenario_xml
+from storyboard_xml import (
+    end_xml,
+    init_xml,
+    lane_position_xml,
+    private_xml,
+    speed_xml,
+    story_xml,
+    teleport_xml,
+)
+
+from eidrive_scenario.simulation import RunSettings, Simulation
+
+WIDTH = 3.5
+
+
+def change_xml(lane: int, *, dimension: str = "time", value: float = 4, offset: float = 0) -> str:
+    return f"""<LateralAction><LaneChangeAction targetLaneOffset="{offset}">
+    <LaneChangeActionDynamics dynamicsShape="sinusoidal" dynamicsDimension="{dimension}" value="{value}"/>
+    <LaneChangeTarget><AbsoluteTargetLane value="{lane}"/></LaneChangeTarget></LaneChangeAction></LateralAction>"""
+
+
+def drive(folder: Path, action: str, *, init: str = "", seconds: float = 25, right: int = 2) -> tuple[Any, list[float]]:
+    """Return time, x, y and speed of Ego, driven at 15 m/s in lane -1, with an action after 2 s; and when
+    the action completed [s].
+    """
+    (folder / "road.xodr").write_text(map_xml(road_xml(lanes=lanes_xml(right=right), length=800.0)))
+    path = folder / "a.xosc"
+    path.write_bytes(
+        scenario_xml(
+            road=road_file_xml("road.xodr"),
+            entities=object_xml("Ego"),
+            init=init_xml("Ego", teleport_xml(lane_position_xml(-1, 20.0)), speed_xml(15), init),
+            story=story_xml(action=action, condition='<SimulationTimeCondition rule="greaterThan" value="2"/>'),
+            stop=end_xml(seconds),
+        )
+    )
+    rows, complete = [], []
+    with Simulation(path, settings=RunSettings(drive="Ego")) as simulation:
+        end = None
+        while end is None:
+            frame, end = simulation.tick()
+            row = frame.view.row("Ego")
+            rows.append([frame.view.time, *frame.view.position[row, :2].tolist(), float(frame.view.speed[row])])
+            complete += [
+                one.time for one in frame.changes if (one.kind, one.after.value) == ("action", "completeState")
+            ]
+    return np.array(rows), complete
+
+
+@pytest.mark.parametrize(("dimension", "value"), [("time", 4), ("distance", 60), ("rate", WIDTH * np.pi / 8)])
+def test_driven_vehicle_follows_the_transition_and_drives_on(tmp_path: Path, dimension: str, value: float) -> None:
+    """All three are a sine of 4 s at 15 m/s. Half of the offset of 3.5 m is reached after 2 s."""
+    rows, _ = drive(tmp_path, change_xml(-2, dimension=dimension, value=value))
+    time, y, speed = rows[:, 0], rows[:, 2], rows[:, 3]
+    assert np.abs(y[time < 2.0] + 0.5 * WIDTH).max() < 0.1
+    assert float(np.interp(4.0, time, y)) == pytest.approx(-WIDTH, abs=0.5)
+    assert np.abs(y[time > 9.0] + 1.5 * WIDTH).max() < 0.25
+    assert np.abs(speed[time > 1.0] - 15.0).max() < 0.3, "it does not stop after the lane change"
+
+
+def test_lane_change_of_a_driven_vehicle_completes_in_the_new_lane(tmp_path: Path) -> None:
+    rows, (done,) = drive(tmp_path, change_xml(-2))
+    assert 6.0 - 0.1 <= done < 9.0
+    assert float(np.interp(done, rows[:, 0], rows[:, 2])) == pytest.approx(-1.5 * WIDTH, abs=0.3)
+
+
+def test_offset_in_the_new_lane_is_kept(tmp_path: Path) -> None:
+    rows, _ = drive(tmp_path, change_xml(-2, offset=0.5), seconds=20)
+    assert np.abs(rows[rows[:, 0] > 12.0, 2] - (0.5 - 1.5 * WIDTH)).max() < 0.2
+
+
+def test_driven_vehicle_keeps_its_direction_in_an_oncoming_lane(tmp_path: Path) -> None:
+    rows, _ = drive(tmp_path, change_xml(1), seconds=20)
+    assert np.abs(rows[rows[:, 0] > 12.0, 2] - 0.5 * WIDTH).max() < 0.3
+    assert np.diff(rows[:, 1]).min() > 0.5, "it never turns round"
+
+
+def test_route_continues_in_the_new_lane_to_its_end(tmp_path: Path) -> None:
+    """The route of 380 m ends at s = 400 m, where the vehicle stops."""
+    goal = private_xml(
+        "<RoutingAction><AcquirePositionAction><Position>"
+        f"{lane_position_xml(-1, 400.0)}</Position></AcquirePositionAction></RoutingAction>"
+    )
+    rows, _ = drive(tmp_path, change_xml(-2), init=goal, seconds=50)
+    assert rows[-1, 3] == pytest.approx(0.0, abs=0.05)
+    assert 380.0 < rows[-1, 1] < 410.0
+    assert rows[-1, 2] == pytest.approx(-1.5 * WIDTH, abs=0.3)
