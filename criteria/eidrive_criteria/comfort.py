@@ -146,10 +146,18 @@ class Comfort(Criterion):
 
 
 def _derivative(values: Array, dt: float, window: float, order: int) -> Array:
-    """Return the derivative of the order 1 or 2 of samples (N,) by fitted quadratics; the window shrinks to N."""
-    from scipy.signal import savgol_filter
+    """Return the derivative of the order 1 or 2 of samples (N,) by fitted quadratics; the window shrinks to N.
 
+    At both ends it is that of the first and of the last quadratic.
+    """
     length = min(max(round(window / dt), FEWEST), len(values))
     length -= 1 - length % 2
-    found: Array = savgol_filter(values, length, 2, deriv=order, delta=dt)
-    return found
+    half = length // 2
+    times = (np.arange(length) - half) * dt
+    fit = np.linalg.pinv(np.vander(times, 3, increasing=True))
+    quadratics: Array = np.lib.stride_tricks.sliding_window_view(values, length) @ fit.T
+    if order == 2:
+        return np.pad(2.0 * quadratics[:, 2], half, mode="edge")
+    slope, bend = quadratics[:, 1], 2.0 * quadratics[:, 2]
+    first, last = slope[0] + bend[0] * times[:half], slope[-1] + bend[-1] * times[half + 1 :]
+    return np.concatenate([first, slope, last])

@@ -6,17 +6,35 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import NamedTuple
 
+import numpy as np
+
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.world.view import WorldView
 
 RANGE = 200.0
 """Maximum distance of the actors that are considered [m]."""
+SPACING = 5.0
+"""Distance of the sample points of a lane [m]."""
+BESIDE = 15.0
+"""Distance from the sample points of the lane within which actors are placed on their lanes [m]."""
 CLOSE = 10.0
 """Distance between bodies up to which straight coordinates apply to actors beside the lane [m]."""
 STANDING = 0.1
 """Maximum speed of a standing actor [m/s]. Its heading is irrelevant for the role of a leader."""
 
-_Chain = Mapping[str, tuple[float, int, int]]
+
+class _Chain(NamedTuple):
+    """Lane ahead up to a fork.
+
+    roads   distance of its start [m], direction in s and lane at the start, by road
+    length  from the start of the first road [m]
+    points  (N, 2) of the lane center, SPACING apart [m]
+    """
+
+    roads: Mapping[str, tuple[float, int, int]]
+    length: float
+    points: Array
 
 
 class Relation(NamedTuple):
@@ -49,8 +67,8 @@ class Relation(NamedTuple):
 
     @property
     def leads(self) -> bool:
-        """Whether the other actor is ahead in the path of the actor and does not approach it on its own."""
-        return self.ahead > 0.0 and self.side_gap == 0.0 and self.other_speed > -STANDING
+        """Whether the other actor is ahead in the path of the actor and neither approaches it nor crosses the path."""
+        return self.ahead > 0.0 and self.side_gap == 0.0 and self.other_speed > -STANDING and not self.crosses
 
     @property
     def closing_speed(self) -> float:
@@ -79,7 +97,7 @@ class Surroundings:
 
     def __init__(self, roads: RoadNetwork | None) -> None:
         self._roads = roads
-        self._chains: dict[tuple[LaneKey, int], tuple[_Chain, float]] = {}
+        self._chains: dict[tuple[LaneKey, int], _Chain] = {}
         self._hints: dict[str, LaneLocation | None] = {}
 
     def relations(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Iterator[Relation]:
@@ -101,6 +119,8 @@ class Surroundings:
         if not near:
             return
         lane = self._own_lane(view, row)
+        if lane is not None:
+            near = self._in_reach(view, row, near, *lane)
         for other in near:
             found = self._relation(view, row, other, lane)
             if found is not None:
@@ -111,6 +131,21 @@ class Surroundings:
         return min(
             (found for found in self.relations(view, of, to) if found.leads), key=lambda each: each.gap, default=None
         )
+
+    def _in_reach(self, view: WorldView, row: int, near: list[int], place: LaneLocation, direction: int) -> list[int]:
+        """Return the actors beside the lane and those in the straight path; the others are ignored."""
+        assert self._roads is not None
+        chain = self._chain(place, direction)
+        begun = place.s if direction > 0 else self._roads.roads[place.road].length - place.s
+        first = max(int((begun - 2.0 * BESIDE) / SPACING), 0)
+        points = chain.points[first : int((begun + RANGE) / SPACING) + 2]
+        boxes = view.boxes[near]
+        offset = boxes[:, None, :2] - points
+        beside = (np.square(offset).sum(axis=-1) <= BESIDE * BESIDE).any(axis=1)
+        own = view.plain_boxes[row]
+        left = (boxes[:, 1] - own[1]) * math.cos(own[6]) - (boxes[:, 0] - own[0]) * math.sin(own[6])
+        straight = np.abs(left) <= (np.hypot(boxes[:, 3], boxes[:, 4]) + own[4]) / 2.0
+        return [near[index] for index in np.flatnonzero(beside | straight).tolist()]
 
     def _own_lane(self, view: WorldView, row: int) -> tuple[LaneLocation, int] | None:
         """Return the location of an actor on its lane and its direction in s; None off the road."""
@@ -161,7 +196,7 @@ class Surroundings:
         assert self._roads is not None
         own, body = view.plain_boxes[row], view.plain_boxes[other]
         there = self._locate(view, other)
-        roads, length = self._chain(place, direction)
+        roads, length, _ = self._chain(place, direction)
         begun = place.s if direction > 0 else self._roads.roads[place.road].length - place.s
         if there is None or there.road not in roads:
             distance = math.hypot(body[0] - own[0], body[1] - own[1]) - (own[3] + body[3]) / 2.0
@@ -199,11 +234,8 @@ class Surroundings:
         nearest = min(same, key=lambda number: abs(number - lane))
         return self._roads.location(road, nearest, s).t
 
-    def _chain(self, place: LaneLocation, direction: int) -> tuple[_Chain, float]:
-        """Return the roads of the lane ahead up to a fork, and their length from the start of the first one [m].
-
-        Values are the distance of the start of the road, the direction in s and the lane at its start.
-        """
+    def _chain(self, place: LaneLocation, direction: int) -> _Chain:
+        """Return the lane ahead up to a fork."""
         assert self._roads is not None
         road = self._roads.roads[place.road]
         key = LaneKey(place.road, road.section_at(place.s).index, place.lane)
@@ -223,8 +255,22 @@ class Surroundings:
                 found[following.road] = (length, way, following.lane)
                 length += self._roads.roads[following.road].length
             last = following
-        self._chains[key, direction] = found, length
-        return found, length
+        chain = self._chains[key, direction] = _Chain(found, length, self._sample(found))
+        return chain
+
+    def _sample(self, roads: Mapping[str, tuple[float, int, int]]) -> Array:
+        """Return points (N, 2) of the lane center, SPACING apart; the first one is at the start of the first road."""
+        assert self._roads is not None
+        points = []
+        along = 0.0
+        for number, (start, way, lane) in roads.items():
+            length = self._roads.roads[number].length
+            while along <= start + length:
+                s = along - start if way > 0 else length - (along - start)
+                pose = self._roads.road_pose_at(number, s, self._lane_t(number, lane, s))
+                points.append((pose.x, pose.y))
+                along += SPACING
+        return np.array(points).reshape(-1, 2)
 
 
 def _body(view: WorldView, row: int, along: float, left: float, heading: float) -> _Body:

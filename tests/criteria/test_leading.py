@@ -42,6 +42,7 @@ def test_value_in_one_frame(
         ((-24.0, 0.0, 0.0, 10.0), "behind"),
         ((24.0, 0.0, 3.141592653589793, 10.0), "oncoming"),
         ((24.0, 9.0, 1.5707963267948966, 10.0), "crossing"),
+        ((24.0, 0.0, 1.5707963267948966, 10.0), "crossing the path"),
         ((300.0, 0.0, 0.0, 10.0), "far away"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

@@ -26,10 +26,21 @@ def box(x: float, y: float = 0.0, yaw: float = 0.0, z: float = 0.75) -> list[flo
         (box(0, 13, -math.pi / 2), (30, -5, 0), math.inf),  # has crossed ahead before it is near
         (box(1), (-5, 0, 0), 0.0),  # overlaps already
         (box(14, z=5.0), (-5, 0, 0), math.inf),  # on a bridge
+        (box(24), (-5, 0, 0), 4.0),  # 15 m/s behind 10 m/s, gap 20 m
+        (box(16), (-8, 0, 0), 1.5),  # 8 m/s towards a standing car, gap 12 m
     ],
 )
 def test_time_to_contact(other: list[float], velocity: tuple[float, float, float], expected: float) -> None:
     assert time_to_contact(box(0), other, velocity) == pytest.approx(expected)
+
+
+def test_time_to_contact_of_successive_passages_is_infinite() -> None:
+    """The ego is in the common zone from 2.000 s to 3.433 s, the other one from 4.286 s on."""
+    ego = [-2.0 - 12.0 - 2.3, 0.0, 0.75, 4.6, 3.0, 1.5, 0.0]
+    other = [0.0, -1.5 - 30.0 - 2.4, 0.75, 4.8, 4.0, 1.5, math.pi / 2]
+    assert time_to_contact(ego, other, (-6.0, 7.0, 0.0)) == math.inf
+    other[1] += 16.0
+    assert time_to_contact(ego, other, (-6.0, 7.0, 0.0)) == pytest.approx(2.0), "both arrive after 2 s"
 
 
 def criterion(**settings: Any) -> TimeToCollision:

@@ -96,5 +96,12 @@ def test_actor_off_all_roads_has_straight_coordinates() -> None:
     assert leader.gap == pytest.approx(16.0)
 
 
+def test_actors_away_from_the_lane_have_no_relation() -> None:
+    """Cars on the crossing road and in a row 60 m beside the lane."""
+    others = {f"Far{n}": (-80.0 + 5.0 * n, -60.0, 0.0, 5.0) for n in range(20)}
+    cars = view(Ego=at("1", -1, 20.0), Lead=at("1", -1, 50.0), Crossing=at("3", -1, 90.0), **others)
+    assert [found.other for found in Surroundings(ROADS).relations(cars, "Ego")] == ["Lead"]
+
+
 def test_absent_actor_has_no_relations() -> None:
     assert list(Surroundings(ROADS).relations(view(Lead=at("1", -1, 20.0)), "Ego")) == []
