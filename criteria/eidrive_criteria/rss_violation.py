@@ -93,7 +93,8 @@ class RssViolation(Criterion):
         self._ticks += 1
         violated = False
         for found in self._surroundings.relations(view, settings.of, None if settings.to is None else (settings.to,)):
-            behind = found.ahead < 0.0 and found.gap > 0.0
+            # A body that overlaps from behind is a coupled trailer, or has hit this one.
+            behind = found.ahead < 0.0 and (found.gap > 0.0 or found.side_gap == 0.0)
             if behind or found.crosses or math.hypot(found.speed, found.side_speed) < STANDING:
                 continue
             ratio = safety_ratio(self._model, found)

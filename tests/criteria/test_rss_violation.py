@@ -40,7 +40,12 @@ def test_car_alongside(frame: Any, car: Any, side: float, passed: bool) -> None:
 
 @pytest.mark.parametrize(
     ("other", "what"),
-    [((-6, 0, 0, 15), "behind"), ((8, 0, math.pi / 2, 5), "crossing"), ((20, 6, math.pi, 10), "oncoming beside")],
+    [
+        ((-6, 0, 0, 15), "behind"),
+        ((-3.5, 0, 0.1, 10), "coupled trailer"),
+        ((8, 0, math.pi / 2, 5), "crossing"),
+        ((20, 6, math.pi, 10), "oncoming beside"),
+    ],
 )
 def test_actors_without_duty_of_distance(frame: Any, car: Any, other: Any, what: str) -> None:
     verdict = judge([frame(0.0, {"Ego": car(0, speed=10.0), "Other": car(*other)})])
