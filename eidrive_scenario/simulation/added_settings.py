@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -66,6 +66,8 @@ def parse_drive(option: str, entries: Iterable[str]) -> dict[str, str | None]:
 def _several(given: Any) -> list[Any]:
     if isinstance(given, str | Path):
         return [given]
+    if isinstance(given, Set):  # its order differs between processes
+        return sorted(given, key=str)
     return list(given) if isinstance(given, Iterable) and not isinstance(given, bytes) else [given]
 
 

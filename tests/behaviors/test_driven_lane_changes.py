@@ -19,7 +19,7 @@ from storyboard_xml import (
     teleport_xml,
 )
 
-from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 WIDTH = 3.5
 
@@ -96,3 +96,15 @@ def test_route_continues_in_the_new_lane_to_its_end(tmp_path: Path) -> None:
     assert rows[-1, 3] == pytest.approx(0.0, abs=0.05)
     assert 380.0 < rows[-1, 1] < 410.0
     assert rows[-1, 2] == pytest.approx(-1.5 * WIDTH, abs=0.3)
+
+
+OFFSET = """<LateralAction><LaneOffsetAction continuous="false"><LaneOffsetActionDynamics dynamicsShape="step"/>
+<LaneOffsetTarget><AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>"""
+
+
+def test_action_without_effect_on_a_driven_vehicle_is_a_warning(tmp_path: Path) -> None:
+    drive(tmp_path, OFFSET, seconds=3)
+    result = run_file(tmp_path / "a.xosc", settings=RunSettings(drive="Ego"))
+    expected = "LaneOffsetAction: no effect on 'Ego', which a driving stack drives; command its speed, route, lane or"
+    assert sum(expected in one for one in result.warnings) == 1
+    assert not any(expected in one for one in run_file(tmp_path / "a.xosc").warnings)

@@ -231,3 +231,8 @@ def test_invalid_criterion_of_a_file_is_reported_with_its_line(tmp_path: Path) -
     (tmp_path / "c.yaml").write_text("- collision: {of: Ego}\n- max_speed:\n    of: Egon\n    at_most: 3\n")
     with pytest.raises(InputError, match=r"c\.yaml:2: criterion 'max_speed': unknown entity 'Egon'"):
         run_file(PASSING_BY, settings=RunSettings(criteria=tmp_path / "c.yaml"))
+
+
+def test_set_of_entities_has_one_order() -> None:
+    """The order of a set of texts differs between processes; warnings and the command keep one order."""
+    assert list(RunSettings(drive={"b", "a", "c"}).drive or ()) == ["a", "b", "c"]

@@ -6,6 +6,7 @@ import math
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
 from eidrive_behaviors.actions.lane_change import SHIFTED, STANDING, off_road_error
 from eidrive_scenario.api.actions import (
     STEEPEST,
@@ -56,6 +57,8 @@ class LaneOffsetAction(ActionBehaviour):
     def update(self) -> Status:
         """Set the offset at the end of the step."""
         here = self.actor.motion.location
+        if self.actor.driven:
+            warn_without_effect(self)
         if self.actor.driven or here is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         if (here.road, here.lane) != self._lane:

@@ -6,6 +6,7 @@ import math
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
 from eidrive_behaviors.actions.lane_change import STANDING
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS, infinite_if_none
 from eidrive_scenario.api.actions import (
@@ -59,6 +60,8 @@ class LateralDistanceAction(ActionBehaviour):
         """Set the offset at the end of the step."""
         motion, dt = self.actor.motion, self.context.dt
         here, roads = motion.location, self.context.roads
+        if self.actor.driven:
+            warn_without_effect(self)
         if self.actor.driven or self.action.entity_ref not in self.context.view or here is None or roads is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._side * self._wanted_gap() + self._lateral_gap()

@@ -6,6 +6,7 @@ import math
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
 
 STIFFNESS = 0.4
@@ -40,6 +41,8 @@ class LongitudinalDistanceAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Set the speed for the step."""
+        if self.actor.driven:
+            warn_without_effect(self)
         if not self.context.actors[self.action.entity_ref].present or self.actor.driven:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._gap() - self._wanted()

@@ -7,6 +7,7 @@ from enum import Enum
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
 from eidrive_behaviors.actions.speed import relative_speed
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
@@ -72,6 +73,8 @@ class SynchronizeAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Set the speed for the step."""
+        if self.actor.driven:
+            warn_without_effect(self)
         motion, dt, final = self.actor.motion, self.context.dt, self._final_speed()
         if motion.speed != 0.0 or self._sense is None:
             self._sense = math.copysign(1.0, motion.speed or final or 1.0)
