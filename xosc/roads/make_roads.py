@@ -288,7 +288,8 @@ def write(crossing: Crossing, path: Path) -> None:
             add(junction, "controller", id=number, type="0", sequence=i)
     tree = etree.ElementTree(root)
     etree.indent(tree, "  ")
-    tree.write(str(path), xml_declaration=True, encoding="UTF-8")
+    text = etree.tostring(tree, xml_declaration=True, encoding="UTF-8")
+    path.write_bytes(text + b"\n")
 
 
 def main() -> None:
