@@ -32,7 +32,7 @@ class SummedCriterion(Criterion):
 
     needs_roads = True
     state: ClassVar[str]
-    """What the actor does in the state, for reasons; after its name."""
+    """Predicate of the state in reasons, which follows the name of the actor."""
 
     def __init__(self, settings: SummedSettings) -> None:
         super().__init__(settings)

@@ -31,10 +31,10 @@ class SafeDistanceModel:
         distance = self._reaction(rear) + self._after(rear) ** 2 / (2.0 * self.min_braking)
         return max(distance - front * front / (2.0 * self.max_braking), 0.0)
 
-    def opposite(self, correct: float, wrong: float) -> float:
+    def opposite(self, in_own_lane: float, against: float) -> float:
         """Return the minimum gap of an actor in its own lane and one against it [m]; speeds of at least 0."""
-        first = self._reaction(correct) + self._after(correct) ** 2 / (2.0 * self.min_braking_correct)
-        return first + self._reaction(wrong) + self._after(wrong) ** 2 / (2.0 * self.min_braking)
+        first = self._reaction(in_own_lane) + self._after(in_own_lane) ** 2 / (2.0 * self.min_braking_correct)
+        return first + self._reaction(against) + self._after(against) ** 2 / (2.0 * self.min_braking)
 
     def lateral(self, left: float, right: float) -> float:
         """Return the minimum lateral distance of a left and a right actor [m]; speeds are positive to the right."""

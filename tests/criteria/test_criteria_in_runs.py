@@ -97,7 +97,7 @@ CASES = {
 """Settings with which a criterion passes and fails."""
 
 ELSEWHERE = {"monitor", "running_red_light"}
-"""Criteria with runs in tests of their own."""
+"""Criteria whose runs are in separate tests."""
 
 
 def write_scenario(folder: Path, criteria: str, actors: Actors, road: Path = ROAD, init: str = "") -> Path:
