@@ -16,9 +16,10 @@ from xml.sax.saxutils import escape
 
 import pytest
 import yaml
+from criteria_values import CRITERIA
 from hostile_scenario import Write, scenario_writer
 from pydantic import BaseModel
-from settings_values import CHANNELS, CRITERIA, STATIONS, WEATHER, as_text, variants
+from settings_values import CHANNELS, STATIONS, WEATHER, as_text, variants
 from trial import attempt
 
 from eidrive_scenario.driving.settings import AgentSettings, parse_station_settings
