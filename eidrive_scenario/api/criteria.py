@@ -12,6 +12,7 @@ from eidrive_scenario.evaluation.criterion import (
     evaluate_criteria,
 )
 from eidrive_scenario.evaluation.fault import Impact, judge_impact
+from eidrive_scenario.evaluation.known_actors import Source, known_actors
 from eidrive_scenario.evaluation.lane_tracking import SIDEWALKS, LaneTracker, corners
 from eidrive_scenario.evaluation.safe_distance import SafeDistanceModel
 from eidrive_scenario.evaluation.stop_line_crossings import Crossing, StopLineCrossings, along, beside
@@ -30,6 +31,7 @@ __all__ = [
     "LaneTracker",
     "Relation",
     "SafeDistanceModel",
+    "Source",
     "Step",
     "StopLineCrossings",
     "Surroundings",
@@ -40,6 +42,7 @@ __all__ = [
     "corners",
     "evaluate_criteria",
     "judge_impact",
+    "known_actors",
     "lamp_colors",
     "shows_red",
 ]

@@ -89,6 +89,26 @@ class Criterion(ABC):
         """Return additional numbers, by names that start with the name of the criterion."""
         return {}
 
+    def conclude(
+        self,
+        passed: bool,
+        reason: str,
+        *,
+        value: float | None = None,
+        limit: float | None = None,
+        first_violation: float | None = None,
+        is_final: bool | None = None,
+    ) -> Verdict:
+        """Return a verdict with the name and the unit of the criterion.
+
+        is_final  whether the failure is final, so that it ends the run if the criterion is fatal; None: it is if there
+                  is a violation
+        """
+        final = first_violation is not None if is_final is None else is_final
+        return Verdict(
+            self.name, passed, value, limit, self.unit, first_violation, reason, self.fatal and final and not passed
+        )
+
 
 def bind_roads(criterion: Criterion, roads: RoadNetwork | None) -> None:
     """Bind a criterion to the roads of its scenario. Raise SettingError if it requires roads and there are none."""

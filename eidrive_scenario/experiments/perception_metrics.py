@@ -9,6 +9,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.evaluation.known_actors import nearest_pairs
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, match_by_share
 from eidrive_scenario.experiments.statistics import Proportion, wilson
 from eidrive_scenario.geometry import iou_bev
@@ -104,18 +105,11 @@ def position_error(samples: Iterable[MetricSample], max_distance: float = 4.0) -
     Objects and detections are paired in order of increasing distance, up to `max_distance` [m]. An association by
     overlap would exclude large errors. The result is NaN without pairs.
     """
-    squares: list[float] = []
-    for sample in samples:
-        offset = sample.detections.boxes[:, None, :2] - sample.objects[None, :, :2]
-        distance = np.linalg.norm(offset, axis=2)
-        taken: set[tuple[str, int]] = set()
-        for flat in np.argsort(distance, axis=None, kind="stable").tolist():
-            box, row = divmod(flat, len(sample.objects))
-            if distance[box, row] > max_distance:
-                break
-            if ("box", box) not in taken and ("object", row) not in taken:
-                taken |= {("box", box), ("object", row)}
-                squares.append(float(distance[box, row]) ** 2)
+    squares = [
+        distance**2
+        for sample in samples
+        for _, _, distance in nearest_pairs(sample.detections.boxes, sample.objects, max_distance)
+    ]
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 

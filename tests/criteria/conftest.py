@@ -8,9 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.api.common import Contact, RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import Frame
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.step import AgentStep
 
 
 class Car(NamedTuple):
@@ -23,6 +26,7 @@ class Car(NamedTuple):
 
 
 MakeFrame = Callable[..., Frame]
+Point = tuple[float, float]
 
 
 @pytest.fixture
@@ -76,5 +80,28 @@ def frame() -> MakeFrame:
             contacts=tuple(contacts),
         )
         return Frame(view, signals=signals or {})
+
+    return make
+
+
+def objects(time: float, points: Sequence[Point], score: float = 1.0) -> Detections:
+    """Return objects with the centers x, y [m], the size of a `Car` and a score."""
+    count = len(points)
+    boxes = np.array([(x, y, 0.75, 4.0, 2.0, 1.5, 0.0) for x, y in points]).reshape(count, 7)
+    nothing = np.full((count, 2), np.nan)
+    unknown = np.full((count, 2, 2), np.nan)
+    return Detections(time, boxes, np.full(count, score), ("car",) * count, nothing, unknown)
+
+
+@pytest.fixture
+def perceived() -> MakeFrame:
+    """Return a function `perceived(frame, "Ego", own=[(x, y)], fused=[(x, y)])` that adds the step of a station."""
+
+    def make(
+        frame: Frame, station: str, own: Sequence[Point] = (), fused: Sequence[Point] = (), score: float = 1.0
+    ) -> Frame:
+        time = frame.view.time
+        step = AgentStep(objects(time, own, score), (), objects(time, fused, score), None, None, ())
+        return replace(frame, steps={**frame.steps, station: step})
 
     return make

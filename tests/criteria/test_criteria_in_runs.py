@@ -96,7 +96,7 @@ CASES = {
 }
 """Settings with which a criterion passes and fails."""
 
-ELSEWHERE = {"monitor", "running_red_light"}
+ELSEWHERE = {"detection_count", "monitor", "running_red_light"}
 """Criteria whose runs are in separate tests."""
 
 
