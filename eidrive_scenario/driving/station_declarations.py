@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from eidrive_scenario.files.yaml_text import load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
+from eidrive_scenario.openscenario.selections import EntitySelections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
 from eidrive_scenario.registry import registry
@@ -38,15 +39,22 @@ def declared_settings(
             except SettingError as error:
                 diagnostics.extend(error.diagnostics)
             controllers[name] = controller
+    selections = EntitySelections(scenario)
     for name, settings in found.items():
-        diagnostics.extend(_unknown_senders(name, settings, controllers))
+        senders = _without_selections(settings.cooperates_with, selections, controllers)
+        if senders != settings.cooperates_with:
+            found[name] = settings.model_copy(update={"cooperates_with": senders})
+        diagnostics.extend(_unknown_senders(name, found[name], selections, controllers))
         if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
             message = f"{name!r} has no wheels for planner {settings.planner!r}"
             line = _line(controllers[name], "planner")
             diagnostics.append(Diagnostic(message, "remove the property 'planner'", controllers[name].source, line))
+    cooperate = _without_selections(cooperate, selections, controllers)
     for sender in cooperate or ():
         if sender not in controllers:
-            diagnostics.append(Diagnostic(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
+            what = "selection without stations" if sender in selections.declared else "no station"
+            hint = suggestion(sender, [*controllers, *selections.declared])
+            diagnostics.append(Diagnostic(f"{what} {sender!r}", hint, "--cooperate"))
     if diagnostics:
         raise SettingError(diagnostics)
     updated = {}
@@ -152,12 +160,28 @@ def _line(controller: Controller, *properties: str) -> int:
     return next((lines[name] for name in properties if name in lines), controller.line)
 
 
-def _unknown_senders(name: str, settings: AgentSettings, controllers: Mapping[str, Controller]) -> list[Diagnostic]:
+def _without_selections(
+    senders: tuple[str, ...] | None, selections: EntitySelections, stations: Container[str]
+) -> tuple[str, ...] | None:
+    """Return the senders with each selection replaced by the stations among its members, if there are any."""
+    if senders is None:
+        return None
+    found: dict[str, None] = {}
+    for sender in senders:
+        members = [name for name in selections.members(sender) if name in stations]
+        found.update(dict.fromkeys(members or [sender]))
+    return tuple(found)
+
+
+def _unknown_senders(
+    name: str, settings: AgentSettings, selections: EntitySelections, controllers: Mapping[str, Controller]
+) -> list[Diagnostic]:
     line = _line(controllers[name], "cooperates_with")
-    others = [other for other in controllers if other != name]
+    others = [other for other in (*controllers, *selections.declared) if other != name]
     return [
         Diagnostic(
-            f"{name!r} cooperates with {sender!r}, which is no station",
+            f"{name!r} cooperates with {sender!r}, which "
+            + ("is a selection without stations" if sender in selections.declared else "is no station"),
             suggestion(sender, others),
             controllers[name].source,
             line,

@@ -23,6 +23,7 @@ from eidrive_scenario.openscenario.model import (
     ParameterCondition,
     VariableDeclaration,
 )
+from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.values.expressions import REFERENCE
 
 
@@ -91,11 +92,29 @@ def unused_monitors(context: LintContext) -> Iterator[Diagnostic]:
 
 
 def unused_selections(context: LintContext) -> Iterator[Diagnostic]:
-    """Yield entity selections without a reference."""
+    """Yield entity selections without a reference.
+
+    A station may cooperate with the stations of a selection whose name is the value of a parameter.
+    """
     referenced = context.referenced.get("entity", set()) | context.command_words
+    stations = _stations_with_senders(context)
     for element in context.elements:
-        if isinstance(element, EntitySelection) and element.name not in referenced:
+        if not isinstance(element, EntitySelection) or element.name in referenced:
+            continue
+        if not stations.intersection(context.members(element.name)):
             yield at(element, f"selection {element.name!r} is never used", "remove it")
+
+
+def _stations_with_senders(context: LintContext) -> set[str]:
+    """Return all stations if one of them selects its senders."""
+    stations = {
+        name: controller
+        for name, assigned in context.scenario.controllers.items()
+        for controller in assigned
+        if is_agent_controller(controller)
+    }
+    entries = (entry.name for controller in stations.values() for entry in property_entries(controller))
+    return set(stations) if "cooperates_with" in entries else set()
 
 
 def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from itertools import product
 from typing import Any, TypeVar
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.openscenario.selections import EntitySelections
 from eidrive_scenario.storyboard.context.condition import EntityCondition, Measure
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 
@@ -25,14 +26,9 @@ class Selections:
     """Entity selections of one scenario."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._entities_by_type = scenario.entities_by_type
-        entities = scenario.document.entities
-        declarations = entities.entity_selection if entities is not None else ()
-        self._groups = {one.name: one for one in declarations if one.name not in scenario.entities}
-
-    def members(self, name: str) -> list[str]:
-        """Return the entity of this name, or the members of the selection. Raise ScenarioError for a cycle."""
-        return list(dict.fromkeys(self._members(name, ())))
+        selections = EntitySelections(scenario)
+        self._groups = selections.declared
+        self.members = selections.members
 
     def alternatives(self, element: E) -> list[E]:
         """Return the element once per combination of members of the selections that it refers to.
@@ -58,19 +54,6 @@ class Selections:
                 element.line,
             )
         )
-
-    def _members(self, name: str, parents: tuple[str, ...]) -> Iterator[str]:
-        group = self._groups.get(name)
-        if group is None:
-            yield name
-            return
-        if name in parents:
-            text = f"selection {name!r} is a member of itself"
-            raise ScenarioError(Diagnostic(text, "remove it from its members", group.source, group.line))
-        for ref in group.members.entity_ref:
-            yield from self._members(ref.entity_ref, (*parents, name))
-        for entry in group.members.by_type:
-            yield from self._entities_by_type.get(entry.object_type, ())
 
     def _named_groups(self, element: model.Element) -> set[str]:
         if not self._groups:
