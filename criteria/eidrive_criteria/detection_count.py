@@ -8,11 +8,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from eidrive_criteria.bounds import BoundedSettings
-from eidrive_criteria.perceived import VEHICLES, PerceivedCriterion, PerceivedSettings
+from eidrive_criteria.perceived import VEHICLES, ActorClass, PerceivedCriterion, PerceivedSettings
 from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Frame, Verdict
 
-ActorClass = Literal["car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc"]
 Measure = Literal["mean", "min", "max", "total"]
 
 PHRASES: Mapping[Measure, str] = {
@@ -55,10 +54,11 @@ class DetectionCount(PerceivedCriterion):
         self._all: set[str] = set()
         self._violated: float | None = None
 
-    def evaluate(self, frame: Frame, known: Mapping[str, float]) -> None:
+    def evaluate(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         if view.time < settings.after - TIME_TOLERANCE:
             return
+        known = self.known(frame, settings.source)
         counted = [name for name in known if view.categories[view.rows[name]] in self._classes]
         self._frames += 1
         self._sum += len(counted)
@@ -94,7 +94,7 @@ class DetectionCount(PerceivedCriterion):
         elif value is None:
             reason = f"{self.of} was not present from {settings.after:.2f} s on"
         else:
-            reason = f"{self.of} knew {value:.4g} {what} {PHRASES[settings.measure]} ({self.source} objects)"
+            reason = f"{self.of} knew {value:.4g} {what} {PHRASES[settings.measure]} ({settings.source} objects)"
         return self.conclude(
             value is not None and settings.allows(value),
             reason,

@@ -11,9 +11,11 @@ from eidrive_scenario.evaluation.criterion import (
     actor_never_present,
     evaluate_criteria,
 )
+from eidrive_scenario.evaluation.false_tracks import Brakings, FalseTracks
 from eidrive_scenario.evaluation.fault import Impact, judge_impact
 from eidrive_scenario.evaluation.known_actors import Source, known_actors
 from eidrive_scenario.evaluation.lane_tracking import SIDEWALKS, LaneTracker, corners
+from eidrive_scenario.evaluation.lines_of_sight import LinesOfSight
 from eidrive_scenario.evaluation.safe_distance import SafeDistanceModel
 from eidrive_scenario.evaluation.stop_line_crossings import Crossing, StopLineCrossings, along, beside
 from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
@@ -22,13 +24,16 @@ from eidrive_scenario.roads.model.signal_states import lamp_colors, shows_red
 
 __all__ = [
     "SIDEWALKS",
+    "Brakings",
     "Continuity",
     "Criterion",
     "CriterionSettings",
     "Crossing",
+    "FalseTracks",
     "Frame",
     "Impact",
     "LaneTracker",
+    "LinesOfSight",
     "Relation",
     "SafeDistanceModel",
     "Source",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.view import WorldView
@@ -15,6 +16,13 @@ GATE = 2.0
 """Maximum horizontal distance of the center of a true object from the body of another actor [m]."""
 SAME = 4.0
 """Maximum distance of false objects of successive ticks that form one false track [m]; 80 m/s at a step of 0.05 s."""
+
+
+class Brakings(NamedTuple):
+    """Number of brakings of a station, and of those without a cause."""
+
+    number: int
+    without_cause: int
 
 
 @dataclass
@@ -36,14 +44,16 @@ class FalseTracks:
     false track      maximal series of ticks in which the planner receives an object without a true actor within GATE.
                      Its probability of existence is at least `min_existence` of the station. Objects of successive
                      ticks within SAME of each other continue one track. The ego body is not a true object.
-    braking          maximal series of ticks in which `Plan.braking` is set
+    braking          maximal series of ticks in which `Plan.braking` is set, or the deceleration of the plan exceeds
+                     `harder_than` [m/s²]
     without a cause  all objects that the planner states as reason (`Plan.objects`) in the first tick of the braking
                      are false. A braking without stated objects has a cause.
 
     Ground truth is used only here and in criteria, never by a planner.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, harder_than: float = math.inf) -> None:
+        self._harder_than = harder_than
         self._stations: dict[str, _Station] = {}
         self._start = self._end = math.nan
 
@@ -71,12 +81,17 @@ class FalseTracks:
                     all(math.dist(point, before) > SAME for before in station.false) for point in points
                 )
                 station.false = points
-            braking = step.plan.braking is not None
+            braking = step.plan.braking is not None or -step.plan.acceleration > self._harder_than
             if braking and not station.braking:
                 station.brakings += 1
                 reasons = step.plan.objects
                 station.without_cause += bool(reasons) and all(row in rows for row in reasons)
             station.braking = braking
+
+    def brakings(self, station: str) -> Brakings:
+        """Return the brakings of a station."""
+        known = self._stations.get(station)
+        return Brakings(0, 0) if known is None else Brakings(known.brakings, known.without_cause)
 
     def metrics(self) -> dict[str, float]:
         """Return `false_tracks.NAME.per_minute`, `.brakings` and `.brakings_without_cause` of each station."""

@@ -13,7 +13,7 @@ from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
 
 Source = Literal["own", "fused"]
-"""Objects of a station: those of its own detector and tracker, or the result of fusion, which its planner gets."""
+"""Objects of a station: those that it perceives itself, or the result of fusion, which its planner gets."""
 
 
 def objects_of(step: AgentStep, source: Source) -> Detections:

@@ -1,17 +1,19 @@
-"""Bodies of road objects and signals: poles, trees, barriers, posts.
+"""Bodies of road objects and signals: buildings, poles, trees, barriers, posts.
 
-Buildings are part of the scenery. Objects that are painted on the road or have no height are excluded.
+Objects that are painted on the road or have no height are excluded.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from eidrive_scenario.roads import LaneLocation, PlacedObject, Pose, RoadNetwork, Signal, outlines, placed_objects
+from eidrive_scenario.world.actor import Vector3
 
 SIZES: Mapping[str, tuple[float, float, float]] = {
     "tree": (4.0, 4.0, 7.0),
@@ -77,6 +79,17 @@ class RoadObjectBody(NamedTuple):
     solid: bool = True
 
 
+@dataclass(frozen=True)
+class Building:
+    """Box on the ground: center [m], length, width, height [m], heading [rad]."""
+
+    name: str
+    center: Vector3
+    size: Vector3
+    yaw: float
+    color: Vector3 | None = None
+
+
 class SignalHead(NamedTuple):
     """Head of a signal: pose of the center of its lower edge, facing the traffic.
 
@@ -88,6 +101,24 @@ class SignalHead(NamedTuple):
     width: float
     height: float
     carried: bool
+
+
+def buildings(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Building]:
+    """Yield the buildings of a road network as boxes, except objects with some ids."""
+    for placed in placed_objects(roads):
+        if placed.object.type == "building" and placed.object.id not in without:
+            yield _building(roads, placed)
+
+
+def _building(roads: RoadNetwork, placed: PlacedObject) -> Building:
+    """Return the box around an object of the road network."""
+    entry, pose = placed.object, placed.pose
+    length, width, height = placed.length or 1.0, placed.width or 1.0, placed.height or STOREY
+    if entry.outlines and not entry.repeats:
+        pose, length, width = bounding_box(roads, placed)
+        height = max([height, *(corner.height for outline in entry.outlines for corner in outline)])
+    center = (pose.x, pose.y, pose.z + height / 2)
+    return Building(entry.name or f"building {entry.id}", center, (length, width, height), pose.h)
 
 
 def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[RoadObjectBody]:

@@ -13,7 +13,8 @@ from msgspec.structs import replace
 from eidrive_scenario.api.common import Contact, RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import Frame
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.driving.step import AgentStep, Plan
+from eidrive_scenario.v2x.messages.message import Message, StationState
 
 
 class Car(NamedTuple):
@@ -95,13 +96,21 @@ def objects(time: float, points: Sequence[Point], score: float = 1.0) -> Detecti
 
 @pytest.fixture
 def perceived() -> MakeFrame:
-    """Return a function `perceived(frame, "Ego", own=[(x, y)], fused=[(x, y)])` that adds the step of a station."""
+    """Return a function `perceived(frame, "Ego", own=[(x, y)], fused=[(x, y)], sends=True)` that adds a step."""
 
     def make(
-        frame: Frame, station: str, own: Sequence[Point] = (), fused: Sequence[Point] = (), score: float = 1.0
+        frame: Frame,
+        station: str,
+        own: Sequence[Point] = (),
+        fused: Sequence[Point] = (),
+        score: float = 1.0,
+        plan: Plan | None = None,
+        sends: bool = False,
     ) -> Frame:
-        time = frame.view.time
-        step = AgentStep(objects(time, own, score), (), objects(time, fused, score), None, None, ())
+        time, known = frame.view.time, objects(frame.view.time, own, score)
+        state = StationState(time, 0.0, 0.0, 0.0, 0.0, 0.0)
+        outbox = (Message(station, frame.view.tick, time, state, known, 100),) if sends else ()
+        step = AgentStep(known, (), objects(time, fused, score), plan, None, outbox)
         return replace(frame, steps={**frame.steps, station: step})
 
     return make

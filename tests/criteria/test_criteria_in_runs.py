@@ -96,7 +96,15 @@ CASES = {
 }
 """Settings with which a criterion passes and fails."""
 
-ELSEWHERE = {"detection_count", "monitor", "running_red_light"}
+PERCEPTION = {
+    "cooperation_gain",
+    "detection_count",
+    "detection_recall",
+    "false_braking",
+    "first_detection",
+    "position_error",
+}
+ELSEWHERE = {"monitor", "running_red_light"} | PERCEPTION
 """Criteria whose runs are in separate tests."""
 
 

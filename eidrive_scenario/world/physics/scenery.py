@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.roads import PlacedObject, RoadNetwork, placed_objects, surface_meshes
+from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN, quaternion
 from eidrive_scenario.world.physics.bullet import bullet
@@ -17,20 +16,9 @@ from eidrive_scenario.world.physics.ground import is_level
 from eidrive_scenario.world.physics.obstacles import MAX_FACES, Obstacles
 from eidrive_scenario.world.physics.spatial_grid import SpatialGrid, grid_cells
 from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
-from eidrive_scenario.world.road_objects import STOREY, RoadObjectBody, bounding_box, road_object_bodies
+from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildings, road_object_bodies
 
 GROUND = "ground"
-
-
-@dataclass(frozen=True)
-class Building:
-    """Box on the ground: center [m], length, width, height [m], heading [rad]."""
-
-    name: str
-    center: Vector3
-    size: Vector3
-    yaw: float
-    color: Vector3 | None = None
 
 
 class Scenery:
@@ -54,10 +42,8 @@ class Scenery:
         self._obstacles: Obstacles | None = None
         self._obstacle_handles: frozenset[int] = frozenset()
         if roads is not None:
-            for placed in placed_objects(roads):
-                if placed.object.type == "building" and placed.object.id not in entities:
-                    building = _building(roads, placed)
-                    self.add_building(building.name, building.center, building.size, building.yaw)
+            for building in buildings(roads, without=entities):
+                self.add_building(building.name, building.center, building.size, building.yaw)
 
     def add_building(self, name: str, center: Vector3, size: Vector3, yaw: float, color: Vector3 | None = None) -> None:
         """Add a building that blocks vehicles and rays."""
@@ -135,14 +121,3 @@ class Scenery:
         bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **in_client)
         bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **in_client)
         self._names[handle] = name
-
-
-def _building(roads: RoadNetwork, placed: PlacedObject) -> Building:
-    """Return the box around an object of the road network."""
-    entry, pose = placed.object, placed.pose
-    length, width, height = placed.length or 1.0, placed.width or 1.0, placed.height or STOREY
-    if entry.outlines and not entry.repeats:
-        pose, length, width = bounding_box(roads, placed)
-        height = max([height, *(corner.height for outline in entry.outlines for corner in outline)])
-    center = (pose.x, pose.y, pose.z + height / 2)
-    return Building(entry.name or f"building {entry.id}", center, (length, width, height), pose.h)

@@ -22,11 +22,11 @@ from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Color, by_
 from eidrive_scenario.world.meshes.solids import polygon
 from eidrive_scenario.world.physics.bodies import Body
 from eidrive_scenario.world.physics.ground import GroundUnder
-from eidrive_scenario.world.physics.scenery import Building, Scenery
+from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.render.illumination.lamps import Beam
 from eidrive_scenario.world.render.model import Light, MeshInstance, Model, gridded, merged, model, placed
 from eidrive_scenario.world.render.renderer import Renderer, Subjects
-from eidrive_scenario.world.road_objects import signal_heads
+from eidrive_scenario.world.road_objects import Building, signal_heads
 from eidrive_scenario.world.scene.roadside import Roadside
 from eidrive_scenario.world.scene.vehicle_lamps import beam, glow
 from eidrive_scenario.world.weather import Weather

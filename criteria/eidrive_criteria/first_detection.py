@@ -1,0 +1,84 @@
+"""Criterion: time at which a station first knows an actor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from eidrive_criteria.perceived import PerceivedCriterion, PerceivedSettings
+from eidrive_scenario.api.common import TIME_TOLERANCE
+from eidrive_scenario.api.criteria import Frame, Verdict, actor_never_present
+
+
+class FirstDetectionSettings(PerceivedSettings):
+    """Settings: `{of: Ego, to: Incoming, source: fused, by: 3.0}` [s]. Without `by` it only measures and passes."""
+
+    to: str
+    by: Annotated[float, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _two_actors(self) -> Self:
+        if self.of == self.to:
+            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
+        return self
+
+
+class FirstDetection(PerceivedCriterion):
+    """Criterion that fails if the station does not know the other actor until `by`."""
+
+    settings_type = FirstDetectionSettings
+    name = "first_detection"
+    unit = "s"
+
+    def __init__(self, settings: FirstDetectionSettings) -> None:
+        super().__init__(settings)
+        self._settings = settings
+        self.subjects = (settings.of, settings.to)
+        self._other_was_present = self._late = False
+        self._first: float | None = None
+        self._distance = math.nan
+        """Distance between the centers of both actors at the first detection [m]."""
+
+    def observe(self, frame: Frame) -> None:
+        view, settings = frame.view, self._settings
+        self._other_was_present = self._other_was_present or settings.to in view.rows
+        self._late = settings.by is not None and view.time > settings.by + TIME_TOLERANCE
+        super().observe(frame)
+
+    def evaluate(self, frame: Frame) -> None:
+        view, settings = frame.view, self._settings
+        if self._first is not None or settings.to not in self.known(frame, settings.source):
+            return
+        self._first = view.time
+        own, other = view.plain_boxes[view.rows[self.of]], view.plain_boxes[view.rows[settings.to]]
+        self._distance = math.hypot(other[0] - own[0], other[1] - own[1])
+
+    def verdict(self) -> Verdict:
+        settings = self._settings
+        in_time = settings.by is None or (self._first is not None and self._first <= settings.by + TIME_TOLERANCE)
+        if not self.perceives:
+            reason = self.no_perception()
+        elif not self._other_was_present:
+            reason = actor_never_present([settings.to])
+        elif self._first is None:
+            reason = f"{self.of} never knew {settings.to} ({settings.source} objects)"
+        else:
+            when = f"{self._first:.2f} s, at a distance of {self._distance:.1f} m"
+            reason = f"{self.of} first knew {settings.to} at {when} ({settings.source} objects)"
+        return self.conclude(
+            self.perceives and self._other_was_present and in_time,
+            reason,
+            value=self._first,
+            limit=settings.by,
+            is_final=self._late and not in_time,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return time [s] and distance [m] of the first detection; empty without one."""
+        if self._first is None:
+            return {}
+        pair = f"{self.name}.{self.of}.{self._settings.to}"
+        return {f"{pair}.time": self._first, f"{pair}.distance": self._distance}
