@@ -16,8 +16,10 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model import curves
 from eidrive_scenario.world import World
 from xosc.roads import make_roads
-from xosc.roads.crossings import LANE, Crossing, LaneSpec, Street
-from xosc.roads.make_roads import add, add_lane, add_mark, add_road
+from xosc.roads.crossings import Crossing
+from xosc.roads.layout import LaneSpec, Street
+from xosc.roads.opendrive import add, add_lane, add_mark, add_road
+from xosc.roads.streets import LANE
 
 Element = etree._Element
 
@@ -61,7 +63,7 @@ def random_place(rng: np.random.Generator, folder: Path) -> Place:
     """Return a place for this generator state; its OpenDRIVE file is written into the folder and read."""
     path = folder / "place.xodr"
     if rng.random() < 0.65:
-        make_roads.write(random_crossing(rng), path)
+        make_roads.write(random_crossing(rng).layout(), path)
         root = etree.parse(path).getroot()
         for item in root.iterfind(".//object[@type='building']"):
             holder = item.getparent()
@@ -92,7 +94,7 @@ def random_crossing(rng: np.random.Generator) -> Crossing:
         x=x,
         box=(near, far, right, left),
         reach=(near - ends[0], far + ends[1], right - ends[2], left + ends[3]),
-        lights=bool(rng.random() < 0.6),
+        control="light" if rng.random() < 0.6 else "stop",
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from corpora import corpora_folder
@@ -18,3 +20,12 @@ def corpora() -> Path:
 def library() -> Path:
     """Folder of the library roads."""
     return Path(__file__).parents[3] / "xosc" / "roads"
+
+
+@pytest.fixture(scope="session")
+def carla() -> ModuleType:
+    """CARLA's Python package, whose Map reads OpenDRIVE without a simulator."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        module: ModuleType = pytest.importorskip("carla", reason="the carla wheel is not installed")
+    return module

@@ -3,10 +3,8 @@
 import csv
 import gzip
 import math
-import warnings
 from pathlib import Path
 from time import process_time
-from types import ModuleType
 from typing import Any
 
 import networkx as nx
@@ -17,14 +15,6 @@ from lxml import etree
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 
 TOWNS = ("Town01", "Town03", "Town04", "Town05", "Town06")
-
-
-@pytest.fixture(scope="module")
-def carla() -> ModuleType:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        module: ModuleType = pytest.importorskip("carla", reason="the carla wheel is not installed")
-    return module
 
 
 def test_every_corpus_map_loads_and_has_surfaces(corpora: Path) -> None:
