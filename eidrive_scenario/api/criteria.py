@@ -21,6 +21,8 @@ from eidrive_scenario.evaluation.stop_line_crossings import Crossing, StopLineCr
 from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads.model.signal_states import lamp_colors, shows_red
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+from eidrive_scenario.v2x.statistics.reception_log import ReceptionLog
 
 __all__ = [
     "SIDEWALKS",
@@ -34,6 +36,8 @@ __all__ = [
     "Impact",
     "LaneTracker",
     "LinesOfSight",
+    "LinkStatistics",
+    "ReceptionLog",
     "Relation",
     "SafeDistanceModel",
     "Source",

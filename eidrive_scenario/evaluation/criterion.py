@@ -15,6 +15,7 @@ from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,12 @@ class Criterion(ABC):
     @abstractmethod
     def observe(self, frame: Frame) -> None:
         """Process one frame."""
+
+    def observe_links(self, links: Mapping[tuple[str, str], LinkStatistics]) -> None:  # noqa: B027 - optional
+        """Process the statistics of all links by (sender, receiver), once after the last frame of a run.
+
+        They are not part of recordings.
+        """
 
     @abstractmethod
     def verdict(self) -> Verdict:
@@ -155,15 +162,21 @@ def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
 
 
 def evaluate_criteria(
-    frames: Iterable[Frame], criteria: Sequence[Criterion], roads: RoadNetwork | None = None
+    frames: Iterable[Frame],
+    criteria: Sequence[Criterion],
+    roads: RoadNetwork | None = None,
+    links: Mapping[tuple[str, str], LinkStatistics] | None = None,
 ) -> tuple[Verdict, ...]:
     """Return the verdicts of `criteria` over `frames`, for example of a recording.
 
     roads  of the scenario. Raise SettingError if they are missing and a criterion requires them.
+    links  statistics of the links of the run, as `RunResult.links`
     """
     for criterion in criteria:
         bind_roads(criterion, roads)
     for frame in frames:
         for criterion in criteria:
             criterion.observe(frame)
+    for criterion in criteria if links is not None else ():
+        criterion.observe_links(links or {})
     return tuple(checked_verdict(criterion) for criterion in criteria)

@@ -46,6 +46,9 @@ def build_result(
 ) -> RunResult:
     """Return the result of a run that has ended."""
     frame, scenario, stack = end.frame, state.scenario, state.stack
+    links = dict(stack.link_statistics(frame.view.time))
+    for criterion in state.criteria:
+        criterion.observe_links(links)
     verdicts = final_verdicts(state.criteria, state.exit)
     exit_code = exit_code_of(verdicts, end.reason)
     metrics = criteria_metrics(state.criteria)
@@ -67,7 +70,7 @@ def build_result(
         warnings=tuple(dict.fromkeys([*state.warnings, *late_warnings])),
         parameters=dict(scenario.parameters),
         run=settings.run,
-        links=dict(stack.link_statistics(frame.view.time)),
+        links=links,
         settings=settings,
     )
 

@@ -104,7 +104,8 @@ PERCEPTION = {
     "first_detection",
     "position_error",
 }
-ELSEWHERE = {"monitor", "running_red_light"} | PERCEPTION
+COMMUNICATION = {"age_of_information", "channel_busy_ratio", "latency", "packet_reception_ratio"}
+ELSEWHERE = {"monitor", "running_red_light"} | PERCEPTION | COMMUNICATION
 """Criteria whose runs are in separate tests."""
 
 

@@ -7,7 +7,9 @@ from typing import Any
 
 CRITERIA: Mapping[str, Mapping[str, Any]] = {
     "actor_blocked": {"of": "Ego", "at_most": 60.0, "below": 0.2},
+    "age_of_information": {"sender": "B", "receiver": "Ego", "measure": "p95", "at_most": 0.5},
     "average_speed": {"of": "Ego", "at_least": 2.0, "at_most": 10.0},
+    "channel_busy_ratio": {"of": "Ego", "at_most": 0.6},
     "collision": {"of": "Ego", "with": "B", "fatal": True, "name": "crash", "only_at_fault": True},
     "comfort": {
         "of": "Ego",
@@ -66,11 +68,13 @@ CRITERIA: Mapping[str, Mapping[str, Any]] = {
         "min_confidence": 0.3,
     },
     "keep_lane": {"of": "Ego", "at_most": 1.0},
+    "latency": {"sender": "B", "receiver": "Ego", "measure": "max", "at_most": 0.5},
     "max_speed": {"of": "Ego", "at_most": 10.0},
     "min_distance": {"of": "Ego", "to": "B", "at_least": 1.5, "measure": "box"},
     "min_speed": {"of": "Ego", "at_least": 2.0, "after": 3.0},
     "off_road": {"of": "Ego", "at_most": 1.0},
     "on_sidewalk": {"of": "Ego", "at_most": 1.0},
+    "packet_reception_ratio": {"sender": "B", "receiver": "Ego", "at_least": 0.9},
     "position_error": {
         "of": "Ego",
         "to": "B",

@@ -1,0 +1,86 @@
+"""Criterion: age of the newest received message."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from eidrive_criteria.linked import Link, LinkCriterion, LinkSettings
+from eidrive_scenario.api.criteria import ReceptionLog, Verdict
+from eidrive_scenario.api.v2x import LinkEvent, ReceivedMessage
+
+Measure = Literal["mean", "p95", "peak"]
+PHRASES: Mapping[Measure, str] = {
+    "mean": "on average",
+    "p95": "at the 95th percentile",
+    "peak": "on average before an update",
+}
+
+
+class AgeOfInformationSettings(LinkSettings):
+    """Settings: `{receiver: Ego, measure: peak, at_most: 0.5}` [s]; without `at_most` it only measures and passes."""
+
+    measure: Measure = "mean"
+    at_most: Annotated[float, Field(ge=0)] | None = None
+
+
+class AgeOfInformation(LinkCriterion):
+    """Criterion that fails if the age of information of one of the links exceeds `at_most`.
+
+    The age is the time since the generation of the newest message that the receiver has got from the sender. It counts
+    from the first reception on. A link on which all messages were lost has an infinite age.
+    """
+
+    settings_type = AgeOfInformationSettings
+    name = "age_of_information"
+    unit = "s"
+
+    def __init__(self, settings: AgeOfInformationSettings) -> None:
+        super().__init__(settings)
+        self._settings = settings
+        self._log = ReceptionLog()
+        self._used: set[Link] = set()
+        """Links with a lost or received message."""
+
+    def add_outcome(self, event: LinkEvent) -> None:
+        if event.outcome == "lost":
+            self._used.add((event.sender, event.receiver))
+
+    def add_reception(self, link: Link, received: ReceivedMessage) -> None:
+        message = received.message
+        self._used.add(link)
+        self._log.record(link[1], [(received.arrived, link[0], message.number, message.generated, received)])
+
+    def _ages(self) -> dict[Measure, tuple[float, Link]]:
+        """Return the largest age of each measure with its link; without the undefined ones."""
+        known = self._log.statistics_by_link(self.time)
+        found: dict[Measure, tuple[float, Link]] = {}
+        for link in sorted(self._used):
+            row = known.get(link)
+            values: dict[Measure, float | None] = dict.fromkeys(PHRASES, math.inf)
+            if row is not None:
+                values = {"mean": row.mean_age, "p95": row.p95_age, "peak": row.peak_age}
+            for measure, value in values.items():
+                if value is not None and (measure not in found or value > found[measure][0]):
+                    found[measure] = value, link
+        return found
+
+    def verdict(self) -> Verdict:
+        settings, found = self._settings, self._ages().get(self._settings.measure)
+        value = None if found is None else found[0]
+        if found is None:
+            reason = self.nothing("received message")
+        elif math.isinf(found[0]):
+            reason = f"no message from {found[1][0]} to {found[1][1]} was received"
+        else:
+            newest = f"the newest message from {found[1][0]} to {found[1][1]} was {value:.3f} s old"
+            reason = f"{newest} {PHRASES[settings.measure]}"
+        exceeds = value is not None and settings.at_most is not None and value > settings.at_most
+        return self.conclude(not self.missing and not exceeds, reason, value=value, limit=settings.at_most)
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the largest age of each measure [s]; empty without a message."""
+        return {f"{self.name}.{measure}": value for measure, (value, _) in self._ages().items()}
