@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_criteria.extreme import Extreme, conclude_extreme
 from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
@@ -30,45 +31,30 @@ class ActorBlocked(Criterion):
         super().__init__(settings)
         self._settings = settings
         self.subjects = (settings.of,)
-        self._was_present = False
         self._since: float | None = None
-        self._longest, self._start = 0.0, 0.0
-        self._violated: float | None = None
+        self._longest = Extreme(settings.at_most, largest=True, tolerance=TIME_TOLERANCE)
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         row = view.rows.get(settings.of)
         if row is None or abs(float(view.speed[row])) >= settings.below:
-            self._was_present = self._was_present or row is not None
             self._since = None
+            if row is not None:
+                self._longest.add(0.0, view.time)
             return
-        self._was_present = True
         self._since = view.time if self._since is None else self._since
-        blocked = view.time - self._since
-        if blocked > self._longest:
-            self._longest, self._start = blocked, self._since
-        if self._violated is None and blocked > settings.at_most + TIME_TOLERANCE:
-            self._violated = view.time
+        self._longest.add(view.time - self._since, view.time)
 
     def verdict(self) -> Verdict:
-        of = self._settings.of
-        if not self._was_present:
+        of, longest = self._settings.of, self._longest
+        if longest.value is None:
             reason = actor_never_present([of])
-        elif self._longest > 0.0:
-            reason = f"{of} was blocked for {self._longest:.2f} s from {self._start:.2f} s on"
+        elif longest.value > 0.0:
+            reason = f"{of} was blocked for {longest.value:.2f} s from {longest.when - longest.value:.2f} s on"
         else:
             reason = f"{of} was never blocked"
-        return Verdict(
-            name=self.name,
-            passed=self._was_present and self._violated is None,
-            value=self._longest if self._was_present else None,
-            limit=self._settings.at_most,
-            unit=self.unit,
-            first_violation=self._violated,
-            reason=reason,
-            fatal=self.fatal and self._violated is not None,
-        )
+        return conclude_extreme(self, longest, reason, measured=longest.value is not None)
 
     def metrics(self) -> Mapping[str, float]:
         """Return the longest time in which the actor was blocked [s]."""
-        return {f"{self.name}.{self._settings.of}": self._longest} if self._was_present else {}
+        return {} if self._longest.value is None else {f"{self.name}.{self._settings.of}": self._longest.value}

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Self
 
-from pydantic import Field, model_validator
-
-from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_criteria.bounds import BoundedSettings
+from eidrive_scenario.api.criteria import Criterion, Frame, Verdict, actor_never_present
 
 
-class AverageSpeedSettings(CriterionSettings):
+class AverageSpeedSettings(BoundedSettings):
     """Settings: `{of: Ego, at_least: 5.0, at_most: 14.0}` [m/s]. Without limits it only measures and passes."""
 
     of: str
-    at_least: Annotated[float, Field(ge=0)] | None = None
-    at_most: Annotated[float, Field(ge=0)] | None = None
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.at_least is not None and self.at_most is not None and self.at_least > self.at_most:
-            raise ValueError(f"'at_least' exceeds 'at_most' (got {self.at_least} > {self.at_most})")
-        return self
 
 
 class AverageSpeed(Criterion):
@@ -62,19 +52,11 @@ class AverageSpeed(Criterion):
 
     def verdict(self) -> Verdict:
         settings, average = self._settings, self._average()
-        too_slow = average is not None and settings.at_least is not None and average < settings.at_least
-        too_fast = average is not None and settings.at_most is not None and average > settings.at_most
         reason = actor_never_present([settings.of])
         if average is not None:
             reason = f"{settings.of} drove {average:.2f} m/s on average over {self._duration:.2f} s"
-        return Verdict(
-            name=self.name,
-            passed=average is not None and not too_slow and not too_fast,
-            value=average,
-            limit=settings.at_most if too_fast or settings.at_least is None else settings.at_least,
-            unit=self.unit,
-            first_violation=None,
-            reason=reason,
+        return self.conclude(
+            average is not None and settings.allows(average), reason, value=average, limit=settings.limit_of(average)
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -108,15 +108,12 @@ class Collision(Criterion):
         else:
             touched = f"did not touch {' or '.join(self._others)}" if self._others else "touched nothing"
             reason = f"{self._of} {touched}" + (" by its own fault" if self._only_at_fault else "")
-        return Verdict(
-            name=self.name,
-            passed=first is None and not self._missing,
+        return self.conclude(
+            first is None and not self._missing,
+            reason,
             value=float(len(self._hits)),
             limit=0.0,
-            unit="",
             first_violation=first.time if first is not None else None,
-            reason=reason,
-            fatal=self.fatal and first is not None,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -130,14 +130,13 @@ class Comfort(Criterion):
             quantity = worst.quantity.replace("_", " ")
             reason = f"{quantity} of {of} was {worst.value:.2f}, {worst.ratio:.2f} of its limit, at {worst.time:.2f} s"
         passed = bool(self._parts) and (worst is None or worst.ratio <= 1.0)
-        return Verdict(
-            name=self.name,
-            passed=passed,
+        return self.conclude(
+            passed,
+            reason,
             value=worst.ratio if worst is not None else None,
             limit=1.0,
-            unit="",
             first_violation=worst.time if worst is not None and not passed else None,
-            reason=reason,
+            is_final=False,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -59,15 +59,12 @@ class DrivenDistance(Criterion):
 
     def verdict(self) -> Verdict:
         of, limit, was_present = self._settings.of, self._settings.at_least, self._was_present
-        return Verdict(
-            name=self.name,
-            passed=was_present and self._distance >= limit,
+        return self.conclude(
+            was_present and self._distance >= limit,
+            f"{of} drove {self._distance:.1f} m" if was_present else actor_never_present([of]),
             value=self._distance if was_present else None,
             limit=limit,
-            unit=self.unit,
-            first_violation=None,
-            reason=f"{of} drove {self._distance:.1f} m" if was_present else actor_never_present([of]),
-            fatal=self.fatal and self._late,
+            is_final=self._late,
         )
 
     def metrics(self) -> Mapping[str, float]:

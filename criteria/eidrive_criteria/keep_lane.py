@@ -27,6 +27,7 @@ class KeepLane(SummedCriterion):
         self._known = False
 
     def interrupt(self) -> None:
+        super().interrupt()
         self._known = False
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:

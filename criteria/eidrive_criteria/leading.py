@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, Self
 
 from pydantic import model_validator
 
+from eidrive_criteria.extreme import Extreme, conclude_extreme
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import (
     Criterion,
@@ -54,10 +54,8 @@ class LeaderCriterion(Criterion):
         self.subjects = (settings.of,) if settings.to is None else (settings.of, settings.to)
         self._surroundings = Surroundings(None)
         self._missing = set(self.subjects)
-        self._extreme: float | None = None
-        self._when = math.nan
+        self._extreme = Extreme(limit, largest=self.largest)
         self._other = ""
-        self._violated: float | None = None
 
     def bind(self, roads: RoadNetwork | None) -> None:
         super().bind(roads)
@@ -75,33 +73,21 @@ class LeaderCriterion(Criterion):
         value = self.measure(leader) if leader is not None else None
         if value is None or leader is None:
             return
-        if self._extreme is None or (value > self._extreme if self.largest else value < self._extreme):
-            self._extreme, self._when, self._other = value, view.time, leader.other
-        if self._violated is None and self.limit is not None:
-            exceeded = value > self.limit if self.largest else value < self.limit
-            self._violated = view.time if exceeded else None
+        if self._extreme.add(value, view.time):
+            self._other = leader.other
 
     def verdict(self) -> Verdict:
         if self._missing:
             reason = actor_never_present(self._missing)
-        elif self._extreme is None:
+        elif self._extreme.value is None:
             reason = f"{self.of} never had {self.to or 'an actor'} ahead in its path, so there is no {self.quantity}"
         else:
-            value = f"{self._extreme:.2f} {self.unit}"
-            reason = f"{self.quantity} of {self.of} to {self._other} was {value} at {self._when:.2f} s"
-        return Verdict(
-            name=self.name,
-            passed=not self._missing and self._violated is None,
-            value=self._extreme,
-            limit=self.limit,
-            unit=self.unit,
-            first_violation=self._violated,
-            reason=reason,
-            fatal=self.fatal and self._violated is not None,
-        )
+            value = f"{self._extreme.value:.2f} {self.unit}"
+            reason = f"{self.quantity} of {self.of} to {self._other} was {value} at {self._extreme.when:.2f} s"
+        return conclude_extreme(self, self._extreme, reason, measured=not self._missing)
 
     def metrics(self) -> Mapping[str, float]:
         """Return the extreme and its time [s]; empty without a value."""
-        if self._extreme is None:
+        if self._extreme.value is None:
             return {}
-        return {f"{self.name}.{self.of}": self._extreme, f"{self.name}.{self.of}.time": self._when}
+        return {f"{self.name}.{self.of}": self._extreme.value, f"{self.name}.{self.of}.time": self._extreme.when}

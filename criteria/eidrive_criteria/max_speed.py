@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_criteria.extreme import Extreme, conclude_extreme
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
@@ -29,38 +29,21 @@ class MaxSpeed(Criterion):
         super().__init__(settings)
         self._settings = settings
         self.subjects = (settings.of,)
-        self._fastest, self._when = -math.inf, math.nan
-        self._violated: float | None = None
+        self._fastest = Extreme(settings.at_most, largest=True)
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
         row = view.rows.get(self._settings.of)
-        if row is None:
-            return
-        speed, limit = abs(float(view.speed[row])), self._settings.at_most
-        if speed > self._fastest:
-            self._fastest, self._when = speed, view.time
-        if self._violated is None and limit is not None and speed > limit:
-            self._violated = view.time
+        if row is not None:
+            self._fastest.add(abs(float(view.speed[row])), view.time)
 
     def verdict(self) -> Verdict:
-        of, was_present = self._settings.of, math.isfinite(self._fastest)
-        reason = (
-            f"{of} drove up to {self._fastest:.2f} m/s at {self._when:.2f} s"
-            if was_present
-            else actor_never_present([of])
-        )
-        return Verdict(
-            name=self.name,
-            passed=was_present and self._violated is None,
-            value=self._fastest if was_present else None,
-            limit=self._settings.at_most,
-            unit=self.unit,
-            first_violation=self._violated,
-            reason=reason,
-            fatal=self.fatal and self._violated is not None,
-        )
+        of, fastest = self._settings.of, self._fastest
+        if fastest.value is None:
+            return self.conclude(False, actor_never_present([of]), limit=fastest.limit)
+        reason = f"{of} drove up to {fastest.value:.2f} m/s at {fastest.when:.2f} s"
+        return conclude_extreme(self, fastest, reason)
 
     def metrics(self) -> Mapping[str, float]:
         """Return the maximum speed [m/s]."""
-        return {f"max_speed.{self._settings.of}": self._fastest} if math.isfinite(self._fastest) else {}
+        return {} if self._fastest.value is None else {f"max_speed.{self._settings.of}": self._fastest.value}

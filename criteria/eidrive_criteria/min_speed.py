@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_criteria.extreme import Extreme, conclude_extreme
 from eidrive_scenario.api.common import TIME_TOLERANCE
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
@@ -35,8 +35,7 @@ class MinSpeed(Criterion):
         self._settings = settings
         self.subjects = (settings.of,)
         self._was_present = False
-        self._slowest, self._when = math.inf, math.nan
-        self._violated: float | None = None
+        self._slowest = Extreme(settings.at_least, largest=False)
 
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
@@ -44,33 +43,19 @@ class MinSpeed(Criterion):
         if row is None:
             return
         self._was_present = True
-        if view.time < settings.after - TIME_TOLERANCE:
-            return
-        speed = abs(float(view.speed[row]))
-        if speed < self._slowest:
-            self._slowest, self._when = speed, view.time
-        if self._violated is None and settings.at_least is not None and speed < settings.at_least:
-            self._violated = view.time
+        if view.time >= settings.after - TIME_TOLERANCE:
+            self._slowest.add(abs(float(view.speed[row])), view.time)
 
     def verdict(self) -> Verdict:
-        of, measured = self._settings.of, math.isfinite(self._slowest)
-        if measured:
-            reason = f"{of} drove at least {self._slowest:.2f} m/s, slowest at {self._when:.2f} s"
+        of, slowest = self._settings.of, self._slowest
+        if slowest.value is not None:
+            reason = f"{of} drove at least {slowest.value:.2f} m/s, slowest at {slowest.when:.2f} s"
         elif self._was_present:
             reason = f"{of} was not present from {self._settings.after:.2f} s on, so nothing was measured"
         else:
             reason = actor_never_present([of])
-        return Verdict(
-            name=self.name,
-            passed=measured and self._violated is None,
-            value=self._slowest if measured else None,
-            limit=self._settings.at_least,
-            unit=self.unit,
-            first_violation=self._violated,
-            reason=reason,
-            fatal=self.fatal and self._violated is not None,
-        )
+        return conclude_extreme(self, slowest, reason, measured=slowest.value is not None)
 
     def metrics(self) -> Mapping[str, float]:
         """Return the minimum speed [m/s]."""
-        return {f"min_speed.{self._settings.of}": self._slowest} if math.isfinite(self._slowest) else {}
+        return {} if self._slowest.value is None else {f"min_speed.{self._settings.of}": self._slowest.value}

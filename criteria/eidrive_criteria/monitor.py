@@ -44,15 +44,13 @@ class Monitor(Criterion):
             reason = f"the scenario has no monitor {of!r}"
         else:
             reason = f"{of} is {str(value).lower()} since {self._changed:.2f} s"
-        return Verdict(
-            name=self.name,
-            passed=value == expected and not final,
+        return self.conclude(
+            value == expected and not final,
+            reason,
             value=None if value is None else float(value),
             limit=float(expected),
-            unit="",
             first_violation=self._violated if final else None if value == expected else self._changed,
-            reason=reason,
-            fatal=self.fatal and final,
+            is_final=final,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -73,13 +73,10 @@ class PairCriterion(Criterion):
         else:
             apart = f"{self.of} and {self.to} were never present at the same time"
             reason = actor_never_present(self._missing) if self._missing else apart
-        return Verdict(
-            name=self.name,
-            passed=self._together and self._violated is None,
+        return self.conclude(
+            self._together and self._violated is None,
+            reason,
             value=self.smallest if math.isfinite(self.smallest) else None,
             limit=self.limit,
-            unit=self.unit,
             first_violation=self._violated,
-            reason=reason,
-            fatal=self.fatal and self._violated is not None,
         )

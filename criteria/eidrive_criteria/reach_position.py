@@ -65,15 +65,12 @@ class ReachPosition(Criterion):
             reason = f"{settings.of} came no nearer to {place} than {self._nearest:.2f} m{until}"
         else:
             reason = actor_never_present([settings.of])
-        return Verdict(
-            name=self.name,
-            passed=self._reached is not None,
+        return self.conclude(
+            self._reached is not None,
+            reason,
             value=self._nearest if math.isfinite(self._nearest) else None,
             limit=settings.within,
-            unit=self.unit,
-            first_violation=None,
-            reason=reason,
-            fatal=self.fatal and self._late,
+            is_final=self._late,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -77,15 +77,8 @@ class ReachedRegion(Criterion):
             reason = f"{settings.of} did not reach the region{until}"
         else:
             reason = actor_never_present([settings.of])
-        return Verdict(
-            name=self.name,
-            passed=self._reached is not None,
-            value=self._reached,
-            limit=settings.by,
-            unit=self.unit,
-            first_violation=None,
-            reason=reason,
-            fatal=self.fatal and self._late and self._reached is None,
+        return self.conclude(
+            self._reached is not None, reason, value=self._reached, limit=settings.by, is_final=self._late
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -117,15 +117,13 @@ class RssViolation(Criterion):
             )
         else:
             reason = f"{of} needed no distance from any actor"
-        return Verdict(
-            name=self.name,
-            passed=passed,
+        return self.conclude(
+            passed,
+            reason,
             value=share,
             limit=self._settings.share,
-            unit="",
             first_violation=self._first if not passed else None,
-            reason=reason,
-            fatal=self.fatal and self._first is not None and self._settings.share == 0.0,
+            is_final=self._first is not None and self._settings.share == 0.0,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -46,6 +46,7 @@ class RunningStopSign(StopLineCriterion):
         """End of the last sufficient stop by signal [s]."""
 
     def interrupt(self) -> None:
+        super().interrupt()
         self._since.clear()
         self._stopped.clear()
 

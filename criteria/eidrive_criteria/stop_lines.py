@@ -7,13 +7,13 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
+from eidrive_criteria.followed import FollowedCriterion
 from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import (
-    Continuity,
-    Criterion,
     CriterionSettings,
     Crossing,
     Frame,
+    Step,
     StopLineCrossings,
     Verdict,
     actor_never_present,
@@ -27,7 +27,7 @@ class StopLineSettings(CriterionSettings):
     part: Literal["front", "rear"] = "front"
 
 
-class StopLineCriterion(Criterion):
+class StopLineCriterion(FollowedCriterion):
     """Criterion that fails at the first illegal crossing of a stop line."""
 
     needs_roads = True
@@ -36,11 +36,8 @@ class StopLineCriterion(Criterion):
     """Description of an illegal crossing for reasons, before the id of the signal."""
 
     def __init__(self, settings: StopLineSettings) -> None:
-        super().__init__(settings)
-        self.of, self.part = settings.of, settings.part
-        self.subjects = (settings.of,)
-        self._was_present = False
-        self._continuity = Continuity()
+        super().__init__(settings, settings.of)
+        self.part = settings.part
         self._before = (0.0, 0.0)
         """Crossing point in the previous frame."""
         self._passed = 0
@@ -60,18 +57,10 @@ class StopLineCriterion(Criterion):
         """Return whether a crossing was illegal. Each crossing is passed once."""
 
     def interrupt(self) -> None:
-        """Forget the approach, after an absence or a teleport."""
+        self.crossings.interrupt()
 
-    def observe(self, frame: Frame) -> None:
+    def follow(self, frame: Frame, row: int, step: Step | None) -> None:
         view = frame.view
-        row = view.rows.get(self.of)
-        step = self._continuity.step(view, row)
-        if step is None:
-            self.crossings.interrupt()
-            self.interrupt()
-        if row is None:
-            return
-        self._was_present = True
         x, y, _, length, _, _, yaw = view.plain_boxes[row]
         reach = length / 2.0 if self.part == "front" else -length / 2.0
         point = x + reach * math.cos(yaw), y + reach * math.sin(yaw)
@@ -85,7 +74,7 @@ class StopLineCriterion(Criterion):
 
     def verdict(self) -> Verdict:
         first = self._illegal[0] if self._illegal else None
-        if not self._was_present:
+        if not self.was_present:
             reason = actor_never_present([self.of])
         elif first is not None:
             reason = f"{self.of} {self.offense} {first.signal} at {first.time:.2f} s"
@@ -93,19 +82,16 @@ class StopLineCriterion(Criterion):
             reason = f"the map has no {'traffic light' if self.kind == 'light' else self.kind}"
         else:
             reason = f"{self.of} passed {self._passed} stop lines, all legally"
-        return Verdict(
-            name=self.name,
-            passed=self._was_present and first is None,
-            value=float(len(self._illegal)) if self._was_present else None,
+        return self.conclude(
+            self.was_present and first is None,
+            reason,
+            value=float(len(self._illegal)) if self.was_present else None,
             limit=0.0,
-            unit=self.unit,
             first_violation=first.time if first is not None else None,
-            reason=reason,
-            fatal=self.fatal and first is not None,
         )
 
     def metrics(self) -> Mapping[str, float]:
         """Return the numbers of passed stop lines and of illegal crossings."""
-        if not self._was_present:
+        if not self.was_present:
             return {}
         return {f"{self.name}.passed": float(self._passed), f"{self.name}.count": float(len(self._illegal))}

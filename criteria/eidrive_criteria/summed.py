@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from eidrive_criteria.followed import FollowedCriterion
 from eidrive_scenario.api.common import RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import (
-    Continuity,
-    Criterion,
     CriterionSettings,
     Frame,
     LaneTracker,
+    Step,
     Verdict,
     actor_never_present,
 )
@@ -27,7 +27,7 @@ class SummedSettings(CriterionSettings):
     at_most: Annotated[float, Field(ge=0)] = 0.0
 
 
-class SummedCriterion(Criterion):
+class SummedCriterion(FollowedCriterion):
     """Criterion that fails if a sum exceeds `at_most`; with `at_most` 0 a single frame in the state fails it."""
 
     needs_roads = True
@@ -35,15 +35,12 @@ class SummedCriterion(Criterion):
     """Predicate of the state in reasons, which follows the name of the actor."""
 
     def __init__(self, settings: SummedSettings) -> None:
-        super().__init__(settings)
-        self.of, self.at_most = settings.of, settings.at_most
-        self.subjects = (settings.of,)
+        super().__init__(settings, settings.of)
+        self.at_most = settings.at_most
         self._sum = 0.0
-        self._was_present = False
         self._first: float | None = None
         """First time in the state [s]."""
         self._violated: float | None = None
-        self._continuity = Continuity()
 
     def bind(self, roads: RoadNetwork | None) -> None:
         super().bind(roads)
@@ -58,45 +55,34 @@ class SummedCriterion(Criterion):
         """
 
     def interrupt(self) -> None:
-        """Forget the state of the previous frame, after an absence or a teleport."""
+        self.lanes.forget()
 
-    def observe(self, frame: Frame) -> None:
-        view = frame.view
-        row = view.rows.get(self.of)
-        step = self._continuity.step(view, row)
-        if step is None:
-            self.lanes.forget()
-            self.interrupt()
-        if row is None:
-            return
-        self._was_present = True
-        added = self.increment(view, row, *(step or (0.0, 0.0)))
+    def follow(self, frame: Frame, row: int, step: Step | None) -> None:
+        time = frame.view.time
+        added = self.increment(frame.view, row, *(step or (0.0, 0.0)))
         if added is None:
             return
-        self._first = view.time if self._first is None else self._first
+        self._first = time if self._first is None else self._first
         self._sum += added
         if self._violated is None and (self._sum > self.at_most or self.at_most == 0.0):
-            self._violated = view.time
+            self._violated = time
 
     def verdict(self) -> Verdict:
-        if not self._was_present:
+        if not self.was_present:
             reason = actor_never_present([self.of])
         elif self._first is None:
             reason = f"{self.of} never {self.state}"
         else:
             amount = f"{self._sum:.2f} {self.unit}" if self.unit else f"{self._sum:.0f} times"
             reason = f"{self.of} {self.state}: {amount}, first at {self._first:.2f} s"
-        return Verdict(
-            name=self.name,
-            passed=self._was_present and self._violated is None,
-            value=self._sum if self._was_present else None,
+        return self.conclude(
+            self.was_present and self._violated is None,
+            reason,
+            value=self._sum if self.was_present else None,
             limit=self.at_most,
-            unit=self.unit,
             first_violation=self._violated,
-            reason=reason,
-            fatal=self.fatal and self._violated is not None,
         )
 
     def metrics(self) -> Mapping[str, float]:
         """Return the sum."""
-        return {f"{self.name}.{self.of}": self._sum} if self._was_present else {}
+        return {f"{self.name}.{self.of}": self._sum} if self.was_present else {}

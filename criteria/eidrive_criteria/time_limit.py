@@ -39,13 +39,10 @@ class TimeLimit(Criterion):
     def verdict(self) -> Verdict:
         passed = self._violated is None
         verb = "lasted" if passed else "had not ended by itself after"
-        return Verdict(
-            name=self.name,
-            passed=passed,
+        return self.conclude(
+            passed,
+            f"the run {verb} {self._time:.2f} s",
             value=self._time,
             limit=self._within,
-            unit=self.unit,
             first_violation=self._violated,
-            reason=f"the run {verb} {self._time:.2f} s",
-            fatal=self.fatal and not passed,
         )

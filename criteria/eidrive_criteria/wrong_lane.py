@@ -6,6 +6,7 @@ import math
 
 from eidrive_criteria.summed import SummedCriterion, SummedSettings
 from eidrive_scenario.api.common import WorldView
+from eidrive_scenario.api.criteria import LaneTracker
 
 AGAINST = math.cos(math.radians(120.0))
 """Cosine of the angle between an actor and its lane from which on the lane is the wrong one."""
@@ -30,11 +31,16 @@ class WrongLane(SummedCriterion):
     state = "drove against the direction of its lane"
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
-        place = self.lanes.center(view, row)
-        if place is None or distance < STILL or self.lanes.roads.road(place.road).junction_id is not None:
-            return None
-        lane = self.lanes.lane(place)
-        if not lane.drivable or lane.type == "bidirectional" or lane.direction == "both":
-            return None
-        turn = math.cos(view.states[row].yaw - self.lanes.roads.pose(place).h)
-        return distance if turn < AGAINST else None
+        against = drives_against_lane(self.lanes, view, row)
+        return distance if against and distance >= STILL else None
+
+
+def drives_against_lane(lanes: LaneTracker, view: WorldView, row: int) -> bool:
+    """Return whether an actor is in a lane of the opposite direction, outside junctions and lanes for both."""
+    place = lanes.center(view, row)
+    if place is None or lanes.roads.road(place.road).junction_id is not None:
+        return False
+    lane = lanes.lane(place)
+    if not lane.drivable or lane.type == "bidirectional" or lane.direction == "both":
+        return False
+    return math.cos(view.states[row].yaw - lanes.roads.pose(place).h) < AGAINST

@@ -16,6 +16,7 @@ from eidrive_scenario.evaluation.fault import Impact, judge_impact
 from eidrive_scenario.evaluation.known_actors import Source, known_actors
 from eidrive_scenario.evaluation.lane_tracking import SIDEWALKS, LaneTracker, corners
 from eidrive_scenario.evaluation.lines_of_sight import LinesOfSight
+from eidrive_scenario.evaluation.route_progress import Place, RouteProgress, route_through
 from eidrive_scenario.evaluation.safe_distance import SafeDistanceModel
 from eidrive_scenario.evaluation.stop_line_crossings import Crossing, StopLineCrossings, along, beside
 from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
@@ -37,8 +38,10 @@ __all__ = [
     "LaneTracker",
     "LinesOfSight",
     "LinkStatistics",
+    "Place",
     "ReceptionLog",
     "Relation",
+    "RouteProgress",
     "SafeDistanceModel",
     "Source",
     "Step",
@@ -53,5 +56,6 @@ __all__ = [
     "judge_impact",
     "known_actors",
     "lamp_colors",
+    "route_through",
     "shows_red",
 ]

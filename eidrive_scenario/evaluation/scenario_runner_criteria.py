@@ -27,17 +27,21 @@ CLASSES: Mapping[str, Translation] = {
     "CollisionTest": Translation("collision"),
     "DrivenDistanceTest": Translation("driven_distance", arguments={"distance": "at_least"}),
     "EndofRoadTest": Translation("end_of_road", arguments={"duration": "at_most"}),
+    "InRouteTest": Translation("in_route", arguments={"offroad_max": "at_most", "offroad_min": "beyond"}),
     "KeepLaneTest": Translation("keep_lane"),
     "MaxVelocityTest": Translation("max_speed", arguments={"max_velocity": "at_most"}),
     "OffRoadTest": Translation("off_road", arguments={"duration": "at_most"}),
     "OnSidewalkTest": Translation("on_sidewalk", arguments={"duration": "at_most"}),
+    "OutsideRouteLanesTest": Translation("outside_route_lanes"),
+    "RouteCompletionTest": Translation("route_completion", fixed={"within": 10.0}),
     "RunningRedLightTest": Translation("running_red_light", fixed={"part": "rear"}),
     "RunningStopTest": Translation("running_stop_sign"),
     "WrongLaneTest": Translation("wrong_lane"),
+    "YieldToEmergencyVehicleTest": Translation("yield_to_emergency_vehicle", arguments={"ev": "to"}),
 }
 """Criteria by class of ScenarioRunner; SI units on both sides."""
 
-REQUIRED = ("DrivenDistanceTest", "MaxVelocityTest", "AverageVelocityTest")
+REQUIRED = ("DrivenDistanceTest", "MaxVelocityTest", "AverageVelocityTest", "YieldToEmergencyVehicleTest")
 """Classes that require a value; an empty one is an error."""
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.storyboard.state.states import StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent
@@ -24,6 +25,7 @@ class Frame(msgspec.Struct, frozen=True):
     appearances  lights, animations and visibility of the actors that differ from the default
     environment  time of day, weather and road condition; None until the scenario sets an environment
     monitors     values of the scenario's monitors by name
+    routes       points (M, 3) of the routes that the scenario requested in this tick, by actor [m]
     """
 
     view: WorldView
@@ -34,3 +36,4 @@ class Frame(msgspec.Struct, frozen=True):
     appearances: Mapping[str, Appearance] = msgspec.field(default_factory=dict)
     environment: Environment | None = None
     monitors: Mapping[str, bool] = msgspec.field(default_factory=dict)
+    routes: Mapping[str, Array] = msgspec.field(default_factory=dict)

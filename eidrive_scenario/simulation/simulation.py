@@ -167,7 +167,7 @@ class Simulation:
         signals, appearances, monitors = commands.signals, commands.appearances, commands.monitors
         environment = self._environment = commands.environment or self._environment
         changes = self.storyboard.changes
-        frame = Frame(view, steps, changes, self._links, signals, appearances, environment, monitors)
+        frame = Frame(view, steps, changes, self._links, signals, appearances, environment, monitors, commands.routes)
         self._observe(frame, commands.driven)
         end = end_reason(self._state, self.storyboard, view.time, self.settings.time_limit)
         if end is None:

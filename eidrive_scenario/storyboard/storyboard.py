@@ -17,6 +17,7 @@ from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.requested_routes import RequestedRoutes
 from eidrive_scenario.storyboard.kinematics.trailers import check_acyclic, declared_trailer, pairs, pose_behind
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
@@ -60,6 +61,7 @@ class Storyboard:
             self.context.actors, self.context, controllers or {}, registry("controllers")
         )
         self.context.warnings += unassigned_controller_warnings(self.context.actors, controllers or {})
+        self._routes = RequestedRoutes()
         self.ended: str | None = None
         """Reason for the end of the run by the storyboard; None while it continues."""
 
@@ -113,6 +115,7 @@ class Storyboard:
         commands = self.context.commands
         towed_pairs = self._add_trailers()
         self._update_spawns(commands)
+        commands.routes = self._routes.changes(self.context.actors)
         for controller_model in self._controller_models:
             if controller_model.actor.present and not controller_model.actor.driven:
                 controller_model.step()

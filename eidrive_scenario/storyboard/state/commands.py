@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.requests import Goal, Overrides
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -41,6 +42,7 @@ class Commands:
     environment  environment that was set in this tick, None without a change
     signals      state of every traffic signal, by id
     monitors     values of all monitors
+    routes       points (M, 3) of the routes that were requested in this tick, by actor [m]
     appearances  appearances of the actors that differ from the default
     """
 
@@ -55,4 +57,5 @@ class Commands:
     environment: Environment | None = None
     signals: Mapping[str, str] = field(default_factory=dict)
     monitors: Mapping[str, bool] = field(default_factory=dict)
+    routes: Mapping[str, Array] = field(default_factory=dict)
     appearances: Mapping[str, Appearance] = field(default_factory=dict)

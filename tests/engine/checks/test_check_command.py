@@ -48,13 +48,13 @@ def test_check_folder_reports_errors_of_all_files(eidrive: Eidrive, folder: Call
 
 def test_check_unsupported_criterion_is_a_warning(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
     condition = (
-        '<Condition name="criteria_InRouteTest" delay="0" conditionEdge="rising"><ByValueCondition>'
+        '<Condition name="criteria_ReachedRegionTest" delay="0" conditionEdge="rising"><ByValueCondition>'
         '<ParameterCondition parameterRef="" value="" rule="lessThan"/></ByValueCondition></Condition>'
     )
     place = folder(runner=("<ConditionGroup>", f"<ConditionGroup>{condition}"))
     result = eidrive("check", place / "runner.xosc")
     assert result.exit_code == 0, result.output
-    assert "criterion 'InRouteTest' is not evaluated" in result.stdout
+    assert "criterion 'ReachedRegionTest' is not evaluated" in result.stdout
     assert result.stdout.splitlines()[-1] == "1 file, 0 errors, 1 warning"
 
 

@@ -234,7 +234,7 @@ def test_stop_trigger_criteria_translates_supported_conditions() -> None:
         ("criteria_AverageVelocityTest", "velocity", "5"),
         ("criteria_ActorBlockedTest", "max_time", "60"),
         ("criteria_ActorBlockedTest", "min_speed", "0.5"),
-        ("criteria_RouteCompletionTest", "", ""),
+        ("criteria_ReachedRegionTest", "", ""),
         ("criteria_KeepLaneTest", "", ""),
     )
     criteria = stop_trigger_criteria(scenario)
@@ -244,7 +244,7 @@ def test_stop_trigger_criteria_translates_supported_conditions() -> None:
     assert [criterion.verdict().limit for criterion in criteria] == [0.0, 100.0, 13.5, 5.0, 60.0, 180.0]
     assert {criterion.subjects for criterion in criteria} == {("Ego",)}
     unknown, without_roads = unsupported_criteria(scenario)
-    assert unknown.message == "criterion 'RouteCompletionTest' is not evaluated"
+    assert unknown.message == "criterion 'ReachedRegionTest' is not evaluated"
     assert unknown.line is not None
     assert without_roads.message == "criterion 'KeepLaneTest' is not evaluated"
     assert without_roads.hint == "it requires roads, and the scenario has none"
@@ -261,6 +261,21 @@ def test_stop_trigger_criteria_on_lanes_and_signals_are_evaluated_with_roads() -
     with Simulation(scenario) as simulation:
         result = simulation.run()
     assert len(result.criteria) >= len(names)
+
+
+def test_stop_trigger_criteria_on_routes_and_emergency_vehicles() -> None:
+    scenario = written_for_scenario_runner(
+        ("criteria_InRouteTest", "offroad_max", "20"),
+        ("criteria_InRouteTest", "", ""),
+        ("criteria_RouteCompletionTest", "", ""),
+        ("criteria_OutsideRouteLanesTest", "", ""),
+        ("criteria_YieldToEmergencyVehicleTest", "ev", "Ambulance"),
+        road=ROAD,
+    )
+    assert unsupported_criteria(scenario) == []
+    near, usual, completion, lanes, emergency = stop_trigger_criteria(scenario)
+    assert [near.verdict().limit, usual.verdict().limit, completion.verdict().limit] == [20.0, 30.0, 0.99]
+    assert (lanes.name, emergency.subjects) == ("outside_route_lanes", ("Ego", "Ambulance"))
 
 
 def test_stop_trigger_criterion_with_a_duration_has_it_as_limit() -> None:

@@ -67,6 +67,13 @@ CRITERIA: Mapping[str, Mapping[str, Any]] = {
         "within": 3.0,
         "min_confidence": 0.3,
     },
+    "in_route": {
+        "of": "Ego",
+        "route": [[0.0, 0.0], [50.0, 0.0]],
+        "at_most": 20.0,
+        "beyond": 10.0,
+        "share": 0.2,
+    },
     "keep_lane": {"of": "Ego", "at_most": 1.0},
     "latency": {"sender": "B", "receiver": "Ego", "measure": "max", "at_most": 0.5},
     "max_speed": {"of": "Ego", "at_most": 10.0},
@@ -74,6 +81,7 @@ CRITERIA: Mapping[str, Mapping[str, Any]] = {
     "min_speed": {"of": "Ego", "at_least": 2.0, "after": 3.0},
     "off_road": {"of": "Ego", "at_most": 1.0},
     "on_sidewalk": {"of": "Ego", "at_most": 1.0},
+    "outside_route_lanes": {"of": "Ego", "at_most": 0.1, "margin": 1.0, "wrong_lanes": False},
     "packet_reception_ratio": {"sender": "B", "receiver": "Ego", "at_least": 0.9},
     "position_error": {
         "of": "Ego",
@@ -87,6 +95,12 @@ CRITERIA: Mapping[str, Mapping[str, Any]] = {
     "post_encroachment_time": {"of": "Ego", "to": "B", "at_least": 1.5},
     "reach_position": {"of": "Ego", "x": 1.0, "y": 2.0, "within": 3.0, "by": 10.0},
     "reached_region": {"of": "Ego", "region": [[0.0, -2.0], [10.0, 2.0]], "by": 10.0},
+    "route_completion": {
+        "of": "Ego",
+        "route": [[0.0, 0.0], [50.0, 0.0]],
+        "at_least": 0.5,
+        "within": 5.0,
+    },
     "rss_violation": {
         "of": "Ego",
         "to": "B",
@@ -105,5 +119,6 @@ CRITERIA: Mapping[str, Mapping[str, Any]] = {
     "time_limit": {"within": 10.0},
     "time_to_collision": {"of": "Ego", "to": "B", "at_least": 1.5},
     "wrong_lane": {"of": "Ego", "at_most": 1.0},
+    "yield_to_emergency_vehicle": {"of": "Ego", "to": "B", "within": 40.0, "at_most": 15.0},
 }
 """Settings of criteria that are right."""

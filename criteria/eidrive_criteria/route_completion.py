@@ -1,0 +1,75 @@
+"""Criterion: completed share of the route of an actor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from eidrive_criteria.routed import RouteCriterion, RouteSettings
+from eidrive_scenario.api.common import EPSILON
+from eidrive_scenario.api.criteria import Place, Verdict
+
+
+class RouteCompletionSettings(RouteSettings):
+    """Settings: `{of: Ego, at_least: 0.99}`; `{of: Ego, within: 10}` requires in addition that only 10 m are left."""
+
+    at_least: Annotated[float, Field(ge=0, le=1)] = 0.99
+    within: Annotated[float, Field(gt=0)] | None = None
+
+
+class RouteCompletion(RouteCriterion):
+    """Criterion that fails if the actor completes less than a share `at_least` of its route.
+
+    The completed distance is that of the farthest place on the route; a teleport completes nothing.
+    """
+
+    settings_type = RouteCompletionSettings
+    name = "route_completion"
+
+    def __init__(self, settings: RouteCompletionSettings) -> None:
+        super().__init__(settings)
+        self._settings = settings
+        self._completed, self._last = 0.0, 0.0
+        """Completed distance, and the farthest place since the last teleport [m]."""
+        self._started = False
+
+    def begin(self) -> None:
+        self._completed, self._started = 0.0, False
+
+    def locate(self, time: float, place: Place, driven: float | None) -> None:
+        if not self._started:
+            self._completed = self._last = place.along
+            self._started = True
+        elif driven is None:
+            self._last = place.along
+        elif place.along > self._last:
+            self._completed += place.along - self._last
+            self._last = place.along
+
+    def _share(self) -> float | None:
+        if self.route is None or not self._started:
+            return None
+        return min(self._completed / self.route.length, 1.0) if self.route.length > 0.0 else 1.0
+
+    def verdict(self) -> Verdict:
+        settings, value = self._settings, self._share()
+        if value is None or self.route is None:
+            return self.conclude(False, self.nothing(), limit=settings.at_least)
+        left = self.route.length * (1.0 - value)
+        arrived = settings.within is None or left <= settings.within + EPSILON
+        completed = f"{self.of} completed {100 * value:.1f} % of its route of {self.route.length:.1f} m"
+        return self.conclude(
+            value >= settings.at_least - EPSILON and arrived,
+            f"{completed}, {left:.1f} m were left",
+            value=value,
+            limit=settings.at_least,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the completed share and the length of the route [m]."""
+        value = self._share()
+        if value is None or self.route is None:
+            return {}
+        return {f"{self.name}.{self.of}": value, f"{self.name}.{self.of}.length": self.route.length}

@@ -1,0 +1,105 @@
+"""Criterion: giving way to an emergency vehicle from behind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from eidrive_scenario.api.common import TIME_TOLERANCE, RoadNetwork
+from eidrive_scenario.api.criteria import (
+    Criterion,
+    CriterionSettings,
+    Frame,
+    Surroundings,
+    Verdict,
+    actor_never_present,
+)
+
+
+class YieldToEmergencyVehicleSettings(CriterionSettings):
+    """Settings: `{of: Ego, to: Ambulance, within: 50, at_most: 15}` with distance [m] and time [s].
+
+    within   gap from which on an emergency vehicle behind has to be let past [m]
+    at_most  maximum time until it is past [s]; None: until the end of the run
+    """
+
+    of: str
+    to: str
+    within: Annotated[float, Field(gt=0, le=200)] = 50.0
+    at_most: Annotated[float, Field(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _two_actors(self) -> Self:
+        if self.of == self.to:
+            raise ValueError(f"'of' and 'to' are equal (got {self.of!r}; expected two actors)")
+        return self
+
+
+class YieldToEmergencyVehicle(Criterion):
+    """Criterion that fails if an emergency vehicle that approaches from behind does not get past the actor.
+
+    It approaches when it drives in the direction of the actor, at most `within` behind it, in any lane. The approach
+    ends when its center is ahead of that of the actor, or when it is farther behind.
+    """
+
+    settings_type = YieldToEmergencyVehicleSettings
+    name = "yield_to_emergency_vehicle"
+    unit = "s"
+
+    def __init__(self, settings: YieldToEmergencyVehicleSettings) -> None:
+        super().__init__(settings)
+        self._settings = settings
+        self.subjects = (settings.of, settings.to)
+        self._missing = set(self.subjects)
+        self._surroundings = Surroundings(None)
+        self._since: float | None = None
+        """Start of the present approach [s]; None without one."""
+        self._longest: float | None = None
+        """Longest time from the start of an approach until the emergency vehicle was past, or until now [s]."""
+        self._violated: float | None = None
+
+    def bind(self, roads: RoadNetwork | None) -> None:
+        super().bind(roads)
+        self._surroundings = Surroundings(roads)
+
+    def observe(self, frame: Frame) -> None:
+        view, settings = frame.view, self._settings
+        if self._missing:
+            self._missing.difference_update(view.names)
+        found = next(self._surroundings.relations(view, settings.of, (settings.to,)), None)
+        if self._since is None:
+            approaches = found is not None and found.ahead <= 0.0 < found.other_speed and found.gap <= settings.within
+            self._since = view.time if approaches else None
+        if self._since is None:
+            return
+        waited = view.time - self._since
+        self._longest = waited if self._longest is None else max(self._longest, waited)
+        if self._violated is None and settings.at_most is not None and waited > settings.at_most + TIME_TOLERANCE:
+            self._violated = view.time
+        if found is None or found.ahead > 0.0 or found.gap > settings.within:
+            self._since = None
+
+    def verdict(self) -> Verdict:
+        settings = self._settings
+        of, to = settings.of, settings.to
+        if self._missing:
+            reason = actor_never_present(self._missing)
+        elif self._longest is None:
+            reason = f"{to} never approached {of} from behind within {settings.within:g} m"
+        elif self._since is not None:
+            reason = f"{to} was still behind {of}, {self._longest:.2f} s after it had approached"
+        else:
+            reason = f"{to} was past {of} {self._longest:.2f} s after it had approached"
+        return self.conclude(
+            not self._missing and self._since is None and self._violated is None,
+            reason,
+            value=self._longest,
+            limit=settings.at_most,
+            first_violation=self._violated,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the longest time until the emergency vehicle was past [s]; empty without an approach."""
+        return {} if self._longest is None else {f"{self.name}.{self._settings.of}": self._longest}

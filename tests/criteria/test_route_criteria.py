@@ -1,0 +1,219 @@
+"""Criteria on routes: distance from the route, completed share, lanes, giving way to an emergency vehicle."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from criteria_scenario import write_scenario
+from eidrive_criteria.in_route import InRoute, InRouteSettings
+from eidrive_criteria.outside_route_lanes import OutsideRouteLanes, OutsideRouteLanesSettings
+from eidrive_criteria.route_completion import RouteCompletion, RouteCompletionSettings
+from eidrive_criteria.yield_to_emergency_vehicle import YieldToEmergencyVehicle, YieldToEmergencyVehicleSettings
+from msgspec.structs import replace
+from pydantic import ValidationError
+
+from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
+from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.simulation import RunSettings, run_file
+
+STRAIGHT = [(0.0, 0.0), (100.0, 0.0)]
+Point = tuple[float, float]
+
+
+def judge(criterion: Criterion, frames: list[Any], roads: Any = None) -> Verdict:
+    (verdict,) = evaluate_criteria(frames, [criterion], roads)
+    return verdict
+
+
+def in_route(frames: list[Any], **settings: Any) -> Verdict:
+    return judge(InRoute(InRouteSettings(of="Ego", **settings)), frames)
+
+
+def completion(frames: list[Any], **settings: Any) -> Verdict:
+    return judge(RouteCompletion(RouteCompletionSettings(of="Ego", **settings)), frames)
+
+
+def outside(frames: list[Any], roads: Any, **settings: Any) -> Verdict:
+    return judge(OutsideRouteLanes(OutsideRouteLanesSettings(of="Ego", **settings)), frames, roads)
+
+
+def yields(frames: list[Any], **settings: Any) -> Verdict:
+    return judge(YieldToEmergencyVehicle(YieldToEmergencyVehicleSettings(of="Ego", to="EV", **settings)), frames)
+
+
+def drive(frame: Any, car: Any, *points: Point, speed: float = 30.0) -> list[Any]:
+    """Return one frame per second with the Ego at these points."""
+    return [frame(float(second), {"Ego": car(x, y, speed=speed)}) for second, (x, y) in enumerate(points)]
+
+
+def test_distance_from_the_route(frame: Any, car: Any) -> None:
+    frames = drive(frame, car, (0, 0), (20, 8), (40, 12), (60, 0))
+    verdict = in_route(frames, route=STRAIGHT)
+    assert (verdict.passed, verdict.value) == (True, 12.0)
+    verdict = in_route(frames, route=STRAIGHT, at_most=10, fatal=True)
+    assert (verdict.passed, verdict.value, verdict.first_violation, verdict.fatal) == (False, 12.0, 2.0, True)
+
+
+def test_long_departure_fails(frame: Any, car: Any) -> None:
+    """From (20, 20) to (60, 20) the Ego drives 40 m at 20 m from a route of 100 m, after 28.3 m to get there."""
+    frames = drive(frame, car, (0, 0), (20, 20), (40, 20), (60, 20), (80, 0))
+    assert in_route(frames, route=STRAIGHT, share=0.69).passed
+    verdict = in_route(frames, route=STRAIGHT, share=0.68)
+    assert (verdict.passed, verdict.first_violation) == (False, 3.0)
+    assert in_route(frames, route=STRAIGHT, beyond=20, share=0).passed
+
+
+def test_shortcut_is_a_departure(frame: Any, car: Any) -> None:
+    """The route goes 60 m to the left, 40 m ahead and back; the Ego drives straight ahead instead."""
+    route = [(0.0, 0.0), (0.0, 60.0), (40.0, 60.0), (40.0, 0.0)]
+    frames = drive(frame, car, (0, 0), (10, 0), (20, 0), (30, 0), (40, 0))
+    verdict = in_route(frames, route=route)
+    assert (verdict.passed, verdict.value) == (False, 40.0)
+    assert completion(frames, route=route).value == 0.0
+
+
+@pytest.mark.parametrize(("end", "share"), [(80.0, 0.8), (100.0, 1.0), (120.0, 1.0), (0.0, 0.0)])
+def test_completed_share(frame: Any, car: Any, end: float, share: float) -> None:
+    points = [(float(x), 1.0) for x in np.arange(0.0, end + 1.0, 20.0)]
+    verdict = completion(drive(frame, car, *points), route=STRAIGHT)
+    assert verdict.passed == (share == 1.0)
+    assert verdict.value == pytest.approx(share)
+
+
+def test_limits_of_completion(frame: Any, car: Any) -> None:
+    frames = drive(frame, car, *((float(x), 0.0) for x in range(0, 81, 20)))
+    assert completion(frames, route=STRAIGHT, at_least=0.8).passed
+    assert not completion(frames, route=STRAIGHT, at_least=0.81).passed
+    assert completion(frames, route=STRAIGHT, at_least=0.5, within=20).passed
+    assert not completion(frames, route=STRAIGHT, at_least=0.5, within=19).passed
+
+
+def test_route_there_and_back(frame: Any, car: Any) -> None:
+    route = [(0.0, 0.0), (60.0, 0.0), (0.0, 0.0)]
+    there = [(0.0, 0.0), (20.0, 0.0), (40.0, 0.0), (60.0, 0.0)]
+    assert completion(drive(frame, car, *there), route=route).value == pytest.approx(0.5)
+    back = drive(frame, car, *there, *reversed(there[:-1]))
+    assert completion(back, route=route).value == pytest.approx(1.0)
+
+
+def test_teleport_and_backward_motion_complete_nothing(frame: Any, car: Any) -> None:
+    """20 m, 10 m back, 10 m again, a teleport of 200 m, then 20 m more, of 400 m."""
+    frames = drive(frame, car, (0, 0), (20, 0), (10, 0), (20, 0), (220, 0), (240, 0))
+    assert completion(frames, route=[(0, 0), (400, 0)]).value == pytest.approx(0.1)
+
+
+def test_last_requested_route_counts(frame: Any, car: Any) -> None:
+    """The second route, of 40 m, starts at 20 m; the Ego completes half of it."""
+    frames = drive(frame, car, (0, 0), (20, 0), (40, 0))
+    assert "no route was requested" in completion(frames).reason
+    first, second = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]]), np.array([[20.0, 0.0, 0.0], [60.0, 0.0, 0.0]])
+    frames = [
+        replace(frames[0], routes={"Ego": first, "Other": second}),
+        replace(frames[1], routes={"Ego": second}),
+        frames[2],
+    ]
+    assert completion(frames).value == pytest.approx(0.5)
+    assert completion(frames[:2]).value == 0.0
+    assert in_route(frames).value == 0.0
+
+
+@pytest.mark.parametrize("route", [[(5.0, 5.0), (5.0, 5.0)], [(0.0, 0.0), (1e-9, 0.0)]])
+def test_route_without_length(frame: Any, car: Any, route: list[Point]) -> None:
+    frames = drive(frame, car, (0, 0), (10, 0))
+    assert completion(frames, route=route).value == 1.0
+    assert in_route(frames, route=route).value is not None
+
+
+def test_route_over_lanes(frame: Any, car: Any, roads: Any) -> None:
+    """Along the left lane of road 1 the direction is against x: there is no route from -60 to 0, which is straight.
+
+    On the right lane the route of 60 m passes through (-30, 0), although its ends are 1 m beside the center.
+    """
+    frames = drive(frame, car, (-60, 0), (-30, 0), (0, 0))
+    right = RouteCompletion(RouteCompletionSettings(of="Ego", route=((-60, -1), (0, -1))))
+    assert judge(right, frames, roads).value == pytest.approx(1.0)
+    criterion = InRoute(InRouteSettings(of="Ego", route=((-60, 3.5), (0, 3.5))))
+    assert judge(criterion, frames, roads).value == pytest.approx(3.5)
+
+
+def test_share_outside_the_lanes(frame: Any, car: Any, roads: Any) -> None:
+    """Parking lanes end at y = -5.25. The center is 0.45 m, then 0.75 m outside them."""
+    points = [(-60, 0), (-50, 0), (-40, -5.7), (-30, -6.0), (-20, 0)]
+    frames = drive(frame, car, *points)
+    steps = [np.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(points)]
+    verdict = outside(frames, roads)
+    assert verdict.value == pytest.approx(steps[2] / sum(steps))
+    assert (verdict.passed, verdict.first_violation) == (False, 3.0)
+    assert outside(frames, roads, margin=0.8).passed
+    assert outside(frames, roads, margin=0).value == pytest.approx((steps[1] + steps[2]) / sum(steps))
+    assert outside(frames, roads, at_most=0.3).passed
+
+
+def test_lane_of_the_opposite_direction_is_outside(frame: Any, car: Any, roads: Any) -> None:
+    frames = drive(frame, car, (-60, 0), (-40, 3.5), (-20, 3.5))
+    assert outside(frames, roads).value == pytest.approx(1.0)
+    verdict = outside(frames, roads, wrong_lanes=False)
+    assert (verdict.passed, verdict.value) == (True, 0.0)
+    stands = drive(frame, car, (-40, 3.5), (-40, 3.5), speed=0.0)
+    assert outside(stands, roads).value == 0.0
+
+
+def chase(frame: Any, car: Any, until: int, ego: float = 10.0) -> list[Any]:
+    """Return one frame per second: an emergency vehicle at 20 m/s in the left lane starts 60 m behind the Ego."""
+    return [
+        frame(float(t), {"Ego": car(ego * t, speed=ego), "EV": car(20.0 * t - 60.0, 3.5, speed=20.0)})
+        for t in range(until + 1)
+    ]
+
+
+def test_time_until_the_emergency_vehicle_is_past(frame: Any, car: Any) -> None:
+    """The gap is 56 m - 10 m/s t: 46 m after 1 s. After 7 s the emergency vehicle is 10 m ahead."""
+    verdict = yields(chase(frame, car, 9))
+    assert (verdict.passed, verdict.value) == (True, 6.0)
+    verdict = yields(chase(frame, car, 9), at_most=5.5, fatal=True)
+    assert (verdict.passed, verdict.first_violation, verdict.fatal) == (False, 7.0, True)
+    assert yields(chase(frame, car, 9), within=30).value == 4.0
+
+
+def test_emergency_vehicle_that_stays_behind_fails(frame: Any, car: Any) -> None:
+    verdict = yields(chase(frame, car, 4))
+    assert (verdict.passed, verdict.value) == (False, 3.0)
+    assert "still behind" in verdict.reason
+    assert yields(chase(frame, car, 9, ego=30.0)).value is None, "it falls behind"
+    oncoming = [frame(float(t), {"Ego": car(10 * t, speed=10), "EV": car(90 - 20 * t, 3.5, np.pi, 20)}) for t in (0, 1)]
+    verdict = yields(oncoming)
+    assert (verdict.passed, verdict.value) == (True, None)
+
+
+def test_missing_actors_fail(frame: Any, car: Any, roads: Any) -> None:
+    others = [frame(0.0, {"Other": car(0)})]
+    for verdict in (in_route(others), completion(others), outside(others, roads), yields(others)):
+        assert (verdict.passed, verdict.value) == (False, None)
+        assert "never present" in verdict.reason
+    with pytest.raises(ValidationError, match="equal"):
+        YieldToEmergencyVehicleSettings(of="Ego", to="Ego")
+
+
+ROUTE = """<PrivateAction><RoutingAction><AcquirePositionAction><Position>
+<WorldPosition x="{x}" y="0"/></Position></AcquirePositionAction></RoutingAction></PrivateAction></Private>"""
+
+
+@pytest.mark.parametrize("drive", [None, "Ego"], ids=["scripted", "driven"])
+@pytest.mark.parametrize(("x", "passed"), [(-35.0, True), (-10.0, False)])
+def test_route_of_the_scenario(tmp_path: Path, drive: str | None, x: float, passed: bool) -> None:
+    """In 4 s the Ego drives 40 m from -70 m. The recording contains the route, so that it gives the same verdict."""
+    path = write_scenario(tmp_path, "route_completion: {of: Ego, at_least: 0.9}", {"Ego": (-70.0, 0.0, 0.0, 10.0)})
+    text = path.read_text(encoding="utf-8").replace(
+        "</PrivateAction></Private>", "</PrivateAction>" + ROUTE.format(x=x)
+    )
+    path.write_text(text, encoding="utf-8")
+    recorder = Recorder(tmp_path / "recording.mcap", metadata={})
+    (verdict,) = run_file(path, settings=RunSettings(drive=drive), observers=[recorder]).criteria
+    assert verdict.passed == passed
+    criterion = RouteCompletion(RouteCompletionSettings(of="Ego", at_least=0.9))
+    recorded = judge(criterion, list(read_recording(tmp_path / "recording.mcap").frames()))
+    assert recorded == verdict
