@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -47,6 +49,40 @@ def scenarios() -> list[str]:
         for path in root.rglob(f"*{SCENARIO_SUFFIX}")
         if definition(path) == "scenario"
     )
+
+
+@dataclass(frozen=True)
+class LibraryScenario:
+    """Scenario of the library: its name, the folder that contains it, and the description in its header on one line."""
+
+    name: str
+    family: str
+    description: str
+
+
+def describe_scenarios() -> list[LibraryScenario]:
+    """Return the scenarios of the library, sorted by name."""
+    root = library_path()
+    return [
+        LibraryScenario(name, name.rpartition("/")[0], _description(root / f"{name}{SCENARIO_SUFFIX}"))
+        for name in scenarios()
+    ]
+
+
+def _description(path: Path) -> str:
+    """Return the description in the FileHeader of a scenario without line breaks and control characters."""
+    found: list[str] = []
+
+    def visit(_: int, tag: str, attributes: Mapping[str, str]) -> bool:
+        if tag == "FileHeader":
+            found.append(attributes.get("description", ""))
+        return bool(found)
+
+    try:
+        first_elements(read_regular_file(path, _MAX_BYTES), _MAX_ELEMENTS, visit)
+    except (OSError, ValueError):  # a file without a header that is damaged further on
+        return ""
+    return "".join(letter for letter in " ".join("".join(found).split()) if letter.isprintable())
 
 
 def resolve_scenario(name: str | Path) -> Path:
@@ -154,7 +190,7 @@ def definition(path: Path) -> Definition:
     }
     found: list[Definition] = []
 
-    def visit(depth: int, tag: str) -> bool:
+    def visit(depth: int, tag: str, _: Mapping[str, str]) -> bool:
         if depth == 1 and tag != "OpenSCENARIO":
             found.append("roads" if tag == "OpenDRIVE" else "other")
         elif depth == 2 and tag in kinds:

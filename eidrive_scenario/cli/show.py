@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -38,7 +39,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     from eidrive_scenario.registry import registry
 
     if what is Names.scenarios:
-        lines = library.scenarios()
+        lines = _scenario_lines()
     elif what is Names.channels:
         lines = [*library.names("channels"), "none"]
     elif what is Names.weather:
@@ -48,20 +49,29 @@ def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")]
     elif what is Names.rules:
         from eidrive_scenario.checks.registry import ALL_RULES
 
-        width = max(len(rule.name) for rule in ALL_RULES)
-        lines = [f"{rule.name:<{width}}  {rule.level.value:<7}  {rule.summary}" for rule in ALL_RULES]
+        lines = _columns([(rule.name, rule.level.value, rule.summary) for rule in ALL_RULES])
     elif what is Names.criteria:
         from eidrive_scenario.evaluation.criteria_list import describe_criteria
 
-        rows = [(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()]
-        widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
-        lines = [f"{name:<{widths[0]}}  {unit:<{widths[1]}}  {text}" for name, unit, text in rows]
+        lines = _columns([(name, unit, f"{text} {settings}") for name, unit, settings, text in describe_criteria()])
     else:
         known = registry(what.value)
-        width = max(map(len, known), default=0)
-        lines = [f"{name:<{width}}  {known.value(name)}" for name in known]
+        lines = _columns([(name, known.value(name)) for name in known])
     for line in lines:
         typer.echo(line)
+
+
+def _scenario_lines() -> list[str]:
+    """Return one line per scenario: name, family and description."""
+    from eidrive_scenario.library import describe_scenarios
+
+    return _columns([(entry.name, entry.family, entry.description) for entry in describe_scenarios()])
+
+
+def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return rows of texts as lines with aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def _catalog_lines() -> list[str]:
@@ -74,11 +84,9 @@ def _catalog_lines() -> list[str]:
         kind = f"{entry.kind} {entry.category}".strip()
         size = " x ".join(f"{value:.2f}" for value in entry.size) + " m" if entry.size is not None else ""
         rows.append((entry.catalog, entry.name, kind, size, f"{entry.mass:g} kg" if entry.mass is not None else ""))
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     folder = f"{LIBRARY_FOLDER}/{CATALOGS}"
     return [
-        *lines,
+        *_columns(rows),
         f'From any folder: <VehicleCatalog><Directory path="{folder}"/></VehicleCatalog>',
         f"For other engines, copy {library_path() / CATALOGS} to {folder} beside the scenario.",
     ]

@@ -6,7 +6,7 @@ Messages never quote the content of a file that is not well-formed: it may be a 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn, cast
 from xml.parsers import expat
@@ -92,8 +92,8 @@ def parse_untrusted(
     return root
 
 
-def first_elements(content: bytes, max_elements: int, visit: Callable[[int, str], bool]) -> bool:
-    """Call `visit` with the depth (root: 1) and the name without prefix of each element until it returns True.
+def first_elements(content: bytes, max_elements: int, visit: Callable[[int, str, Mapping[str, str]], bool]) -> bool:
+    """Call `visit` with the depth (root: 1), name without prefix and attributes of each element until it returns True.
 
     Return True if it did within `max_elements`. No entity is expanded. Raise ValueError if the file is not XML up to
     that element.
@@ -102,11 +102,11 @@ def first_elements(content: bytes, max_elements: int, visit: Callable[[int, str]
     depth = count = 0
     found = False
 
-    def start(name: str, _: object) -> None:
+    def start(name: str, attributes: Mapping[str, str]) -> None:
         nonlocal depth, count, found
         depth += 1
         count += 1
-        found = visit(depth, name.rsplit(":", 1)[-1])
+        found = visit(depth, name.rsplit(":", 1)[-1], attributes)
         if found or count >= max_elements:
             raise _Done
 

@@ -29,6 +29,23 @@ def test_scenarios_without_catalogs(own_library: Path) -> None:
     assert library.scenarios() == ["coop/scenario_1", "coop/scenario_2"]
 
 
+def test_scenarios_are_described_by_their_header(own_library: Path) -> None:
+    header = '<FileHeader revMajor="1" revMinor="3" description="two\n  lines &amp; a bell&#9;"/>'
+    (own_library / "mine.xosc").write_text(f"<OpenSCENARIO>{header}<Storyboard/></OpenSCENARIO>")
+    (own_library / "coop" / "scenario_2.xosc").write_text("<OpenSCENARIO><Storyboard/><damaged></OpenSCENARIO>")
+    assert library.describe_scenarios() == [
+        library.LibraryScenario("coop/scenario_1", "coop", ""),
+        library.LibraryScenario("coop/scenario_2", "coop", ""),
+        library.LibraryScenario("mine", "", "two lines & a bell"),
+    ]
+
+
+def test_every_scenario_of_this_checkout_has_a_family_and_a_description() -> None:
+    entries = library.describe_scenarios()
+    assert len(entries) >= 20
+    assert all(entry.family == entry.name.split("/")[0] and entry.description for entry in entries)
+
+
 @pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_1.xosc"])
 def test_a_name_is_a_file_of_the_library(own_library: Path, name: str) -> None:
     assert library.resolve_scenario(name) == own_library / "coop" / "scenario_1.xosc"

@@ -1,6 +1,7 @@
 """Commands `eidrive list`, `tree`, `view`, `report` and `--help`."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -54,6 +55,13 @@ def test_list_prints_names_of_each_kind(eidrive: Eidrive, what: str, expected: s
 
 def test_list_has_every_group_of_extensions() -> None:
     assert set(GROUPS) <= {name.value for name in Names}
+
+
+def test_list_of_scenarios_shows_name_family_and_description(eidrive: Eidrive) -> None:
+    lines = eidrive("list", "scenarios").stdout.splitlines()
+    rows = {columns[0]: columns[1:] for columns in (re.split("  +", line) for line in lines)}
+    assert rows["coop/scenario_1"] == ["coop", "Coop. scenario 1: collision avoidance with a roadside unit"]
+    assert rows["ei/scenario_18"] == ["ei", "EI 18: jaywalking pedestrian"]
 
 
 def test_list_without_argument_prints_scenarios(eidrive: Eidrive) -> None:
