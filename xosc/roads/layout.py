@@ -207,6 +207,7 @@ class Way:
     """Connecting road from lanes of one arm to adjacent lanes of another, from the innermost.
 
     left  lanes on the left of lane 0
+    right lanes on the right of the others that continue no lane, such as painted ground
     curb  `corner`: a margin and a sidewalk on the right; `straight`: the outer lanes of the street continue there
     line  center line of the first lane, where it is not the usual course
     """
@@ -216,6 +217,7 @@ class Way:
     lanes: tuple[tuple[int, int], ...]
     turn: str
     left: tuple[LaneSpec, ...] = ()
+    right: tuple[LaneSpec, ...] = ()
     curb: Curb = ""
     line: tuple[curves.Curve, ...] | None = None
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from lxml import etree
 
+from xosc.roads.coop_crossings import COOP_CROSSINGS
 from xosc.roads.coop_sites import COOP_SITES
 from xosc.roads.courses import course
 from xosc.roads.ei_sites import EI_SITES
@@ -16,7 +17,7 @@ from xosc.roads.junctions_and_roads import JUNCTIONS_AND_ROADS
 from xosc.roads.layout import Arm, Junction, LaneSpec, Layout, Road, Way
 from xosc.roads.opendrive import Element, add, add_lane, add_line, add_mark, add_road, smooth_change, smooth_width, text
 
-LAYOUTS: tuple[Layout, ...] = (*COOP_SITES, *EI_SITES, *JUNCTIONS_AND_ROADS)
+LAYOUTS: tuple[Layout, ...] = (*COOP_SITES, *COOP_CROSSINGS, *EI_SITES, *JUNCTIONS_AND_ROADS)
 """All road networks of the library."""
 CORNER_MARGIN = 2.6
 """Width between the lane of a right turn and the curb in the middle of the turn [m]."""
@@ -146,6 +147,8 @@ def write_way(root: Element, number: str, way: Way, junction: Junction, layout: 
         lane = add_lane(right, -i, spec, length)
         add(lane[0], "predecessor", id=before)
         add(lane[0], "successor", id=after)
+    for i, spec in enumerate(way.right, start=len(specs) + 1):
+        add_lane(right, -i, spec)
     if way.curb == "corner":
         write_corner(right, way, length)
     elif way.curb == "straight":
