@@ -52,7 +52,7 @@ def crossing_behind_a_bend() -> Layout:
     near = Road.straight("1", "near", ARTERIAL, -80.0, 5.25, 0.0, 125.2, houses=CORNER_CLEARANCE)
     far = Road.straight("2", "far", ARTERIAL, 75.4, 5.25, 0.0, 60.0, houses=CORNER_CLEARANCE)
     left = Road("3", "left", (Section(0.0, ARTERIAL),), 61.35, 18.3, QUARTER, bend)
-    right = Road.straight("4", "right", ARTERIAL, 61.35, -129.8, QUARTER, 120.0, houses=CORNER_CLEARANCE)
+    right = Road.straight("4", "right", ARTERIAL, 61.35, -279.8, QUARTER, 270.0, houses=CORNER_CLEARANCE)
     arms = (
         Arm(near, "end", "light", LIGHT_LINE, crosswalk=True),
         Arm(far, "start", "light", LIGHT_LINE, crosswalk=True),
@@ -74,7 +74,7 @@ def one_way_crossing() -> Layout:
     near = Road.straight("1", "near", one_way(4), -80.0, 12.25, 0.0, 100.4, houses=CORNER_CLEARANCE)
     far = Road.straight("2", "far", one_way(4), 61.8, 12.25, 0.0, 60.0, houses=CORNER_CLEARANCE)
     left = Road.straight("3", "left", street, 43.1, 25.0, QUARTER, 100.0, houses=CORNER_CLEARANCE)
-    right = Road.straight("4", "right", wide, 43.1, -111.9, QUARTER, 100.0, houses=CORNER_CLEARANCE)
+    right = Road.straight("4", "right", wide, 43.1, -211.9, QUARTER, 200.0, houses=CORNER_CLEARANCE)
     from_near, to_far = Arm(near, "end", "light"), Arm(far, "start")
     at_left, at_right = Arm(left, "start", "light"), Arm(right, "end", "light")
     median = (LaneSpec("shoulder", MEDIAN.width),)
