@@ -37,3 +37,12 @@ def test_participants_increase_the_number_of_known_vehicles(number: int, partici
     assert passed(joined) == {"detection_count": True, "own_detection_count": True}
     assert joined.metrics["own_detection_count.Ego.mean"] == alone.metrics["own_detection_count.Ego.mean"]
     assert joined.metrics["detection_count.Ego.mean"] > alone.metrics["detection_count.Ego.mean"]
+
+
+@pytest.mark.parametrize(("number", "participants"), [(1, "rsu"), (2, "vehicle")])
+def test_participants_decide_on_the_collision_without_traffic(number: int, participants: str) -> None:
+    alone, joined = (play(f"coop/scenario_{number}", Participants=name) for name in ("none", participants))
+    assert not passed(alone)["collision"]
+    assert passed(joined)["collision"]
+    assert alone.metrics["messages.sent"] == 0
+    assert joined.metrics["messages.sent"] > 0

@@ -107,7 +107,7 @@ def test_station_that_does_not_move_is_reported_with_its_line(make: Make) -> Non
 
 
 def test_parked_station_and_mast_are_not_reported(make: Make) -> None:
-    planner = '<Property name="planner" value="conflict_area"/>'
+    planner = '<Property name="planner" value="$Planner"/>'
     path = make((planner, planner.replace("conflict_area", "none")))
     assert ours(run_file(path, settings=RunSettings(time_limit=3.0)).warnings) == []
 

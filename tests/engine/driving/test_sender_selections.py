@@ -19,7 +19,7 @@ RING = SELECTION.format("ring", '<EntityRef entityRef="ring"/>')
 
 
 def listening_to(folder: Path, senders: str, *selections: str) -> Path:
-    return edited(folder, ("[RSU]", senders), ("</Entities>", "".join(selections) + "</Entities>"))
+    return edited(folder, ("$Participants", senders), ("</Entities>", "".join(selections) + "</Entities>"))
 
 
 @pytest.mark.parametrize(
