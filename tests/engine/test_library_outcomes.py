@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
@@ -46,3 +48,28 @@ def test_participants_decide_on_the_collision_without_traffic(number: int, parti
     assert passed(joined)["collision"]
     assert alone.metrics["messages.sent"] == 0
     assert joined.metrics["messages.sent"] > 0
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("number", "other"), [(1, "First"), (2, "Lead")])
+def test_lane_follower_hits_the_slower_vehicle(number: int, other: str, seed: int) -> None:
+    result = play(f"pipeline/scenario_{number}", seed, Planner="route")
+    assert [name for name, success in passed(result).items() if success] == ["time_limit"]
+    assert f"Ego and {other} hit each other" in result.criteria[0].reason
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("number", "rule"), [(3, "running_red_light"), (4, "running_stop_sign")])
+def test_signal_criterion_depends_on_obedience_only(number: int, rule: str, seed: int) -> None:
+    obeying, ignoring = (play(f"pipeline/scenario_{number}", seed, ObeySignals=value) for value in ("true", "false"))
+    assert obeying.passed
+    assert [name for name, success in passed(ignoring).items() if not success] == [rule]
+
+
+def test_time_at_the_stop_line_is_that_of_the_original_distance() -> None:
+    """The line is 48.9 m ahead of the center in EI-Drive; 3.33 m/s is reached at 3 m/s². Sites deviate by 0.75 m."""
+    result = play("pipeline/scenario_3", ObeySignals="false", EgoOffset="0", EgoSpeedOffset="0")
+    at = re.search(r"at (\d+\.\d+) s", result.criteria[0].reason)
+    assert at is not None
+    expected = (48.9 - 4.892 / 2) / 3.3333 + 3.3333 / (2 * 3.0)
+    assert float(at[1]) == pytest.approx(expected, abs=0.75 / 3.3333 + 0.05)
