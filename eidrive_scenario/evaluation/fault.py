@@ -14,6 +14,9 @@ STOPPED = 0.05
 BEHIND = math.radians(150.0)
 """Angle at the reference point between the heading and the center of an actor beyond which that actor is behind."""
 
+CORNER = 0.1
+"""Maximum distance of a contact at a corner from both faces [m]."""
+
 Side = Literal["front", "rear", "left", "right"]
 
 
@@ -25,8 +28,11 @@ class Impact(NamedTuple):
     rule: str
 
 
-def side_of(body: Sequence[float], x: float, y: float) -> Side:
-    """Return the face of a body (7,) that is nearest to a point of contact."""
+def side_of(body: Sequence[float], x: float, y: float, other: Sequence[float] | None = None) -> Side:
+    """Return the face of a body (7,) that is nearest to a point of contact.
+
+    At a corner the axis along which the body overlaps the `other` body (7,) less decides, as two faces are near there.
+    """
     dx, dy = x - body[0], y - body[1]
     cos, sin = math.cos(body[6]), math.sin(body[6])
     ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
@@ -36,7 +42,23 @@ def side_of(body: Sequence[float], x: float, y: float) -> Side:
         "left": abs(body[4] / 2.0 - left),
         "right": abs(body[4] / 2.0 + left),
     }
+    end: Side = "front" if ahead >= 0.0 else "rear"
+    flank: Side = "left" if left >= 0.0 else "right"
+    if other is not None and max(distances[end], distances[flank]) < CORNER:
+        along, across = _overlaps(body, other)
+        return end if along < across else flank
     return min(distances, key=lambda side: distances[side])
+
+
+def _overlaps(body: Sequence[float], other: Sequence[float]) -> tuple[float, float]:
+    """Return the overlaps of two bodies along and across the first one [m]; negative for gaps."""
+    dx, dy = other[0] - body[0], other[1] - body[1]
+    cos, sin = math.cos(body[6]), math.sin(body[6])
+    turned = other[6] - body[6]
+    c, s = abs(math.cos(turned)), abs(math.sin(turned))
+    along = (body[3] + c * other[3] + s * other[4]) / 2.0 - abs(cos * dx + sin * dy)
+    across = (body[4] + s * other[3] + c * other[4]) / 2.0 - abs(cos * dy - sin * dx)
+    return along, across
 
 
 def judge_impact(
@@ -48,7 +70,8 @@ def judge_impact(
     lanes   lanes under the actor; None without roads: a lateral contact is then not its fault
     """
     row = view.rows[of]
-    side = side_of(view.plain_boxes[row], x, y)
+    partner = view.plain_boxes[view.rows[other]] if other in view.rows else None
+    side = side_of(view.plain_boxes[row], x, y, partner)
     if _speed(view, before, of) <= STOPPED:
         return Impact(side, False, "it had stopped")
     if other not in view.rows or _speed(view, before, other) <= STOPPED:
