@@ -29,7 +29,7 @@ class ResolvedSettings:
     channel          name of the initial profile; `custom` for one without a name, `none` for no cooperation
     channel_profile  its content with all defaults; None for no cooperation
     later_channels   profiles that events of the scenario select, in the order of the file
-    detector, cooperate   the options that override the scenario; None if the scenario applies
+    detector, planner, cooperate   the options that override the scenario; None if the scenario applies
     stations         settings of each station, by name: detector, its settings, cooperation, sensors and all others
     weather          name of the preset that overrides the scenario; None if the scenario applies
     weather_profile  its content
@@ -53,6 +53,7 @@ class ResolvedSettings:
     channel_profile: Mapping[str, Any] | None = None
     later_channels: tuple[Mapping[str, Any] | None, ...] = ()
     detector: str | None = None
+    planner: str | None = None
     cooperate: tuple[str, ...] | None = None
     stations: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     weather: str | None = None

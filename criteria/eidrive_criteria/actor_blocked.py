@@ -26,6 +26,7 @@ class ActorBlocked(Criterion):
     settings_type = ActorBlockedSettings
     name = "actor_blocked"
     unit = "s"
+    demands_progress = True
 
     def __init__(self, settings: ActorBlockedSettings) -> None:
         super().__init__(settings)

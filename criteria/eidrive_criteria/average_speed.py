@@ -29,6 +29,7 @@ class AverageSpeed(Criterion):
         super().__init__(settings)
         self._settings = settings
         self.subjects = (settings.of,)
+        self.demands_progress = bool(settings.at_least)
         self._distance = self._duration = 0.0
         self._only: float | None = None
         """Speed in the first frame [m/s]."""

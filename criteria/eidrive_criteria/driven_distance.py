@@ -31,6 +31,7 @@ class DrivenDistance(Criterion):
     settings_type = DrivenDistanceSettings
     name = "driven_distance"
     unit = "m"
+    demands_progress = True
 
     def __init__(self, settings: DrivenDistanceSettings) -> None:
         super().__init__(settings)

@@ -34,6 +34,7 @@ class MinSpeed(Criterion):
         super().__init__(settings)
         self._settings = settings
         self.subjects = (settings.of,)
+        self.demands_progress = bool(settings.at_least)
         self._was_present = False
         self._slowest = Extreme(settings.at_least, largest=False)
 

@@ -34,6 +34,7 @@ class ReachPosition(Criterion):
     settings_type = ReachPositionSettings
     name = "reach_position"
     unit = "m"
+    demands_progress = True
 
     def __init__(self, settings: ReachPositionSettings) -> None:
         super().__init__(settings)

@@ -49,6 +49,7 @@ class ReachedRegion(Criterion):
     settings_type = ReachedRegionSettings
     name = "reached_region"
     unit = "s"
+    demands_progress = True
 
     def __init__(self, settings: ReachedRegionSettings) -> None:
         super().__init__(settings)

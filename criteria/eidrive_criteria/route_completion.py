@@ -31,6 +31,7 @@ class RouteCompletion(RouteCriterion):
     def __init__(self, settings: RouteCompletionSettings) -> None:
         super().__init__(settings)
         self._settings = settings
+        self.demands_progress = settings.at_least > 0.0 or settings.within is not None
         self._completed, self._last = 0.0, 0.0
         """Completed distance, and the farthest place since the last teleport [m]."""
         self._started = False

@@ -13,6 +13,7 @@ from eidrive_scenario.checks.scenario_checks import scenario_diagnostics
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution, load_scenario
 from eidrive_scenario.openscenario.distributions import CartesianProduct, ListedValues
+from eidrive_scenario.simulation import RunSettings
 
 _MAX_VALUE_RUNS = 1000
 """Maximum number of runs that are read for the listed values; a distribution may list more."""
@@ -29,20 +30,22 @@ class DistributionCheckReport(CheckReport):
     runs: int = 0
 
 
-def check_distribution(path: Path, ignored: Collection[str] = ()) -> DistributionCheckReport:
+def check_distribution(
+    path: Path, ignored: Collection[str] = (), settings: RunSettings | None = None
+) -> DistributionCheckReport:
     """Check a distribution, its scenario, and the scenario with each value that the distribution lists.
 
     One run is read for each listed value, with the first values of all other parameters; also for the ends of each
     range and for the first draws. A run with a violated constraint is a warning, as it is skipped. Diagnostics of the
     rules that these and the spread runs have, but not the scenario itself, are reported with the number of a run.
-    Raise SettingError if `ignored` has an unknown name.
+    `settings` are those of the runs. Raise SettingError if `ignored` has an unknown name.
     """
     check_rule_names(ignored)
     try:
         expansion = load_distribution(path)
     except InputError as error:
         return DistributionCheckReport.collect((Level.ERROR, diagnostic) for diagnostic in error.diagnostics)
-    found = _DistributionDiagnostics(expansion, ignored)
+    found = _DistributionDiagnostics(expansion, ignored, settings)
     if not any(level is Level.ERROR for level, _ in found):
         found.read_runs()
     return DistributionCheckReport.collect(found, runs=len(expansion))
@@ -51,12 +54,14 @@ def check_distribution(path: Path, ignored: Collection[str] = ()) -> Distributio
 class _DistributionDiagnostics:
     """Diagnostics of a distribution: each rule once per element over all runs that are read."""
 
-    def __init__(self, expansion: DistributionExpansion, ignored: Collection[str]) -> None:
+    def __init__(
+        self, expansion: DistributionExpansion, ignored: Collection[str], settings: RunSettings | None
+    ) -> None:
         self._expansion = expansion
         self._ignored = ignored
         self._found: dict[tuple[Level, Diagnostic], None] = {}
         self._add(Level.WARNING, expansion.warnings)
-        self._found.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored)))
+        self._found.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored, settings)))
         self._known_rules = {_location(diagnostic) for _, diagnostic in self._found if diagnostic.rule}
         self._read: set[int] = set()
 

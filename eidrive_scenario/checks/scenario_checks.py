@@ -14,23 +14,26 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criteria_parser import unsupported_criteria
 from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.simulation import RunSettings, Simulation
 
 
-def check_scenario(source: Source, ignored: Collection[str] = ()) -> CheckReport:
+def check_scenario(source: Source, ignored: Collection[str] = (), settings: RunSettings | None = None) -> CheckReport:
     """Check a scenario with its roads, controllers, channels and criteria.
 
     source   any argument of `load_scenario`
     ignored  names of rules that are not evaluated
+    settings  of the run that is checked, with its driving stacks and criteria
 
     Commands of later events are included, although a run reaches them only later. Raise SettingError if `ignored` has
     an unknown name.
     """
     check_rule_names(ignored)
-    return CheckReport.collect(scenario_diagnostics(source, ignored))
+    return CheckReport.collect(scenario_diagnostics(source, ignored, settings))
 
 
-def scenario_diagnostics(source: Source, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Diagnostic]]:
+def scenario_diagnostics(
+    source: Source, ignored: Collection[str] = (), settings: RunSettings | None = None
+) -> Iterator[tuple[Level, Diagnostic]]:
     """Yield all diagnostics of a scenario, neither sorted nor limited in number."""
     try:
         scenario = load_scenario(source)
@@ -44,7 +47,9 @@ def scenario_diagnostics(source: Source, ignored: Collection[str] = ()) -> Itera
             errors.add(replace(diagnostic, rule=""))
         yield level, diagnostic
     try:
-        Simulation(scenario, load_weights=False).close()
+        simulation = Simulation(scenario, settings=settings, load_weights=False)
+        simulation.close()
+        yield from ((Level.WARNING, diagnostic) for diagnostic in simulation.progress_warnings)
         yield from ((Level.WARNING, diagnostic) for diagnostic in torchscript_warnings(scenario))
     except InputError as error:
         yield from (found for found in _errors(error) if found[1] not in errors)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from eidrive_scenario.cli.added_options import Criteria, Drive, Planner
 from eidrive_scenario.cli.error_output import print_error
 from eidrive_scenario.cli.hung_check import HungCheck
 from eidrive_scenario.cli.option_values import check_seconds
@@ -21,6 +22,7 @@ from eidrive_scenario.wall_limit import LimitReached, limit_wall_time
 
 if TYPE_CHECKING:
     from eidrive_scenario.checks.report import CheckReport
+    from eidrive_scenario.simulation import RunSettings
 
 
 def check(
@@ -30,6 +32,9 @@ def check(
     ignore: Annotated[
         list[str] | None, typer.Option(metavar="RULE", help="Rule to ignore; repeatable.", show_default="none")
     ] = None,
+    drive: Drive = None,
+    planner: Planner = None,
+    criterion: Criteria = None,
     wall_limit: Annotated[
         float | None,
         typer.Option(metavar="SECONDS", help="Maximum wall time of each file.", show_default="none"),
@@ -40,7 +45,10 @@ def check(
     A diagnostic of a rule ends with the name of the rule; `eidrive list rules` lists all rules.
     """
     from eidrive_scenario.checks.distribution_checks import DistributionCheckReport
+    from eidrive_scenario.simulation import RunSettings
+    from eidrive_scenario.simulation.added_settings import parse_drive
 
+    settings = RunSettings(drive=parse_drive("--drive", drive or []), planner=planner, criteria=criterion)
     hung = HungCheck()
     if wall_limit is not None:
         check_seconds("--wall-limit", wall_limit)
@@ -54,7 +62,7 @@ def check(
     for path in files:
         hung.file = path
         try:
-            report = _check_file(path, ignored, wall_limit)
+            report = _check_file(path, ignored, settings, wall_limit)
         except InputError:
             raise
         except (Exception, SystemExit) as error:
@@ -77,8 +85,11 @@ def check(
     raise typer.Exit(INVALID_INPUT if printed["error"] or (strict and printed["warning"]) else 0)
 
 
-def _check_file(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> CheckReport:
-    """Return the diagnostics of a file of any kind. Raise WallLimitError if the limit [s] is exceeded."""
+def _check_file(path: Path, ignored: tuple[str, ...], settings: RunSettings, wall_limit: float | None) -> CheckReport:
+    """Return the diagnostics of a file of any kind. Raise WallLimitError if the limit [s] is exceeded.
+
+    settings  of the runs of scenarios: driving stacks, planner and criteria
+    """
     from eidrive_scenario.checks.catalog_checks import check_catalog
     from eidrive_scenario.checks.distribution_checks import check_distribution
     from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
@@ -91,7 +102,7 @@ def _check_file(path: Path, ignored: tuple[str, ...], wall_limit: float | None) 
                 return check_catalog(path, ignored)
             if kind == "roads" or path.suffix == ROADS_SUFFIX:
                 return check_road_file(path, ignored)
-            return (check_distribution if kind == "distribution" else check_scenario)(path, ignored)
+            return (check_distribution if kind == "distribution" else check_scenario)(path, ignored, settings)
         except LimitReached as error:
             report_extension(error)  # raises an error that names a running extension
             raise

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from eidrive_scenario.cli.added_options import Criteria, Drive, Planner
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
@@ -36,6 +37,7 @@ def run(
         ),
     ] = None,
     detector: Annotated[str | None, typer.Option(help="Detector of all stations.", show_default="the file's")] = None,
+    planner: Planner = None,
     weather: Annotated[
         str | None, typer.Option(help="Weather preset: name or file.", show_default="the file's")
     ] = None,
@@ -53,19 +55,8 @@ def run(
         list[str] | None,
         typer.Option(metavar="K=V", help="Model V, such as alks, of controller K of another tool; repeatable."),
     ] = None,
-    drive: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME[=STACK]",
-            help="Give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable.",
-        ),
-    ] = None,
-    criterion: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="YAML|FILE", help="Add criteria, such as '{collision: {of: Ego}}', or those of a file; repeatable."
-        ),
-    ] = None,
+    drive: Drive = None,
+    criterion: Criteria = None,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with consecutive seeds from --seed.")] = 1,
     max_runs: Annotated[
@@ -127,6 +118,7 @@ def run(
     settings = RunSettings(
         channel=channel,
         detector=detector,
+        planner=planner,
         cooperate=parse_senders(cooperate),
         weather=weather,
         parameters=parameters,

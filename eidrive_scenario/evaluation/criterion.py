@@ -59,6 +59,8 @@ class Criterion(ABC):
     """Names of the required actors, checked against the entities of the scenario before the run."""
     monitors: tuple[str, ...] = ()
     """Names of the evaluated MonitorDeclarations, checked before the run."""
+    demands_progress: bool = False
+    """Whether it fails an actor that never drives on. A class or an instance sets it, by its settings."""
     needs_roads: ClassVar[bool] = False
     """Whether the criterion requires roads; a scenario without roads is then an error before the run."""
     roads: RoadNetwork | None = None

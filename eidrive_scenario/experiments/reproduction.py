@@ -26,6 +26,7 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
     for option, value in (
         ("--channel", _channel(settings.channel)),
         ("--detector", settings.detector),
+        ("--planner", settings.planner),
         ("--weather", _file_or_name(settings.weather)),
         ("--cooperate", None if settings.cooperate is None else ",".join(settings.cooperate) or "none"),
     ):

@@ -21,7 +21,7 @@ MARKER = (
 _DEFAULT_MAX_RUNS = 100
 _MAX_LENGTH = 80
 """Maximum number of characters of a channel in the name of a test."""
-_SHOWN = ("channel", "drive", "criterion", "detector", "seeds", "out")
+_SHOWN = ("channel", "drive", "criterion", "detector", "planner", "seeds", "out")
 """Options that the header of a report lists."""
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _WORKER_KEY = "eidrive_given"
@@ -97,6 +97,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="add criteria to those of each scenario, such as '{collision: {of: Ego}}', or those of a file; repeatable",
     )
     group.addoption("--eidrive-detector", metavar="NAME", help="detector of all stations (default: the file's own)")
+    group.addoption(
+        "--eidrive-planner", metavar="NAME", help="planner of all driven stations (default: the file's own)"
+    )
     group.addoption(
         "--eidrive-max-runs",
         metavar="N|all",

@@ -58,7 +58,7 @@ def run_variant(item: pytest.Item, source: Source, variant: RunVariant, **overri
 def pytest_command(item: pytest.Item) -> str:
     """Return the command line that repeats a test, including runs of scenarios without a file."""
     words = ["pytest", "::".join([str(item.path), *item.nodeid.split("::")[1:]])]
-    for name in ("channel", "detector", "seeds"):
+    for name in ("channel", "detector", "planner", "seeds"):
         value = item.config.getoption(f"eidrive_{name}")
         if value is not None:
             words += [f"--eidrive-{name}", ",".join(value) if isinstance(value, list) else str(value)]
@@ -89,6 +89,7 @@ def _run_and_report(
     settings: dict[str, Any] = {
         "channel": variant.channel,
         "detector": config.getoption("eidrive_detector"),
+        "planner": config.getoption("eidrive_planner"),
         **added_settings(config, variant.added),
         **overrides,
     }

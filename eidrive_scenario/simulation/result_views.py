@@ -68,6 +68,7 @@ def result_row(result: Result) -> dict[str, Scalar]:
         "warnings": len(result.warnings),
         "dt": result.settings.dt,
         "detector": result.settings.detector,
+        "planner": result.settings.planner,
         "weather": result.settings.weather,
     }
     row.update((f"parameter.{name}", typed(text)) for name, text in result.parameters.items())

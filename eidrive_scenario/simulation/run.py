@@ -31,6 +31,7 @@ class RunSettings:
 
     channel         profile: a name, a file, YAML text or a mapping; 'none' disables cooperation
     detector        for all stations
+    planner         for all driven stations; parked ones, with the planner `none`, remain parked
     cooperate       senders whose messages the receiving stations use; () disables reception
     parameters      values of scenario parameters; an Assignment contains the file and line of the value
     dt              time step [s]
@@ -47,6 +48,7 @@ class RunSettings:
 
     channel: str | Path | Mapping[str, Any] | None = None
     detector: str | None = None
+    planner: str | None = None
     cooperate: tuple[str, ...] | None = None
     parameters: Mapping[str, str | Assignment] = field(default_factory=dict)
     dt: float = 0.05
@@ -82,6 +84,7 @@ _TYPES: tuple[tuple[str, tuple[type, ...], str], ...] = (
     ("channel", (*_PLACE, Mapping), "the name, the file or the mapping of a channel profile"),
     ("weather", _PLACE, "the name or the file of a weather preset"),
     ("detector", (str, type(None)), "the name of a detector"),
+    ("planner", (str, type(None)), "the name of a planner"),
     ("parameters", (Mapping,), "a mapping of names to values"),
     ("user_values", (Mapping,), "a mapping of names to values"),
     ("controllers", (Mapping,), "a mapping of controllers to controller models"),

@@ -14,12 +14,14 @@ from eidrive_scenario.evaluation.criteria_parser import (
     unsupported_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, bind_roads
+from eidrive_scenario.evaluation.progress_demand import progress_warnings
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.commands import DeclaredCriteria, check_added_criteria, check_commands
 from eidrive_scenario.simulation.driven_entities import drive_entities
+from eidrive_scenario.simulation.planner_option import select_planner
 from eidrive_scenario.simulation.run import RunSettings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world import World
@@ -35,6 +37,7 @@ class RunSetup:
     added_criteria     criteria that the settings of the run add to those of the scenario
     weather            option that overrides the scenario; None uses the weather of the scenario
     warnings           warnings that are known before the run
+    progress_warnings  those about criteria that demand no progress
     """
 
     scenario: Scenario
@@ -47,6 +50,7 @@ class RunSetup:
     weather: Weather | None
     world: World
     warnings: tuple[str, ...]
+    progress_warnings: tuple[Diagnostic, ...] = ()
 
 
 def set_up_run(
@@ -73,6 +77,7 @@ def set_up_run(
     weather: Weather | None = None
     with collector:
         scenario, replaced = drive_entities(scenario, drive_sources(settings.drive))
+        scenario = select_planner(scenario, settings.planner)
     with collector:
         declared = check_commands(scenario)
     with collector:
@@ -89,11 +94,14 @@ def set_up_run(
         if settings.weather is not None:
             weather = load_weather(settings.weather, origin="--weather")
     collector.raise_if_any()
-    warnings = tuple(map(str, [*replaced, *_warnings(scenario, roads, driving)]))
+    declarations = [*(one for several in declared.values() for one in several), *added]
+    all_criteria = [*criteria, *(one.build() for one in declarations)]
+    progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
+    warnings = tuple(map(str, [*replaced, *_warnings(scenario, roads, driving), *progress]))
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
     if weather is not None:
         world.set_weather(weather)
-    return RunSetup(scenario, roads, storyboard, driving, criteria, declared, added, weather, world, warnings)
+    return RunSetup(scenario, roads, storyboard, driving, criteria, declared, added, weather, world, warnings, progress)
 
 
 def _stack_context(

@@ -49,6 +49,7 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
         channel_profile=without_folders(profile),
         later_channels=tuple(without_folders(one) for one in later),
         detector=settings.detector,
+        planner=settings.planner,
         cooperate=settings.cooperate,
         stations=without_folders(stations),
         weather=weather.name if weather is not None else None,

@@ -70,6 +70,8 @@ class Simulation:
         setup = set_up_run(source, seed, self.settings, load_weights=load_weights, stack=stack)
         self.scenario, self.roads = setup.scenario, setup.roads
         self.storyboard, self.stack, self.world = setup.storyboard, setup.stack, setup.world
+        self.progress_warnings = setup.progress_warnings
+        """Warnings about criteria that demand no progress; they are warnings of the result as well."""
         self._state = RunState.of(setup)
         self.criteria = self._state.criteria
         self._trace, self._false_tracks = TraceHash(), FalseTracks()

@@ -3,10 +3,14 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
-from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionSettings, time_to_contact
+from eidrive_criteria.accelerated_contact import Course, accelerated_contact
+from eidrive_criteria.swept_boxes import time_to_contact
+from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionSettings
+from msgspec.structs import replace
 
-from eidrive_scenario.api.criteria import evaluate_criteria
+from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
 
 
 def box(x: float, y: float = 0.0, yaw: float = 0.0, z: float = 0.75) -> list[float]:
@@ -69,3 +73,67 @@ def test_time_to_collision_of_absent_actor_fails(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [criterion(at_least=2)])
     assert not verdict.passed
     assert verdict.reason.startswith("Lead was never present")
+
+
+def along_x(speed: float, rate: float = 0.0) -> Course:
+    return Course((speed, 0.0, 0.0), (rate, 0.0, 0.0), speed / -rate if rate < 0.0 else math.inf)
+
+
+@pytest.mark.parametrize(
+    ("gap", "own", "lead", "expected"),
+    [
+        (20, along_x(12), along_x(12, -4), 38 / 12),  # the lead stops after 3 s and 18 m; the formula gives 3.162 s
+        (20, along_x(12, -4), along_x(12, -4), math.inf),  # both stop
+        (10, along_x(10), along_x(10, -5), 2.0),  # 10 m = 2.5 t², at the standstill of the lead
+        (10, along_x(0, 5), along_x(0), 2.0),  # starts from rest
+        (10, along_x(10, -4), along_x(0), (10 - math.sqrt(20)) / 4),  # 10 t - 2 t² = 10
+        (13, along_x(10, -4), along_x(0), math.inf),  # stops after 12.5 m
+        (10, along_x(5), along_x(10, -5), 4.0),  # the lead stops after 2 s and 10 m, the ego drives 20 m
+        (-1, along_x(5), along_x(5), 0.0),  # overlap
+        (20, along_x(15), along_x(10), 4.0),  # constant velocities
+        (20, along_x(5), along_x(5, 2), math.inf),  # accelerates away
+    ],
+)
+def test_contact_with_accelerations(gap: float, own: Course, lead: Course, expected: float) -> None:
+    assert accelerated_contact(box(0), box(4 + gap), own, lead) == pytest.approx(expected)
+
+
+def test_contact_of_courses_that_cross() -> None:
+    """The ego front is at 0 at the start and at 8 m after 2 s: 2 t². The other one is 4 m wide, its front 8 m away.
+
+    It enters the path, 2 m wide, at 8 = 4 t + 0.5 a t² after 2 s without acceleration and stops before it at -2 m/s².
+    """
+    own = Course((0.0, 0.0, 0.0), (4.0, 0.0, 0.0), math.inf)
+    other = [12.0, -11.0, 0.75, 4.0, 8.0, 1.5, math.pi / 2]
+    drives = Course((0.0, 4.0, 0.0), (0.0, 0.0, 0.0), math.inf)
+    brakes = Course((0.0, 4.0, 0.0), (0.0, -2.0, 0.0), 2.0)
+    assert accelerated_contact(box(0), other, own, drives) == pytest.approx(2.0)
+    assert accelerated_contact(box(0), other, own, brakes) == math.inf
+
+
+def test_accelerations_agree_with_constant_velocities_without_acceleration() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        x, y, yaw = rng.uniform((-20, -20, -3), (20, 20, 3)).tolist()
+        other = box(x, y, yaw)
+        first, second = ((*rng.uniform(-10, 10, 2), 0.0) for _ in range(2))
+        still = (0.0, 0.0, 0.0)
+        found = accelerated_contact(box(0), other, Course(first, still, math.inf), Course(second, still, math.inf))
+        relative = [b - a for a, b in zip(first, second, strict=True)]
+        assert found == pytest.approx(time_to_contact(box(0), other, relative), abs=1e-9)
+
+
+def braking_lead(frame: Any, car: Any, rate: float, **settings: Any) -> Verdict:
+    """Return the verdict on one frame of the worked example with a gap of 20 m, both at 12 m/s."""
+    plain = frame(0.0, {"Ego": car(0, speed=12), "Lead": car(24, speed=12)})
+    view = replace(plain.view, acceleration=np.array([[0.0, 0.0, 0.0], [rate, 0.0, 0.0]]))
+    (verdict,) = evaluate_criteria([replace(plain, view=view)], [criterion(**settings)])
+    return verdict
+
+
+def test_criterion_with_accelerations(frame: Any, car: Any) -> None:
+    assert braking_lead(frame, car, -4.0, accelerations=True).value == pytest.approx(3.167, abs=5e-4)
+    assert braking_lead(frame, car, -4.0, accelerations=True, at_least=3.16).passed
+    assert not braking_lead(frame, car, -4.0, accelerations=True, at_least=3.17).passed
+    assert braking_lead(frame, car, -4.0).value is None
+    assert braking_lead(frame, car, -200.0, accelerations=True).value is None, "a step of the speed"

@@ -167,9 +167,10 @@ def test_unknown_detector_and_sender_are_reported_with_their_option() -> None:
 
 
 def test_run_without_stop_ends_at_time_limit() -> None:
-    result = play(channel="ideal", time_limit=2.0)
+    """After 10 s the ego has passed the crossing, which fulfills all criteria, and has not reached its goal."""
+    result = play(channel="ideal", time_limit=10.0)
     assert (result.end_reason, result.exit_code, result.passed) == ("time limit", 3, False)
-    assert result.simulated_s == pytest.approx(2.0)
+    assert result.simulated_s == pytest.approx(10.0)
 
 
 def test_drawn_parameters_differ_by_seed_and_given_ones_override() -> None:

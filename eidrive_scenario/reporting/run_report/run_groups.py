@@ -9,7 +9,7 @@ from typing import Any
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, shorten
 
-_LEFT_OUT = ("seed", "run", "drawn", "varied", "scenario", "channel", "detector", "cooperate")
+_LEFT_OUT = ("seed", "run", "drawn", "varied", "scenario", "channel", "detector", "planner", "cooperate")
 """Settings that differ within a group, and options that the settings of channel and stations contain."""
 _NAMES = ("channel_profile.name", "channel_profile.description")
 _SHOWN = 200

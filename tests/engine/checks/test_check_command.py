@@ -9,6 +9,8 @@ from command_fixtures import Eidrive
 from opendrive_xml import lanes_xml, map_xml, road_xml, successor_xml
 from openscenario_xml import catalog_xml
 
+from eidrive_scenario.simulation import RunSettings
+
 
 @pytest.fixture
 def folder(tmp_path: Path, passing_by: Path) -> Callable[..., Path]:
@@ -162,10 +164,10 @@ def test_check_internal_error_continues_with_other_files(
 
     inspect = scenario_checks.check_scenario
 
-    def raise_for_a(path: Path, ignored: tuple[str, ...]) -> object:
+    def raise_for_a(path: Path, ignored: tuple[str, ...], settings: RunSettings) -> object:
         if path.name == "a.xosc":
             raise ZeroDivisionError("division by zero")
-        return inspect(path, ignored)
+        return inspect(path, ignored, settings)
 
     for name in ("a.xosc", "b.xosc"):
         (tmp_path / name).write_text("<OpenSCENARIO/>")
@@ -174,6 +176,31 @@ def test_check_internal_error_continues_with_other_files(
     assert result.exit_code == 3
     assert f"{tmp_path / 'a.xosc'}: internal error: ZeroDivisionError: division by zero" in result.stderr
     assert f"{tmp_path / 'b.xosc'}:1: " in result.stdout
+
+
+def test_check_evaluates_stacks_planners_and_criteria_of_options(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "stack.yaml").write_text("detector: oracle\nspeed: 3\n")
+    options = ("--drive", f"Ego={tmp_path}/stack.yaml", "--criterion", "{collision: {of: Egon}}", "--planner", "rout")
+    result = eidrive("check", passing_by, *options)
+    assert result.exit_code == 2, result.output
+    assert "--planner: unknown planner 'rout'; did you mean 'route'?" in result.stdout
+    result = eidrive("check", passing_by, *options[:4])
+    assert f"{tmp_path}/stack.yaml:2: unknown setting 'speed'" in result.stdout
+    assert "--criterion: criterion 'collision': unknown entity 'Egon'; did you mean 'Ego'?" in result.stdout
+    assert result.stdout.splitlines()[-1] == "1 file, 2 errors, 0 warnings"
+
+
+def test_check_warns_of_a_driven_vehicle_that_may_stand_still(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path
+) -> None:
+    result = eidrive("check", passing_by, "--drive", "Ego", "--strict")
+    assert result.exit_code == 2
+    expected = f"{passing_by}: no criterion demands that Ego drives on: a vehicle that stands still passes; add one"
+    assert result.stdout.startswith(expected)
+    result = eidrive("check", passing_by, "--drive", "Ego", "--criterion", "{driven_distance: {of: Ego, at_least: 9}}")
+    assert result.stdout == "1 file, 0 errors, 0 warnings\n"
 
 
 def test_check_empty_path_is_not_the_current_folder(

@@ -200,7 +200,10 @@ def test_unused_user_value_and_controller_option_are_warnings(eidrive: Eidrive, 
 
 
 def test_run_with_long_time_step_ends(eidrive: Eidrive) -> None:
-    assert eidrive("run", "coop/scenario_1", "--no-record", "--dt", "100", "--time-limit", "1000").exit_code == 0
+    """The ego does not move in a single step, so that the criterion of its progress fails."""
+    result = eidrive("run", "coop/scenario_1", "--no-record", "--dt", "100", "--time-limit", "1000")
+    assert result.exit_code == 1
+    assert "end: stop trigger at 100.00 s" in result.stdout
 
 
 def test_show_prints_ratio_to_real_time(capsys: pytest.CaptureFixture[str]) -> None:

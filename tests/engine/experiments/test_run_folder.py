@@ -182,7 +182,7 @@ def test_concurrent_runs_write_consistent_results_and_recordings(tmp_path: Path)
         for options in _commands()
     ]
     outputs = [process.communicate(timeout=100) for process in running]
-    assert [process.returncode for process in running] == [3] * 4, outputs
+    assert [process.returncode for process in running] == [1] * 4, outputs  # 2 s are too short for the goal
     folders = {path.parent for path in tmp_path.rglob("result.json")}
     assert {
         Path(line.split(": ", 1)[1]) for out, _ in outputs for line in out.splitlines() if "files: " in line

@@ -176,7 +176,8 @@ def test_runs_with_filter_tracker_and_latency_are_repeatable(write: Write) -> No
 def test_lidar_detector_finds_incoming_car_in_time(scenario: str, helper: str) -> None:
     """Lidar only: no collision, and the helper detects the hidden car no later than the ego can at the crossing."""
     result, frames = run(resolve_scenario(scenario), detector="lidar", time_limit=6.5)
-    assert {verdict.name: verdict.passed for verdict in result.criteria} == {"collision": True, "min_distance": True}
+    passed = {verdict.name for verdict in result.criteria if verdict.passed}
+    assert passed == {"collision", "min_distance"}, "the time limit ends the run before the goal"
     first: dict[str, float] = {}
     for frame in frames:
         place = frame.view.centers[frame.view.row("Incoming"), :2]

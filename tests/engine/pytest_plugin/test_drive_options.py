@@ -92,6 +92,21 @@ def test_driven(run_scenario):
     run(project, "test_own.py", *options, text=text).assert_outcomes(passed=1)
 
 
+def test_planner_of_all_driven_stations(project: pytest.Pytester) -> None:
+    text = """
+def test_driven(run_scenario):
+    assert run_scenario("drives/first.xosc").settings.stations["Ego"]["planner"] == "route"
+    assert run_scenario("drives/first.xosc", planner=None).settings.planner is None
+"""
+    options = ("--eidrive-drive", "Ego={planner: none}", "--eidrive-planner", "route")
+    run(project, "test_own.py", "--eidrive-drive", "Ego", *options[2:], text=text).assert_outcomes(passed=1)
+    result = run(project, "drives", *options)
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(
+        ["eidrive: drive Ego={planner: none}, planner route", "--planner: planner 'route' has*"]
+    )
+
+
 @pytest.mark.parametrize(
     ("options", "expected"),
     [

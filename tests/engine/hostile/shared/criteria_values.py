@@ -117,7 +117,7 @@ CRITERIA: Mapping[str, Mapping[str, Any]] = {
     "running_stop_sign": {"of": "Ego", "within": 4.0, "below": 0.1, "duration": 0.5},
     "time_headway": {"of": "Ego", "to": "B", "at_least": 1.0},
     "time_limit": {"within": 10.0},
-    "time_to_collision": {"of": "Ego", "to": "B", "at_least": 1.5},
+    "time_to_collision": {"of": "Ego", "to": "B", "at_least": 1.5, "accelerations": True},
     "wrong_lane": {"of": "Ego", "at_most": 1.0},
     "yield_to_emergency_vehicle": {"of": "Ego", "to": "B", "within": 40.0, "at_most": 15.0},
 }

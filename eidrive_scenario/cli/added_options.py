@@ -1,0 +1,22 @@
+"""Options that `eidrive run` and `eidrive check` share: driving stacks, planner and criteria."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+Drive = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME[=STACK]",
+        help="Give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable.",
+    ),
+]
+Planner = Annotated[str | None, typer.Option(help="Planner of all driven stations.", show_default="the file's")]
+Criteria = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="YAML|FILE", help="Add criteria, such as '{collision: {of: Ego}}', or those of a file; repeatable."
+    ),
+]
