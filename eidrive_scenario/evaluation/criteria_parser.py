@@ -16,7 +16,7 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
-from eidrive_scenario.evaluation.scenario_runner_criteria import CLASSES, translation
+from eidrive_scenario.evaluation.scenario_runner_criteria import CLASSES, INEXPRESSIBLE, translation
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
@@ -251,13 +251,16 @@ def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
     found = []
     for condition in criteria_of(scenario.storyboard):
         translated = translation(condition)
-        if translated is None:
-            hint = f"supported criteria: {', '.join(sorted(CLASSES))}"
+        name = condition.name.removeprefix(CRITERION_PREFIX)
+        if name in INEXPRESSIBLE:
+            hint = f"its arguments are not one number; declare {INEXPRESSIBLE[name]} ({CRITERION} or --criterion)"
+        elif translated is None:
+            hint = suggestion(name, sorted(CLASSES))
         elif _lacks_roads(translated[0], scenario):
             hint = "it requires roads, and the scenario has none"
         else:
             continue
-        message = f"criterion {condition.name.removeprefix(CRITERION_PREFIX)!r} is not evaluated"
+        message = f"criterion {name!r} is not evaluated"
         found.append(Diagnostic(message, hint, condition.source, condition.line))
     return found
 

@@ -41,6 +41,14 @@ CLASSES: Mapping[str, Translation] = {
 }
 """Criteria by class of ScenarioRunner; SI units on both sides."""
 
+INEXPRESSIBLE: Mapping[str, str] = {
+    "InRadiusRegionTest": "reach_position: {of: Ego, x: 100, y: 20, within: 5}",
+    "MinimumSpeedRouteTest": "average_speed: {of: Ego, at_least: 5}",
+    "ReachedRegionTest": "reached_region: {of: Ego, region: [[100, 15], [110, 25]]}",
+    "ScenarioTimeoutTest": "time_limit: {within: 60}",
+}
+"""Criteria to declare instead of classes whose arguments are not one number, all that such a condition can state."""
+
 REQUIRED = ("DrivenDistanceTest", "MaxVelocityTest", "AverageVelocityTest", "YieldToEmergencyVehicleTest")
 """Classes that require a value; an empty one is an error."""
 

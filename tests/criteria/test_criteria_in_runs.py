@@ -6,13 +6,14 @@ The Ego drives 40 m along its lane at 10 m/s behind a car at 8 m/s, 20 m ahead o
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from criteria_scenario import ROAD, write_scenario
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.registry import registry
-from eidrive_scenario.simulation import run_file
+from eidrive_scenario.simulation import RunSettings, run_file
 
 ACTORS = {
     "Ego": (-70.0, 0.0, 0.0, 10.0),
@@ -60,21 +61,38 @@ CASES = {
 }
 """Settings with which a criterion passes and fails."""
 
-PERCEPTION = {
-    "cooperation_gain",
-    "detection_count",
-    "detection_recall",
-    "false_braking",
-    "first_detection",
-    "position_error",
+LATE = {"model": "composed", "own_perception": True, "delay": {"kind": "constant", "seconds": 0.9}}
+"""With 0.9 s of delay the car at 9 m/s has left the conflict area when the Ego brakes for it."""
+
+BY_CHANNEL: dict[str, tuple[dict[str, Any], Any, Any]] = {
+    "age_of_information": ({"receiver": "Ego", "at_most": 0.2}, "ideal", "latency_300ms"),
+    "channel_busy_ratio": ({"of": "Ego", "at_most": 0.5}, "80211p_urban", "congested"),
+    "cooperation_gain": ({"of": "Ego", "at_least": 0.1}, "ideal", "none"),
+    "detection_count": ({"of": "Ego", "classes": ["car"], "at_least": 0.3}, "ideal", "none"),
+    "detection_recall": ({"of": "Ego", "objects": "helper_only", "at_least": 0.99}, "ideal", "none"),
+    "false_braking": ({"of": "Ego"}, "ideal", LATE),
+    "first_detection": ({"of": "Ego", "to": "Incoming", "by": 1.0}, "ideal", "none"),
+    "latency": ({"receiver": "Ego", "at_most": 0.2}, "ideal", "latency_300ms"),
+    "packet_reception_ratio": ({"sender": "RSU", "receiver": "Ego", "at_least": 0.9}, "ideal", "error_30pct"),
+    "position_error": ({"of": "Ego", "at_most": 0.1}, "none", "paper_latency_300ms"),
 }
-COMMUNICATION = {"age_of_information", "channel_busy_ratio", "latency", "packet_reception_ratio"}
-ELSEWHERE = {"monitor", "running_red_light"} | PERCEPTION | COMMUNICATION
-"""Criteria whose runs are in separate tests."""
+"""Settings of criteria on perception and communication, and the channels with which they pass and fail in scenario 1: a
+truck hides the incoming car from the Ego until the crossing, and the roadside unit sees it from the start on."""
+
+SEPARATE = {"monitor", "running_red_light"}
+"""Criteria whose runs have tests of their own below."""
 
 
 def test_every_criterion_has_runs() -> None:
-    assert set(CASES) | ELSEWHERE == set(registry("criteria"))
+    assert set(CASES) | set(BY_CHANNEL) | SEPARATE == set(registry("criteria"))
+
+
+@pytest.mark.parametrize("kind", sorted(BY_CHANNEL))
+def test_criterion_in_runs_of_scenario_1(kind: str) -> None:
+    settings, passing, failing = BY_CHANNEL[kind]
+    for channel, passed in ((passing, True), (failing, False)):
+        result = run_file("coop/scenario_1", settings=RunSettings(channel=channel, criteria={kind: settings}))
+        assert [verdict.passed for verdict in result.criteria if verdict.name == kind] == [passed]
 
 
 @pytest.mark.parametrize("index", [0, 1], ids=["passed", "failed"])
@@ -108,6 +126,19 @@ def test_red_light_in_run(tmp_path: Path, state: str, passed: bool) -> None:
     path = write_scenario(tmp_path, "running_red_light: {of: Ego}", actors, road, LIGHT.format(state=state))
     (verdict,) = run_file(path).criteria
     assert (verdict.passed, verdict.value) == (passed, float(not passed))
+
+
+MONITORS = '<MonitorDeclarations><MonitorDeclaration name="Seen" value="false"/></MonitorDeclarations>'
+
+
+@pytest.mark.parametrize("value", ["true", "false"])
+def test_monitor_in_run(tmp_path: Path, value: str) -> None:
+    action = f'<GlobalAction><SetMonitorAction monitorRef="Seen" value="{value}"/></GlobalAction>'
+    path = write_scenario(tmp_path, "monitor: {of: Seen}", {"Ego": (0.0, 0.0, 0.0, 6.0)}, init=action)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("<CatalogLocations/>", f"{MONITORS}<CatalogLocations/>"), encoding="utf-8")
+    (verdict,) = run_file(path).criteria
+    assert verdict.passed == (value == "true")
 
 
 def test_file_of_the_test_is_valid(tmp_path: Path) -> None:

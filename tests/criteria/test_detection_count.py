@@ -7,7 +7,6 @@ from eidrive_criteria.detection_count import DetectionCount, DetectionCountSetti
 from pydantic import ValidationError
 
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
-from eidrive_scenario.simulation import RunSettings, run_file
 
 
 def count(frames: list[Any], **settings: Any) -> Verdict:
@@ -90,12 +89,3 @@ def test_station_without_perception_fails(frames: list[Any], frame: Any, car: An
 def test_limits_in_reverse_order_are_refused() -> None:
     with pytest.raises(ValidationError, match="exceeds"):
         DetectionCountSettings(of="Ego", at_least=3, at_most=2)
-
-
-@pytest.mark.parametrize(("channel", "passed"), [("ideal", True), ("none", False)])
-def test_hidden_car_is_known_by_cooperation(channel: str, passed: bool) -> None:
-    """A truck hides the incoming car from the Ego until the crossing; the roadside unit sees it from the start on."""
-    criterion = {"detection_count": {"of": "Ego", "classes": ["car"], "at_least": 0.3}}
-    result = run_file("coop/scenario_1", settings=RunSettings(channel=channel, criteria=criterion))
-    (found,) = [verdict.passed for verdict in result.criteria if verdict.name == "detection_count"]
-    assert found == passed

@@ -15,7 +15,6 @@ from pydantic import ValidationError
 
 from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
 from eidrive_scenario.driving.step import Plan
-from eidrive_scenario.simulation import RunSettings, run_file
 
 
 def judge(criterion: Criterion, frames: list[Any]) -> Verdict:
@@ -205,24 +204,3 @@ def test_false_braking(brake: Any) -> None:
     assert braking(frames, at_most=2).passed
     assert braking(frames, harder_than=3.5).value == 1.0
     assert braking(brake((None, -3.0, (1,)))).value == 0.0
-
-
-LATE = {"model": "composed", "own_perception": True, "delay": {"kind": "constant", "seconds": 0.9}}
-
-
-@pytest.mark.parametrize(
-    ("kind", "settings", "passing", "failing"),
-    [
-        ("detection_recall", {"objects": "helper_only", "at_least": 0.99}, "ideal", "none"),
-        ("cooperation_gain", {"at_least": 0.1}, "ideal", "none"),
-        ("first_detection", {"to": "Incoming", "by": 1.0}, "ideal", "none"),
-        ("position_error", {"at_most": 0.1}, "none", "paper_latency_300ms"),
-        ("false_braking", {}, "ideal", LATE),
-    ],
-)
-def test_criterion_in_runs_of_scenario_1(kind: str, settings: dict[str, Any], passing: Any, failing: Any) -> None:
-    """With 0.9 s of delay the car at 9 m/s has left the conflict area when the Ego brakes for it."""
-    for channel, passed in ((passing, True), (failing, False)):
-        run = RunSettings(channel=channel, criteria={kind: {"of": "Ego", **settings}})
-        result = run_file("coop/scenario_1", settings=run)
-        assert [verdict.passed for verdict in result.criteria if verdict.name == kind] == [passed]

@@ -12,12 +12,9 @@ from eidrive_scenario.evaluation.criteria_parser import (
     build_criteria,
     exit_verdict,
     parse_criteria,
-    stop_trigger_criteria,
-    unsupported_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, evaluate_criteria
 from eidrive_scenario.files.yaml_text import load_yaml
-from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import Registry
 from eidrive_scenario.simulation import Simulation
@@ -200,113 +197,3 @@ def test_exit_verdict_has_outcome_and_text_of_command(kind: str, passed: bool) -
     assert verdict.passed is passed
     assert verdict.fatal
     assert verdict.reason == f"the scenario executed {kind} at 3.00 s: gave way"
-
-
-CONDITION = """
-<Condition name="{name}" delay="0" conditionEdge="rising">
-  <ByValueCondition><ParameterCondition parameterRef="{parameter}" value="{value}" rule="lessThan"/></ByValueCondition>
-</Condition>"""
-
-
-ROAD = Path(__file__).parents[3] / "xosc" / "roads" / "coop_1.xodr"
-
-
-def written_for_scenario_runner(
-    *conditions: tuple[str, str, str], ego: bool = True, road: Path | None = None
-) -> Scenario:
-    text = PASSING_BY.read_text(encoding="utf-8")
-    if road is not None:
-        text = text.replace("<RoadNetwork/>", f'<RoadNetwork><LogicFile filepath="{road}"/></RoadNetwork>')
-    written = "".join(CONDITION.format(name=n, parameter=p, value=v) for n, p, v in conditions)
-    text = text.replace("<ConditionGroup>", f"<ConditionGroup>{written}", 1)
-    if ego:
-        text = text.replace("<Properties/>", '<Properties><Property name="type" value="ego_vehicle"/></Properties>', 1)
-    else:
-        text = text.replace('"Ego"', '"Car"')
-    return load_scenario(text.encode())
-
-
-def test_stop_trigger_criteria_translates_supported_conditions() -> None:
-    scenario = written_for_scenario_runner(
-        ("criteria_CollisionTest", "", ""),
-        ("criteria_DrivenDistanceTest", "distance_success", "100"),
-        ("criteria_MaxVelocityTest", "max_velocity", "13.5"),
-        ("criteria_AverageVelocityTest", "velocity", "5"),
-        ("criteria_ActorBlockedTest", "max_time", "60"),
-        ("criteria_ActorBlockedTest", "min_speed", "0.5"),
-        ("criteria_ReachedRegionTest", "", ""),
-        ("criteria_KeepLaneTest", "", ""),
-    )
-    criteria = stop_trigger_criteria(scenario)
-    assert [criterion.name for criterion in criteria] == [
-        *("collision", "driven_distance", "max_speed", "average_speed", "actor_blocked", "actor_blocked_2"),
-    ]
-    assert [criterion.verdict().limit for criterion in criteria] == [0.0, 100.0, 13.5, 5.0, 60.0, 180.0]
-    assert {criterion.subjects for criterion in criteria} == {("Ego",)}
-    unknown, without_roads = unsupported_criteria(scenario)
-    assert unknown.message == "criterion 'ReachedRegionTest' is not evaluated"
-    assert unknown.line is not None
-    assert without_roads.message == "criterion 'KeepLaneTest' is not evaluated"
-    assert without_roads.hint == "it requires roads, and the scenario has none"
-
-
-def test_stop_trigger_criteria_on_lanes_and_signals_are_evaluated_with_roads() -> None:
-    names = ["KeepLane", "WrongLane", "OnSidewalk", "OffRoad", "EndofRoad", "RunningRedLight", "RunningStop"]
-    scenario = written_for_scenario_runner(*((f"criteria_{name}Test", "", "") for name in names), road=ROAD)
-    assert unsupported_criteria(scenario) == []
-    assert [criterion.name for criterion in stop_trigger_criteria(scenario)] == [
-        *("keep_lane", "wrong_lane", "on_sidewalk", "off_road", "end_of_road", "running_red_light"),
-        "running_stop_sign",
-    ]
-    with Simulation(scenario) as simulation:
-        result = simulation.run()
-    assert len(result.criteria) >= len(names)
-
-
-def test_stop_trigger_criteria_on_routes_and_emergency_vehicles() -> None:
-    scenario = written_for_scenario_runner(
-        ("criteria_InRouteTest", "offroad_max", "20"),
-        ("criteria_InRouteTest", "", ""),
-        ("criteria_RouteCompletionTest", "", ""),
-        ("criteria_OutsideRouteLanesTest", "", ""),
-        ("criteria_YieldToEmergencyVehicleTest", "ev", "Ambulance"),
-        road=ROAD,
-    )
-    assert unsupported_criteria(scenario) == []
-    near, usual, completion, lanes, emergency = stop_trigger_criteria(scenario)
-    assert [near.verdict().limit, usual.verdict().limit, completion.verdict().limit] == [20.0, 30.0, 0.99]
-    assert (lanes.name, emergency.subjects) == ("outside_route_lanes", ("Ego", "Ambulance"))
-
-
-def test_stop_trigger_criterion_with_a_duration_has_it_as_limit() -> None:
-    scenario = written_for_scenario_runner(("criteria_OffRoadTest", "duration", "2.5"), road=ROAD)
-    (criterion,) = stop_trigger_criteria(scenario)
-    assert criterion.verdict().limit == 2.5
-
-
-def test_stop_trigger_criteria_ignores_other_conditions() -> None:
-    scenario = load_scenario(PASSING_BY)
-    assert stop_trigger_criteria(scenario) == []
-    assert unsupported_criteria(scenario) == []
-
-
-def test_stop_trigger_criterion_with_non_numeric_value_raises_setting_error() -> None:
-    scenario = written_for_scenario_runner(("criteria_DrivenDistanceTest", "distance_success", "far"))
-    with pytest.raises(SettingError, match="setting 'at_least' is 'far'"):
-        stop_trigger_criteria(scenario)
-
-
-def test_stop_trigger_criteria_without_ego_raises_setting_error() -> None:
-    scenario = written_for_scenario_runner(("criteria_CollisionTest", "", ""), ego=False)
-    with pytest.raises(SettingError, match="the scenario has no ego vehicle; give a Vehicle the property"):
-        stop_trigger_criteria(scenario)
-
-
-def test_stop_condition_with_prefix_but_without_parameter_ends_run() -> None:
-    """Criteria of ScenarioRunner are ParameterConditions; a condition of another type only has a similar name."""
-    text = PASSING_BY.read_text(encoding="utf-8")
-    assert text.count('<Condition name="end"') == 1
-    with Simulation(text.replace('<Condition name="end"', '<Condition name="criteria_end"').encode()) as simulation:
-        result = simulation.run()
-    assert result.end_reason == "stop trigger"
-    assert result.simulated_s == pytest.approx(3.0)
