@@ -35,7 +35,7 @@ def test_set_driven_is_called_in_order_of_names(tmp_path: Path, monkeypatch: pyt
     more = "".join(text[start:end].replace('name="Ego"', f'name="{name}"') for name in names)
     init = "".join(
         f'<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>'
-        f'<WorldPosition x="{20 * number}" y="90"/></Position></TeleportAction></PrivateAction></Private>'
+        f'<WorldPosition x="{60 + 8 * number}" y="0"/></Position></TeleportAction></PrivateAction></Private>'
         for number, name in enumerate(names)
     )
     text = (

@@ -1,0 +1,105 @@
+"""Check of the places at which vehicles start: inside of another body, or off the road."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from eidrive_scenario.driving.planning.area_checks import MARGIN
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.geometry import overlap
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.model import Element
+from eidrive_scenario.openscenario.selections import EntitySelections
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.storyboard.kinematics.trailers import declared_trailer
+from eidrive_scenario.world import World
+from eidrive_scenario.world.view import WorldView
+
+_TOUCH = 0.02
+"""Depth up to which two bodies touch, but do not overlap [m]."""
+_LOW = 0.2
+"""Height up to which a vehicle drives over an object [m]."""
+
+
+def check_spawns(scenario: Scenario, roads: RoadNetwork | None, world: World, drivers: Collection[str]) -> None:
+    """Raise SettingError with every vehicle that drives itself and starts inside of another actor or off the road.
+
+    world    state after Init
+    drivers  vehicles that a driving stack drives
+    """
+    if not drivers:
+        return
+    view = world.view()
+    present = [name for name in scenario.entities if name in view.rows and name in drivers]
+    found = [*overlapping_spawns(scenario, view, present), *_off_road(scenario, roads, view, present)]
+    if found:
+        raise SettingError(found)
+
+
+def overlapping_spawns(scenario: Scenario, view: WorldView, names: Collection[str]) -> Iterator[Diagnostic]:
+    """Yield the overlaps of these actors with any actor, each pair once. A train of vehicle and trailers has none."""
+    present = [name for name in scenario.entities if name in view.rows]
+    boxes = {name: _core(view.plain_boxes[view.rows[name]]) for name in present}
+    trains = _trains(scenario)
+    done: set[str] = set()
+    for name in names:
+        done.add(name)
+        for other in present:
+            is_pair = other not in done and trains.get(name, name) != trains.get(other, other)
+            if is_pair and overlap(boxes[name], boxes[other]):
+                x, y, *_ = boxes[other]
+                yield _at(
+                    scenario,
+                    name,
+                    f"{quoted(name)} starts inside of {quoted(other)}, whose center is at ({x:.1f}, {y:.1f}) m",
+                    "move one of them",
+                )
+
+
+def _core(box: Sequence[float]) -> list[float]:
+    """Return a box without its lowest part, and without the margin in which bodies touch."""
+    x, y, z, length, width, height, yaw = box
+    return [x, y, z + _LOW / 2.0, length - _TOUCH, width - _TOUCH, max(height - _LOW, 0.0), yaw]
+
+
+def _trains(scenario: Scenario) -> Mapping[str, str]:
+    """Return the foremost vehicle of each trailer."""
+    front = {
+        trailer: name for name, entity in scenario.entities.items() if (trailer := declared_trailer(entity)) is not None
+    }
+    found = {}
+    for trailer, towing in front.items():
+        seen = {trailer}
+        while towing in front and towing not in seen:
+            seen.add(towing)
+            towing = front[towing]
+        found[trailer] = towing
+    return found
+
+
+def _off_road(
+    scenario: Scenario, roads: RoadNetwork | None, view: WorldView, names: Sequence[str]
+) -> Iterator[Diagnostic]:
+    """Yield the actors that start farther than `MARGIN` from every lane."""
+    if roads is None or not names:
+        return
+    x, y = np.array([view.plain_boxes[view.rows[name]][:2] for name in names]).T
+    outside = roads.locate(x, y, reach=np.inf).outside.tolist()
+    for name, gap, place in zip(names, outside, zip(x.tolist(), y.tolist(), strict=True), strict=True):
+        if gap > MARGIN:
+            message = f"{quoted(name)} starts at ({place[0]:.1f}, {place[1]:.1f}) m, {gap:.0f} m off the nearest road"
+            yield _at(scenario, name, message, "give a LanePosition, or a world position on a lane")
+
+
+def _at(scenario: Scenario, name: str, message: str, hint: str) -> Diagnostic:
+    """Return a diagnostic at the last TeleportAction of an actor in Init, or at the actor without one."""
+    element: Element = scenario.entities[name]
+    selections = EntitySelections(scenario)
+    for private in scenario.storyboard.init.actions.private:
+        if name in selections.members(private.entity_ref):
+            for action in private.private_action:
+                if action.teleport_action is not None:
+                    element = action.teleport_action
+    return Diagnostic(message, hint, element.source, element.line)

@@ -1,0 +1,129 @@
+"""Vehicles that start inside of another body or off the road: errors before the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
+from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
+from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml, world_position_xml
+
+from eidrive_scenario.checks.scenario_checks import check_scenario
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.simulation import RunSettings, run_file
+
+TRAILER = """<Trailer><TrailerRef entityRef="Cart"/></Trailer></Vehicle>"""
+FLAT = """<MiscObject mass="1" name="plate" miscObjectCategory="obstacle"><BoundingBox><Center x="0" y="0" z="0.05"/>
+<Dimensions length="1" width="1" height="{height}"/></BoundingBox></MiscObject>"""
+BRIDGE = '<WorldPosition x="20" y="-1.75" z="6"/>'
+INSIDE = "'Ego' starts inside of 'Other', whose center is at "
+
+
+def write(folder: Path, *places: str, driven: bool = True, other: str = "", road: bool = True) -> Path:
+    """Write a scenario with Ego and Other at positions, on a straight road of 1 km with the lane -1 at y = -1.75 m."""
+    (folder / "road.xodr").write_text(map_xml(road_xml(lanes=lanes_xml(right=2), length=1000.0)))
+    path = folder / "a.xosc"
+    lines = [init_xml(name, "\n" + teleport_xml(place)) for name, place in zip(("Ego", "Other"), places, strict=False)]
+    path.write_bytes(
+        scenario_xml(
+            road=road_file_xml("road.xodr") if road else "",
+            entities=object_xml("Ego", controller=agent_xml() if driven else "") + object_xml("Other", other),
+            init="\n".join(lines),
+            stop=end_xml(0.1),
+        )
+    )
+    return path
+
+
+def errors(path: Path, **settings: object) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        run_file(path, settings=RunSettings(**settings))  # type: ignore[arg-type]
+    report = check_scenario(path)
+    if not settings:
+        assert [str(one) for one in report.errors] == [str(one) for one in caught.value.diagnostics]
+    return [str(one) for one in caught.value.diagnostics]
+
+
+def line_of(path: Path, entity: str) -> int:
+    """Return the line of the TeleportAction of an entity, which is after that of its Private element."""
+    lines = path.read_text().splitlines()
+    return 2 + next(number for number, line in enumerate(lines) if f'entityRef="{entity}"' in line)
+
+
+def test_driven_vehicle_inside_of_another_one_is_an_error_with_its_line(tmp_path: Path) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20), lane_position_xml(-1, 22))
+    (error,) = errors(path)
+    assert error.startswith(f"{path}:{line_of(path, 'Ego')}: {INSIDE}")
+    assert error.endswith("; move one of them")
+
+
+@pytest.mark.parametrize(
+    ("other", "overlaps"),
+    [
+        (lane_position_xml(-1, 20 + 4.4), True),
+        (lane_position_xml(-1, 20 + 4.6), False),
+        (lane_position_xml(-2, 20), False),
+        (BRIDGE, False),
+    ],
+)
+def test_depth_of_the_overlap(tmp_path: Path, other: str, overlaps: bool) -> None:
+    """The bodies are 4.5 m long; the other lane is 3.5 m away, and the bridge 6 m above."""
+    path = write(tmp_path, lane_position_xml(-1, 20), other)
+    if overlaps:
+        assert INSIDE in errors(path)[0]
+    else:
+        assert run_file(path).simulated_s > 0.0
+
+
+def test_place_of_a_scripted_vehicle_is_no_error(tmp_path: Path) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20), lane_position_xml(-1, 22), driven=False)
+    assert run_file(path).simulated_s > 0.0
+    assert INSIDE in errors(path, drive="Ego")[0]
+    assert "'Other' starts inside of 'Ego'" in errors(path, drive="Other")[0]
+    assert len(errors(path, drive=["Ego", "Other"])) == 1, "each pair once"
+
+
+def test_vehicle_and_its_trailer_overlap(tmp_path: Path) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20), lane_position_xml(-1, 22))
+    text = path.read_text().replace("</Vehicle>", TRAILER, 1).replace('"Other"', '"Cart"')
+    path.write_text(text.replace('vehicleCategory="car"', 'vehicleCategory="trailer"').replace("trailer", "car", 1))
+    assert run_file(path).simulated_s > 0.0
+
+
+@pytest.mark.parametrize(("height", "overlaps"), [(0.1, False), (1.0, True)])
+def test_vehicle_may_start_on_a_flat_object(tmp_path: Path, height: float, overlaps: bool) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20), lane_position_xml(-1, 21), other=FLAT.format(height=height))
+    if overlaps:
+        assert INSIDE in errors(path)[0]
+    else:
+        assert run_file(path).simulated_s > 0.0
+
+
+def test_driven_vehicle_off_the_road_is_an_error_with_its_line(tmp_path: Path) -> None:
+    """The right edge of the road is at y = -7 m; the center of the body is 1.4 m ahead of the reference point."""
+    path = write(tmp_path, world_position_xml(50, -107))
+    (error,) = errors(path)
+    assert error.startswith(f"{path}:{line_of(path, 'Ego')}: 'Ego' starts at (5")
+    assert "m, 100 m off the nearest road; give a LanePosition, or a world position on a lane" in error
+
+
+@pytest.mark.parametrize(("place", "road"), [((50, -8), True), ((50, -107), False)], ids=["verge", "no roads"])
+def test_places_beside_the_road_and_without_roads_are_allowed(
+    tmp_path: Path, place: tuple[int, int], road: bool
+) -> None:
+    assert run_file(write(tmp_path, world_position_xml(*place), road=road)).simulated_s > 0.0
+
+
+def test_all_errors_are_reported_at_once(tmp_path: Path) -> None:
+    path = write(tmp_path, world_position_xml(50, -107), world_position_xml(51, -107))
+    assert [" off " in one for one in errors(path)] == [False, True]
+
+
+def test_selection_that_is_placed_as_a_whole_has_the_line_of_its_action(tmp_path: Path) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20))
+    both = '<EntitySelection name="Both"><Members><EntityRef entityRef="Ego"/><EntityRef entityRef="Other"/></Members>'
+    text = path.read_text().replace("</Entities>", f"{both}</EntitySelection></Entities>")
+    path.write_text(text.replace('<Private entityRef="Ego">', '<Private entityRef="Both">'))
+    (error,) = errors(path)
+    assert error.startswith(f"{path}:{line_of(path, 'Both')}: {INSIDE}")
