@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop weather-sheet clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop heat-maps weather-sheet clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -48,6 +48,9 @@ eval: install   ## evaluate the learned detectors on held-out images and library
 
 closed-loop: install  ## run the scenarios of the paper with learned detectors, 20 seeds each: reports/closed_loop.md
 	$(BIN)/python -m eidrive_scenario.experiments.closed_loop --out reports
+
+heat-maps: install  ## run the obstructed crossings over both speeds: reports/heat_maps/*.png
+	$(BIN)/python -m eidrive_scenario.reporting.heat_map --out reports/heat_maps
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet
