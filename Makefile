@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop heat-maps weather-sheet clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop heat-maps library-pictures weather-sheet clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -51,6 +51,9 @@ closed-loop: install  ## run the scenarios of the paper with learned detectors, 
 
 heat-maps: install  ## run the obstructed crossings over both speeds: reports/heat_maps/*.png
 	$(BIN)/python -m eidrive_scenario.reporting.heat_map --out reports/heat_maps
+
+library-pictures: install  ## draw the scenarios of the library: docs/library/*.png and the table in README.md
+	$(BIN)/python -m eidrive_scenario.reporting.library_pictures
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet

@@ -1,0 +1,124 @@
+"""Pictures of the scenarios of the library, and their table in README.md.
+
+`python -m eidrive_scenario.reporting.library_pictures` in the checkout runs each scenario once, and draws its actors
+and their paths from above.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import cv2
+import numpy as np
+import typer
+
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.files.atomic import create
+from eidrive_scenario.geometry import footprint
+from eidrive_scenario.library import LibraryScenario, describe_scenarios
+from eidrive_scenario.reporting.drawing.road_drawing import road_drawing
+from eidrive_scenario.reporting.drawing.run_picture import EGO, OTHER, SENDER, WALKER, Image, RunPaths, run_picture
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
+from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.world.road_objects import buildings
+
+BEGIN, END = "<!-- library: begin -->\n", "<!-- library: end -->\n"
+"""Lines of the README around the table."""
+FOLDER = "docs/library"
+"""Folder of the pictures in the checkout."""
+COLUMNS = 3
+"""Scenarios in a row of the table."""
+EGO_NAME = "Ego"
+"""Name of the ego in the scenarios of the library."""
+
+
+def picture(name: str, *, seed: int = 1) -> Image:
+    """Run a scenario of the library and return its picture."""
+    run = RunPaths()
+    with Simulation(name, seed=seed) as simulation:
+        frame, end = simulation.tick()
+        categories = dict(zip(frame.view.names, frame.view.categories, strict=True))
+        stations = set(frame.steps)
+        while end is None:
+            run.add(frame.view.names, frame.view.plain_boxes)
+            frame, end = simulation.tick()
+        entities, roads = simulation.scenario.entities, simulation.roads
+    colors = {
+        entity: SENDER if entity in stations else WALKER if categories.get(entity) == "pedestrian" else OTHER
+        for entity in entities
+        if entity != EGO_NAME
+    }
+    if roads is None:
+        return run_picture(run, RoadDrawing(), (), {**colors, EGO_NAME: EGO})
+    houses = [
+        footprint(np.array([*house.center, *house.size, house.yaw])) for house in buildings(roads, without=entities)
+    ]
+    return run_picture(run, road_drawing(roads.roads.values()), houses, {**colors, EGO_NAME: EGO})
+
+
+def file_name(scenario: LibraryScenario) -> str:
+    """Return the name of the file of a picture."""
+    return scenario.name.replace("/", "_") + ".png"
+
+
+def table(scenarios: Sequence[LibraryScenario]) -> str:
+    """Return the table of the scenarios with their pictures, one heading per family."""
+    lines: list[str] = []
+    for family in dict.fromkeys(scenario.family for scenario in scenarios):
+        members = [scenario for scenario in scenarios if scenario.family == family]
+        lines += [f"### `xosc/{family}`", "", "<table>"]
+        for first in range(0, len(members), COLUMNS):
+            cells = "".join(
+                f'<td width="{100 // COLUMNS}%"><img src="{FOLDER}/{file_name(each)}" alt="{escape(each.name)}"><br>'
+                f"<code>{escape(each.name)}</code>: {escape(each.description)}</td>\n"
+                for each in members[first : first + COLUMNS]
+            )
+            lines.append(f"<tr>\n{cells}</tr>")
+        lines += ["</table>", ""]
+    return "\n".join(lines)
+
+
+def with_table(readme: str, scenarios: Sequence[LibraryScenario]) -> str:
+    """Return the README with the current table. Raise SettingError if the lines around the table are missing."""
+    before, begin, rest = readme.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise SettingError(Diagnostic(f"the lines {BEGIN.strip()} and {END.strip()} are missing", "", "README.md"))
+    return f"{before}{BEGIN}\n{table(scenarios)}\n{END}{after}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the pictures and the table. Return 0, or 2 if an input is invalid or a file cannot be written."""
+    parser = argparse.ArgumentParser(description="Draw the scenarios of the library, and update their table.")
+    parser.add_argument("names", nargs="*", help="scenarios to draw, such as coop/scenario_1 (default: all)")
+    parser.add_argument("--root", type=Path, default=Path(), help="folder with README.md")
+    options = parser.parse_args(arguments)
+    scenarios = describe_scenarios()
+    unknown = set(options.names) - {scenario.name for scenario in scenarios}
+    if unknown:
+        parser.error(f"no scenario {min(unknown)!r} in the library")
+    try:
+        for scenario in scenarios:
+            if options.names and scenario.name not in options.names:
+                continue
+            path = options.root / FOLDER / file_name(scenario)
+            _, encoded = cv2.imencode(".png", picture(scenario.name), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+            with create(path) as stream:
+                stream.write(encoded.tobytes())
+            typer.echo(f"wrote {path}")
+        readme = options.root / "README.md"
+        text = with_table(readme.read_text(encoding="utf-8"), scenarios)
+        with create(readme) as stream:
+            stream.write(text.encode())
+    except (InputError, OSError) as error:
+        typer.echo(str(error), err=True)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
