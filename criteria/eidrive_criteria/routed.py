@@ -38,6 +38,7 @@ class RouteCriterion(FollowedCriterion):
     def __init__(self, settings: RouteSettings) -> None:
         super().__init__(settings, settings.of)
         self._given = settings.route
+        self.needs_route = settings.route is None
         self.route: RouteProgress | None = None
         if self._given is not None:
             self.route = RouteProgress(route_through(self._given, None))

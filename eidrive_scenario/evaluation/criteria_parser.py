@@ -64,6 +64,7 @@ def parse_criteria(
     monitors: Collection[str] | None = None,
     scope: Scope | None = None,
     has_roads: bool = True,
+    has_routes: bool = True,
 ) -> tuple[CriterionDeclaration, ...]:
     """Return the criteria that the text of a command declares, in its order.
 
@@ -71,6 +72,7 @@ def parse_criteria(
     monitors  names of the monitors of the scenario; None: the monitors of the criteria are not checked
     scope     parameters to which settings refer as `$name` or `${expression}`
     has_roads  whether the scenario has roads
+    has_routes  whether the scenario requests a route of an actor
 
     Raise SettingError with file and line of every error.
     """
@@ -85,6 +87,7 @@ def parse_criteria(
         monitors=monitors,
         scope=scope,
         has_roads=has_roads,
+        has_routes=has_routes,
         command=CRITERION,
         shown=repr(text.strip()),
     )
@@ -100,6 +103,7 @@ def declare_criteria(
     monitors: Collection[str] | None = None,
     scope: Scope | None = None,
     has_roads: bool = True,
+    has_routes: bool = True,
     command: str = "",
     shown: str = "",
 ) -> tuple[CriterionDeclaration, ...]:
@@ -126,6 +130,7 @@ def declare_criteria(
             _check_known(criterion, criterion.subjects, "entity", entities, source, here)
             _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
             _check_roads(criterion, has_roads, source, here)
+            _check_routes(criterion, has_routes, source, here)
         except SettingError as error:
             diagnostics.extend(error.diagnostics)
             continue
@@ -208,6 +213,13 @@ def _check_roads(criterion: Criterion, has_roads: bool, source: str, line: int |
     if criterion.needs_roads and not has_roads:
         message = f"criterion {criterion.name!r} requires roads, and the scenario has none"
         raise SettingError(Diagnostic(message, "add a LogicFile to its RoadNetwork", source, line))
+
+
+def _check_routes(criterion: Criterion, has_routes: bool, source: str, line: int | None) -> None:
+    if criterion.needs_route and not has_routes:
+        message = f"criterion {criterion.name!r} evaluates a route, and the scenario requests none"
+        hint = "add an AssignRouteAction or an AcquirePositionAction, or give the points of the setting 'route'"
+        raise SettingError(Diagnostic(message, hint, source, line))
 
 
 def _free_name(name: str, taken: Collection[str]) -> str:

@@ -63,6 +63,9 @@ class Criterion(ABC):
     """Whether it fails an actor that never drives on. A class or an instance sets it, by its settings."""
     needs_roads: ClassVar[bool] = False
     """Whether the criterion requires roads; a scenario without roads is then an error before the run."""
+    needs_route: bool = False
+    """Whether it evaluates the route that the scenario requests; a scenario that requests none is then an error before
+    the run."""
     roads: RoadNetwork | None = None
     """Roads of the scenario, None without roads. Set by `bind` before the first frame."""
 

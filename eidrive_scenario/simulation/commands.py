@@ -6,6 +6,7 @@ Errors in late events are thus reported at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, SettingError, quoted, suggestion
@@ -18,15 +19,23 @@ from eidrive_scenario.evaluation.criteria_parser import (
 from eidrive_scenario.files.yaml_sources import read_yaml_source
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import CustomCommandAction
+from eidrive_scenario.openscenario.model import (
+    AcquirePositionAction,
+    AssignRouteAction,
+    CustomCommandAction,
+    RandomRouteAction,
+)
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import drawn_parameters
+from eidrive_scenario.registry import registry
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 from eidrive_scenario.v2x.profile import ChannelProfile, load_profile
 
 PREFIX = "eidrive."
 CHANNEL = "eidrive.channel"
 CRITERION_OPTION = "--criterion"
+ROUTING = (AcquirePositionAction, AssignRouteAction, RandomRouteAction)
+"""Actions that request a route."""
 
 CommandKey = tuple[str, str, int | None, int]
 DeclaredCriteria = Mapping[CommandKey, tuple[CriterionDeclaration, ...]]
@@ -47,6 +56,7 @@ def channel_profile(command: CustomCommandAction) -> ChannelProfile | None:
 def check_commands(scenario: Scenario) -> DeclaredCriteria:
     """Parse all commands of this project and return the declared criteria. Raise ScenarioError with all diagnostics."""
     criteria: dict[CommandKey, tuple[CriterionDeclaration, ...]] = {}
+    has_routes = cache(lambda: _requests_routes(scenario))
 
     def read_criteria(command: CustomCommandAction) -> None:
         criteria[command_key(command)] = parse_criteria(
@@ -57,6 +67,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
             monitors=_monitors(scenario),
             scope=command.scope,
             has_roads=scenario.road_file is not None,
+            has_routes=has_routes(),
         )
 
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
@@ -88,6 +99,7 @@ def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> t
     Raise SettingError with all diagnostics.
     """
     found: list[CriterionDeclaration] = []
+    has_routes = cache(lambda: _requests_routes(scenario))
     diagnostics: list[Diagnostic] = []
     for source in sources:
         try:
@@ -100,6 +112,7 @@ def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> t
                 monitors=_monitors(scenario),
                 scope=scenario.scope,
                 has_roads=scenario.road_file is not None,
+                has_routes=has_routes(),
                 shown=quoted(content.data),
             )
         except InputError as error:
@@ -107,6 +120,16 @@ def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> t
     if diagnostics:
         raise SettingError(list(dict.fromkeys(diagnostics)))
     return tuple(found)
+
+
+def _requests_routes(scenario: Scenario) -> bool:
+    """Whether an action of the scenario, or of an extension, may request a route."""
+    own = registry("actions")
+    return any(
+        isinstance(element, ROUTING) or (isinstance(element, CustomCommandAction) and element.type in own)
+        for tree in (scenario.document, *scenario.entries.values())
+        for element in tree.walk()
+    )
 
 
 def _monitors(scenario: Scenario) -> list[str]:

@@ -19,7 +19,7 @@ ROAD_RULES: tuple[Rule[RoadLintContext], ...] = (
     Rule("unknown-lane", Level.WARNING, "a lane change to a lane that no road has", positions.unknown_lanes),
     Rule("unknown-signal", Level.WARNING, "a traffic signal that no road has", positions.unknown_signals),
     Rule("trajectory-off-road", Level.WARNING, "a trajectory that leaves the road", paths.trajectories_off_road),
-    Rule("waypoint-off-road", Level.WARNING, "a waypoint outside the road", paths.waypoints_off_road),
+    Rule("waypoint-off-road", Level.WARNING, "a waypoint or a destination outside the road", paths.waypoints_off_road),
     Rule("conflict-area-off-road", Level.WARNING, "a conflict area outside the road", stations.conflict_areas_off_road),
 )
 """Rules that need a scenario and its road network."""

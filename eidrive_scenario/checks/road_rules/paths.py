@@ -9,6 +9,7 @@ from eidrive_scenario.checks.road_rules.context import RoadLintContext
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.openscenario.model import (
+    AcquirePositionAction,
     AssignRouteAction,
     FollowTrajectoryAction,
     Position,
@@ -16,6 +17,7 @@ from eidrive_scenario.openscenario.model import (
     RouteRef,
     Trajectory,
     Vehicle,
+    Waypoint,
 )
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.route import build_route
@@ -85,16 +87,18 @@ def _curve(context: RoadLintContext, trajectory: Trajectory) -> TrajectoryCurve 
 
 
 def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """Yield waypoints outside of the road."""
+    """Yield waypoints and destinations outside of the road."""
     if context.roads is None:
         return
-    for route in _routes(context):
-        for waypoint in route.waypoint:
-            if id(waypoint.position) in context.unresolved or (place := context.place(waypoint.position)) is None:
-                continue
-            gap = context.outside([place.pose.x], [place.pose.y])[0]
-            if gap > MARGIN:
-                yield at(waypoint, f"the waypoint is {gap:.1f} m outside the road", "move it onto a lane")
+    waypoints: list[Waypoint | AcquirePositionAction] = [one for route in _routes(context) for one in route.waypoint]
+    waypoints += [element for element in context.elements if isinstance(element, AcquirePositionAction)]
+    for waypoint in waypoints:
+        if id(waypoint.position) in context.unresolved or (place := context.place(waypoint.position)) is None:
+            continue
+        gap = context.outside([place.pose.x], [place.pose.y])[0]
+        if gap > MARGIN:
+            what = "waypoint" if isinstance(waypoint, Waypoint) else "destination"
+            yield at(waypoint, f"the {what} is {gap:.1f} m outside the road", "move it onto a lane")
 
 
 def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:

@@ -120,6 +120,17 @@ def test_criterion_that_requires_roads_is_an_error_without_them(monkeypatch: pyt
         evaluate_criteria([], [criterion])
 
 
+@pytest.mark.parametrize("kind", ["in_route", "route_completion"])
+def test_criterion_on_a_route_is_an_error_without_any(kind: str) -> None:
+    (error,) = diagnostics(f"{kind}: {{of: Ego}}", has_routes=False)
+    assert error == (
+        f"a.xosc:10: criterion '{kind}' evaluates a route, and the scenario requests none; add an AssignRouteAction or "
+        "an AcquirePositionAction, or give the points of the setting 'route'"
+    )
+    assert parse(f"{kind}: {{of: Ego, route: [[0, 0], [9, 0]]}}", has_routes=False)
+    assert parse(f"{kind}: {{of: Ego}}")
+
+
 def test_criterion_of_unknown_monitor_is_reported() -> None:
     known = {"entities": ["Ego", "Incoming"], "monitors": ["CutIn"]}
     assert diagnostics("monitor: {of: CutInn}", **known) == [

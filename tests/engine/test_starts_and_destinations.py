@@ -1,4 +1,4 @@
-"""Vehicles that start inside of another body or off the road: errors before the run."""
+"""Starts inside of another body or off the road, and missing destinations: errors before the run."""
 
 from __future__ import annotations
 
@@ -127,3 +127,29 @@ def test_selection_that_is_placed_as_a_whole_has_the_line_of_its_action(tmp_path
     path.write_text(text.replace('<Private entityRef="Ego">', '<Private entityRef="Both">'))
     (error,) = errors(path)
     assert error.startswith(f"{path}:{line_of(path, 'Both')}: {INSIDE}")
+
+
+def test_destination_off_the_road_is_a_warning_of_the_check(tmp_path: Path) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20))
+    acquire = "<RoutingAction><AcquirePositionAction>\n<Position><WorldPosition x='50' y='-107'/></Position>"
+    acquire += "</AcquirePositionAction></RoutingAction></PrivateAction></Private>"
+    text = path.read_text().replace("</PrivateAction></Private>", f"</PrivateAction><PrivateAction>{acquire}", 1)
+    path.write_text(text)
+    found = [str(one) for one in check_scenario(path).warnings if one.rule == "waypoint-off-road"]
+    assert len(found) == 1
+    assert "the destination is 100.0 m outside the road; move it onto a lane" in found[0]
+
+
+def test_route_criterion_of_a_scenario_with_a_destination(tmp_path: Path) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20))
+    criterion = {"route_completion": {"of": "Ego"}}
+    assert errors(path, criteria=criterion)[0].startswith("--criterion: criterion 'route_completion' evaluates a route")
+    acquire = f"<AcquirePositionAction><Position>{lane_position_xml(-1, 90)}</Position></AcquirePositionAction>"
+    text = path.read_text().replace(
+        "</PrivateAction></Private>",
+        f"</PrivateAction><PrivateAction><RoutingAction>{acquire}</RoutingAction></PrivateAction></Private>",
+        1,
+    )
+    path.write_text(text)
+    (verdict,) = run_file(path, settings=RunSettings(criteria=criterion)).criteria
+    assert verdict.value == pytest.approx(1.4 / 70.0), "the center is 1.4 m ahead of the reference point"
