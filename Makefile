@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop heat-maps library-pictures weather-sheet clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners heat-maps library-pictures weather-sheet clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -54,6 +54,9 @@ heat-maps: install  ## run the obstructed crossings over both speeds: reports/he
 
 library-pictures: install  ## draw the scenarios of the library: docs/library/*.png and the table in README.md
 	$(BIN)/python -m eidrive_scenario.reporting.library_pictures
+
+planners: install  ## run the scenes for planners with two planners, 10 seeds each: reports/planner_scenes.md
+	$(BIN)/python -m eidrive_scenario.experiments.planner_scenes --out reports
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet

@@ -61,6 +61,35 @@ def _overlaps(body: Sequence[float], other: Sequence[float]) -> tuple[float, flo
     return along, across
 
 
+def approached_side(before: WorldView, of: str, other: str) -> Side | None:
+    """Return the face of `of` towards which `other` moves, in the frame before the contact.
+
+    None if they do not approach each other there.
+
+    It is the face across whose axis the bodies are separated the longest. The point of contact does not tell it: two
+    faces that touch are reported by a corner, and the bodies move on until the end of the time step.
+    """
+    body, there = before.plain_boxes[before.rows[of]], before.plain_boxes[before.rows[other]]
+    own, their = before.states[before.rows[of]], before.states[before.rows[other]]
+    cos, sin = math.cos(body[6]), math.sin(body[6])
+    dx, dy = there[0] - body[0], there[1] - body[1]
+    vx, vy = their.velocity_x - own.velocity_x, their.velocity_y - own.velocity_y
+    turn = there[6] - body[6]
+    along = abs(math.cos(turn)) * there[3] + abs(math.sin(turn)) * there[4]
+    across = abs(math.sin(turn)) * there[3] + abs(math.cos(turn)) * there[4]
+    ways: tuple[tuple[float, float, float, tuple[Side, Side]], ...] = (
+        (cos * dx + sin * dy, cos * vx + sin * vy, (body[3] + along) / 2.0, ("front", "rear")),
+        (cos * dy - sin * dx, cos * vy - sin * vx, (body[4] + across) / 2.0, ("left", "right")),
+    )
+    longest, found = 0.0, None
+    for offset, speed, reach, (positive, negative) in ways:
+        gap, closing = abs(offset) - reach, -math.copysign(speed, offset * speed)
+        time = gap / closing if closing > 0.0 else 0.0
+        if time > longest:
+            longest, found = time, positive if offset > 0.0 else negative
+    return found
+
+
 def judge_impact(
     view: WorldView, before: WorldView | None, of: str, other: str, x: float, y: float, lanes: LaneTracker | None
 ) -> Impact:
@@ -71,7 +100,10 @@ def judge_impact(
     """
     row = view.rows[of]
     partner = view.plain_boxes[view.rows[other]] if other in view.rows else None
-    side = side_of(view.plain_boxes[row], x, y, partner)
+    side = None
+    if before is not None and of in before.rows and other in before.rows:
+        side = approached_side(before, of, other)
+    side = side or side_of(view.plain_boxes[row], x, y, partner)
     if _speed(view, before, of) <= STOPPED:
         return Impact(side, False, "it had stopped")
     if other not in view.rows or _speed(view, before, other) <= STOPPED:

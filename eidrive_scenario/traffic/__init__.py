@@ -1,8 +1,8 @@
 """Background traffic."""
 
+from eidrive_scenario.car_following import IntelligentDriver
 from eidrive_scenario.traffic.background import BackgroundTraffic
 from eidrive_scenario.traffic.fleet import Fleet
-from eidrive_scenario.traffic.idm import IntelligentDriver
 from eidrive_scenario.traffic.mobil import LaneChanger
 from eidrive_scenario.traffic.spawning.areas import Cursor, Stretch, polygon, road_range, stretches_cover
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.car_following import Drivers, IntelligentDriver, ballistic
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.traffic.cars import Cars
 from eidrive_scenario.traffic.crossings import Crossings
-from eidrive_scenario.traffic.idm import Drivers, IntelligentDriver, ballistic
 from eidrive_scenario.traffic.lane_changes import DECIDE_EACH, LaneChanges
 from eidrive_scenario.traffic.lanes import FREE, TrafficLanes
 from eidrive_scenario.traffic.leaders import Leaders, Occupants

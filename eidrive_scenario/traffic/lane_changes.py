@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.car_following import Drivers, IntelligentDriver
 from eidrive_scenario.traffic.cars import PLANNED, Cars
-from eidrive_scenario.traffic.idm import Drivers, IntelligentDriver
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, Occupants, find_followers, find_leaders
 from eidrive_scenario.traffic.mobil import LaneChanger, Prospect, incentive, safe

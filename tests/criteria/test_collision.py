@@ -1,5 +1,6 @@
 """Criterion `collision`: actors, time, position and speed of contacts."""
 
+import math
 from typing import Any
 
 import pytest
@@ -121,3 +122,27 @@ def test_collision_with_a_wall_is_a_fault(frame: Any, car: Any) -> None:
     collision = criterion()
     evaluate_criteria([frame(0.0, {"Ego": car(0, speed=5.0)}, [Contact("Ego", "Wall", (2, 0, 0), 5.0)])], [collision])
     assert collision.metrics()["collision.at_fault"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("own_speed", "place", "heading", "speed", "side"),
+    [
+        (0.1, (4.0, 0.0), 180.0, 5.0, "front"),
+        (0.1, (-4.0, 0.0), 0.0, 5.0, "rear"),
+        (0.1, (0.0, 2.4), -90.0, 3.0, "left"),
+        (0.1, (0.0, -2.4), 90.0, 3.0, "right"),
+        (1.0, (3.75, 2.3), -90.0, 8.0, "front"),
+        (8.0, (3.75, 2.3), -90.0, 1.0, "left"),
+    ],
+)
+def test_side_of_a_corner_contact_is_that_of_the_approach(
+    frame: Any, car: Any, own_speed: float, place: tuple[float, float], heading: float, speed: float, side: str
+) -> None:
+    # Faces that touch are reported by a corner, which lies on two faces. The bodies are 4.5 m by 1.8 m and 2 m by 2 m.
+    # In the last two cases the gaps are 0.5 m and 0.4 m: the side is that of the gap which closes last.
+    sizes = {"Ego": (4.5, 1.8, 1.5), "Other": (2.0, 2.0, 1.5)}
+    cars = {"Ego": car(0.0, speed=own_speed), "Other": car(*place, math.radians(heading), speed)}
+    touch = Contact("Ego", "Other", (2.25, 0.9, 0.5), 5.0)
+    frames = [frame(0.0, cars, sizes=sizes), frame(0.05, cars, [touch], sizes=sizes)]
+    (verdict,) = evaluate_criteria(frames, [criterion()])
+    assert f"Ego with its {side}," in verdict.reason

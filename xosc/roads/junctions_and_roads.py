@@ -10,7 +10,7 @@ import math
 from eidrive_scenario.roads.model import curves
 from xosc.roads.crossings import Crossing
 from xosc.roads.layout import Arm, Junction, Layout, Piece, Road, Section, Way, movement
-from xosc.roads.streets import ARTERIAL, LOCAL_STREET, MOTORWAY_LANE, PLAIN_STREET, RING, motorway
+from xosc.roads.streets import ARTERIAL, COUNTRY_ROAD, LOCAL_STREET, MOTORWAY_LANE, PLAIN_STREET, RING, motorway
 
 QUARTER = math.pi / 2
 
@@ -19,6 +19,14 @@ def four_lane_road() -> Layout:
     """Road with two lanes per direction and a bend of 200 m radius to the left."""
     bend = (Piece(200.0), Piece(40.0, 0.0, 1 / 200), Piece(100.0, 1 / 200), Piece(40.0, 1 / 200, 0.0), Piece(200.0))
     return Layout("four_lane_road", (Road("1", "road", (Section(0.0, ARTERIAL),), -60.0, 5.25, 0.0, bend),))
+
+
+def winding_road() -> Layout:
+    """Road with one lane per direction and an S-bend of 50 m radius."""
+    left = (Piece(20.0, 0.0, 1 / 50), Piece(40.0, 1 / 50), Piece(20.0, 1 / 50, 0.0))
+    right = (Piece(20.0, 0.0, -1 / 50), Piece(40.0, -1 / 50), Piece(20.0, -1 / 50, 0.0))
+    pieces = (Piece(120.0), *left, *right, Piece(200.0))
+    return Layout("winding_road", (Road("1", "road", (Section(0.0, COUNTRY_ROAD),), -80.0, 2.0, 0.0, pieces),))
 
 
 def motorway_with_on_ramp() -> Layout:
@@ -94,6 +102,7 @@ FOUR_WAY_JUNCTION = Crossing(
 
 JUNCTIONS_AND_ROADS: tuple[Layout, ...] = (
     four_lane_road(),
+    winding_road(),
     motorway_with_on_ramp(),
     roundabout(),
     FOUR_WAY_SIGNALS.layout(),

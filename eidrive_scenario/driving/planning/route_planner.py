@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -29,8 +30,6 @@ STRIDE = 10
 """Number of lane points that are computed in one step on a continuous lane."""
 TURNS = 50.0
 """Maximum length of a road that may lead into itself within a stride [m]."""
-MAX_LATERAL_OFFSET = 2.5
-"""Distance from the followed lane above which the vehicle was teleported, and its lane is located again [m]."""
 BEHIND = 5
 """Number of points behind the vehicle that are kept when the path is extended."""
 
@@ -42,6 +41,9 @@ class RoutePlanner(Planner):
     road. Outside roads, waypoints are connected by a smooth curve. Objects are ignored. With `obey_signals` the vehicle
     stops at red lights and stop signs in sight. Raise RouteError if no road leads to a waypoint.
     """
+
+    max_lateral_offset: ClassVar[float] = 2.5
+    """Distance from the followed lane above which the vehicle was teleported, and its lane is located again [m]."""
 
     def __init__(
         self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int
@@ -63,17 +65,7 @@ class RoutePlanner(Planner):
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
-        path = self._current_path(x, y, ego.yaw, goal)
-        self._progress = path.project(x, y, self._progress)
-        if self._way[0] is None and self._way[1] is None and path.distance(x, y, self._progress) > MAX_LATERAL_OFFSET:
-            self._lane = []
-            path = self._path = self._lane_ahead(x, y, ego.yaw)
-            self._progress = path.project(x, y)
-        if not path.ends and len(path) - self._progress < 2 * HORIZON:
-            behind = path.points[max(self._progress - BEHIND, 0) :]
-            lap = self._way[2]
-            path = self._path = self._lane_ahead(x, y, ego.yaw) if lap is None else _with_laps(behind, lap)
-            self._progress = path.project(x, y)
+        path = self._advanced_path(x, y, ego.yaw, goal)
         part = slice(self._progress, self._progress + HORIZON)
         target = self._target_speed(ego, goal)
         speeds = np.minimum(path.limits[part], target)
@@ -86,6 +78,25 @@ class RoutePlanner(Planner):
                 speeds, free, reason = np.minimum(speeds, held), False, stop.reason
         acceleration = goal.acceleration if goal is not None and free else 0.0
         return Plan(path.points[part], speeds, reason, acceleration)
+
+    def _advanced_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> PlannedPath:
+        """Return the path of the goal after setting the progress of the vehicle on it; extended where it continues."""
+        path = self._current_path(x, y, yaw, goal)
+        self._progress = path.project(x, y, self._progress)
+        if (
+            self._way[0] is None
+            and self._way[1] is None
+            and path.distance(x, y, self._progress) > self.max_lateral_offset
+        ):
+            self._lane = []
+            path = self._path = self._lane_ahead(x, y, yaw)
+            self._progress = path.project(x, y)
+        if not path.ends and len(path) - self._progress < 2 * HORIZON:
+            behind = path.points[max(self._progress - BEHIND, 0) :]
+            lap = self._way[2]
+            path = self._path = self._lane_ahead(x, y, yaw) if lap is None else _with_laps(behind, lap)
+            self._progress = path.project(x, y)
+        return path
 
     def _stop(self, path: PlannedPath, ego: EgoState, x: float, y: float, now: float) -> StopPoint | None:
         """Return the stop point of the next traffic light or stop sign, or None."""

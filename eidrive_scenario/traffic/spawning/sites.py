@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.car_following import Drivers
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.roads import LaneLocation
 from eidrive_scenario.traffic.cars import PLANNED
 from eidrive_scenario.traffic.fleet import Fleet
-from eidrive_scenario.traffic.idm import Drivers
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FOREIGN, find_followers, find_leaders
 from eidrive_scenario.traffic.spawning.bodies import Participant

@@ -8,6 +8,7 @@ import numpy as np
 from fleet_scene import car, street, view_of
 from msgspec.structs import replace
 
+from eidrive_scenario.car_following import IntelligentDriver
 from eidrive_scenario.traffic import (
     BackgroundTraffic,
     Changes,
@@ -15,7 +16,6 @@ from eidrive_scenario.traffic import (
     Population,
     Swarm,
 )
-from eidrive_scenario.traffic.idm import IntelligentDriver
 from eidrive_scenario.traffic.spawning.bodies import TrafficMix
 from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 from eidrive_scenario.traffic.spawning.population import CentralObject

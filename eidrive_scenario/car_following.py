@@ -74,13 +74,21 @@ class Drivers:
 
     def response(self, speed: Array, desired_speed: Array, gap: Array, approach: Array) -> Array:
         """Return `IntelligentDriver.response` with the parameters of each driver."""
-        time_gap, standstill_gap, acceleration, deceleration, exponent, emergency, _ = self.table.T
+        found = self.free(speed, desired_speed) - self.interaction(speed, gap, approach)
+        return np.asarray(np.maximum(found, -self.table[:, 5]))
+
+    def free(self, speed: Array, desired_speed: Array) -> Array:
+        """Return the accelerations (N,) on a free road [m/s²]."""
+        _, _, acceleration, deceleration, exponent, _, _ = self.table.T
+        free = acceleration * (1.0 - (speed / np.maximum(desired_speed, 1e-3)) ** exponent)
+        return np.asarray(np.maximum(free, -ABOVE_DESIRED * deceleration))
+
+    def interaction(self, speed: Array, gap: Array, approach: Array) -> Array:
+        """Return the decelerations (N,) due to the leaders, without the limit of the brakes [m/s²]."""
+        time_gap, standstill_gap, acceleration, deceleration, _, _, _ = self.table.T
         braking = speed * approach / (2.0 * np.sqrt(acceleration * deceleration))
         desired_gap = standstill_gap + np.maximum(0.0, speed * time_gap + braking)
-        free = acceleration * (1.0 - (speed / np.maximum(desired_speed, 1e-3)) ** exponent)
-        free = np.maximum(free, -ABOVE_DESIRED * deceleration)
-        found = free - acceleration * (desired_gap / np.maximum(gap, 1e-3)) ** 2
-        return np.asarray(np.maximum(found, -emergency))
+        return np.asarray(acceleration * (desired_gap / np.maximum(gap, 1e-3)) ** 2)
 
     @property
     def standstill_gap(self) -> Array:

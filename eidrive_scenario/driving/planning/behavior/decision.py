@@ -1,0 +1,300 @@
+"""Decision between proposals: lateral maneuvers, and the emergency brake as the last resort."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, towards
+from eidrive_scenario.driving.planning.behavior.maneuvers import passing_profiles
+from eidrive_scenario.driving.planning.behavior.oncoming import ONCOMING_SPEED, OncomingTraffic
+from eidrive_scenario.driving.planning.behavior.options import Options
+from eidrive_scenario.driving.planning.behavior.proposals import (
+    Conflict,
+    Proposal,
+    Wall,
+    conflicts,
+    crossing_walls,
+    inside_way,
+    proposals_for,
+)
+from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
+from eidrive_scenario.driving.planning.behavior.scoring import evaluate
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.situation import Situation
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, surroundings
+from eidrive_scenario.world.actor import ActorSpec
+
+ROUTE = "route"
+"""Name of the maneuver without a lateral deviation."""
+OFF_PROFILE = 0.8
+"""Distance from the current profile above which the vehicle starts a new one from its position [m]."""
+SATISFIED = 0.85
+"""Share of the wanted progress from which on no other maneuver is considered."""
+DWELL = 2.0
+"""Time for which a maneuver is kept unless it becomes risky [s]."""
+URGENT = 4.0
+"""Time before a collision at which the emergency brake may act [s]."""
+
+
+VIEWED = 10.0
+"""Distance ahead at which the oncoming lane is determined [m]."""
+HARDER = 0.3
+"""Difference to a comfortable deceleration from which on braking is hard [m/s²]."""
+
+
+class Decision(msgspec.Struct, frozen=True):
+    """Chosen proposal: profile, motion along the line s and speed (K,) [m, m/s], and the reason.
+
+    acceleration  of the first step [m/s²];  braking  deceleration of an emergency [m/s²], or None
+    objects       rows of the fused objects that are the reason
+    """
+
+    profile: LateralProfile
+    s: Array
+    speed: Array
+    acceleration: float
+    braking: float | None
+    reason: str
+    objects: tuple[int, ...]
+
+
+class Decider:
+    """Decisions of one vehicle; it keeps the current maneuver."""
+
+    def __init__(self, settings: BehaviorSettings, spec: ActorSpec, times: Array, view: float) -> None:
+        self._settings = settings
+        self._times = times
+        self._roller = Roller(settings, times)
+        self._center = spec.offset[0]
+        self._half_length, self._half_width = spec.size[0] / 2.0, spec.size[1] / 2.0
+        self._front = self._center + self._half_length
+        self._body = Body(self._front, self._half_length - self._center, spec.wheelbase, self._half_width)
+        self._emergency = min(settings.emergency_deceleration, spec.max_deceleration)
+        self._current: LateralProfile | None = None
+        self._switched = -math.inf
+        self._oncoming = OncomingTraffic(view)
+
+    def line_changed(self, shift: float | None) -> None:
+        """Move the current maneuver to another line.
+
+        shift  increase of the distances along the line [m]; None if the maneuver ends because the lines differ
+        """
+        current = self._current
+        if current is None or shift is None:
+            self._current = None
+        else:
+            places = tuple(place + shift for place in current.places)
+            self._current = msgspec.structs.replace(current, places=places)
+
+    def decide(self, situation: Situation) -> Decision:
+        """Return the best proposal."""
+        settings = self._settings
+        body = (situation.s + self._center, situation.d, self._half_length, self._half_width)
+        scene = surroundings(situation.objects, situation.prediction, situation.line, situation.window, settings, body)
+        current = self._continued(situation)
+        profiles = [current]
+        if current.name != ROUTE or abs(current.last) > 0.05:
+            profiles.append(self._towards(situation, ROUTE, 0.0))
+        options = self._options(situation, scene, profiles)
+        best = int(np.argmax(options.evaluation.score))
+        held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
+        self._oncoming.observe(scene, body[0], situation.now, held_up=held_up)
+        if held_up:
+            more = passing_profiles(situation, scene, settings, self._body)
+            if more:
+                beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
+                hidden = self._oncoming.first_hidden(scene, beside, body[:2], situation.now)
+                options = options.extend(self._options(situation, scene, more, hidden=hidden))
+                best = int(np.argmax(options.evaluation.score))
+        best = self._kept(options, best, situation.now)
+        threat = -1 if bool(scene.certain.all()) else self._uncertain_threat(scene, options, best)
+        if threat >= 0:
+            return self._without_hard_braking(situation, scene, options, threat)
+        return self._decision(situation, options, best)
+
+    def _uncertain_threat(self, scene: Surroundings, options: Options, best: int) -> int:
+        """Return the hypothesis of an object of uncertain existence for which the vehicle would brake hard; or -1."""
+        brakes_hard = self._acceleration(options, best) < -self._settings.comfortable_deceleration - HARDER
+        collides = float(options.evaluation.collision[best]) < URGENT
+        if not (brakes_hard or collides):
+            return -1
+        gentle = options.gentle
+        causes = [options.evaluation.cause[best], options.evaluation.cause[gentle], *options.rolled.cause[best]]
+        for cause in causes:
+            row = int(cause)
+            if row <= WALL:
+                owner = options.walls[best][WALL - row].owner
+                row = -1 if owner is None else owner
+            if row >= 0 and not scene.certain[row]:
+                return row
+        return -1
+
+    def _without_hard_braking(
+        self, situation: Situation, scene: Surroundings, options: Options, threat: int
+    ) -> Decision:
+        """Return the decision if a hypothesis of uncertain existence is no reason for more than a gentle stop."""
+        certain = self._options(situation, _only_certain(scene), options.profiles[:1])
+        choice, stop = int(np.argmax(certain.evaluation.score)), certain.gentle
+        if self._acceleration(certain, choice) < self._acceleration(certain, stop):
+            return self._decision(situation, certain, choice)
+        owner = situation.prediction.objects[threat]
+        reason = f"slow down for a possible {situation.kind_of(owner)}"
+        decision = self._decision(situation, certain, stop)
+        return msgspec.structs.replace(decision, reason=reason, objects=situation.rows_of(owner))
+
+    def _acceleration(self, options: Options, row: int) -> float:
+        """Return the acceleration of a proposal in the first step [m/s²]."""
+        speed = options.rolled.speed[row]
+        return float(speed[1] - speed[0]) / float(self._times[1] - self._times[0])
+
+    def _continued(self, situation: Situation) -> LateralProfile:
+        """Return the current profile, or one that starts at the vehicle if there is none or it left its profile."""
+        current = self._current
+        s, d, _ = situation.steered
+        if current is not None and abs(current.offset_at(s) - d) <= OFF_PROFILE:
+            if current.last == 0.0 and s >= current.places[-1]:
+                return LateralProfile(ROUTE, (s,), (0.0,))
+            return current
+        return self._towards(situation, ROUTE, 0.0)
+
+    def _towards(self, situation: Situation, name: str, value: float) -> LateralProfile:
+        current = self._current
+        s, start, slope = situation.steered
+        if current is not None and abs(current.offset_at(s) - start) <= OFF_PROFILE:
+            start, slope = current.offset_at(s), current.slope_at(s)
+        if abs(start - value) < 0.02 and abs(slope) < 0.01:
+            return LateralProfile(name, (s,), (value,))
+        return towards(name, value, s, start, slope, situation.speed, self._settings.lateral_acceleration)
+
+    def _options(
+        self,
+        situation: Situation,
+        scene: Surroundings,
+        profiles: list[LateralProfile],
+        *,
+        hidden: float | None = None,
+    ) -> Options:
+        """Return the proposals along profiles, the first of which is the current one.
+
+        hidden  for new maneuvers instead: the place from which oncoming traffic may come unseen [m]
+        """
+        proposals: list[Proposal] = []
+        walls: list[list[Wall]] = []
+        leads: list[Bools] = []
+        for number, profile in enumerate(profiles):
+            way = inside_way(scene, profile, self._half_width)
+            found = conflicts(scene, way, situation.s)
+            reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
+            here = (self._front, situation.s, situation.speed)
+            made = proposals_for(
+                number, found, self._settings, emergency=self._emergency, is_current=hidden is None and number == 0
+            )
+            for proposal in made:
+                rows = crossing_walls(found, self._times, here, proposal.precedence, reasons)
+                walls.append([*rows, *([situation.stop] if situation.stop is not None else [])])
+                leads.append(_leads(scene, way, found, situation.s + self._center, proposal))
+            proposals += made
+        rolled = self._roller.roll(
+            proposals,
+            Course(situation.line.along, situation.limits, situation.wanted),
+            (situation.s, situation.speed),
+            (self._front, self._center),
+            scene,
+            np.array(leads).reshape(len(proposals), len(scene), len(self._times)),
+            walls,
+        )
+        current = self._current.name if self._current is not None else ROUTE
+        evaluation = evaluate(
+            proposals,
+            profiles,
+            rolled,
+            scene,
+            self._times,
+            self._body,
+            self._settings,
+            situation.wanted,
+            current,
+            math.inf if hidden is None else hidden,
+        )
+        return Options(profiles, proposals, walls, rolled, evaluation)
+
+    def _is_held_up(self, situation: Situation, options: Options, best: int) -> bool:
+        """Return whether the best proposal makes too little progress because of objects."""
+        if math.isfinite(options.evaluation.collision[best]):
+            return True
+        way = float(options.rolled.s[best, -1] - options.rolled.s[best, 0])
+        return way < SATISFIED * situation.free_progress(float(self._times[-1]), self._settings.acceleration)
+
+    def _kept(self, options: Options, best: int, now: float) -> int:
+        """Return the best proposal of the current maneuver during its dwell time, unless it is risky."""
+        if now - self._switched >= DWELL or self._current is None:
+            return best
+        name = self._current.name
+        same = [row for row, p in enumerate(options.proposals) if options.profiles[p.profile].name == name]
+        if not same:
+            return best
+        kept = max(same, key=lambda row: float(options.evaluation.score[row]))
+        return kept if not math.isfinite(options.evaluation.collision[kept]) else best
+
+    def _decision(self, situation: Situation, options: Options, best: int) -> Decision:
+        proposal = options.proposals[best]
+        profile = options.profiles[proposal.profile]
+        if self._current is None or profile.name != self._current.name:
+            self._switched = situation.now
+        self._current = profile
+        speed, s = options.rolled.speed[best], options.rolled.s[best]
+        acceleration = self._acceleration(options, best)
+        reason, objects = self._reason(situation, options, best)
+        braking = proposal.deceleration if proposal.is_emergency else None
+        return Decision(profile, s, speed, acceleration, braking, reason, objects)
+
+    def _reason(self, situation: Situation, options: Options, best: int) -> tuple[str, tuple[int, ...]]:
+        """Return the reason of a proposal, and the rows of its objects."""
+        proposal = options.proposals[best]
+        profile = options.profiles[proposal.profile]
+        threat = int(options.evaluation.cause[best])
+        owners = situation.prediction.objects
+        if proposal.is_emergency:
+            others = [row for row, other in enumerate(options.proposals) if not other.is_emergency]
+            threat = int(options.evaluation.cause[others[0]]) if others else threat
+            what = "" if threat < 0 else f": collision course with {situation.kind_of(owners[threat])}"
+            return f"emergency braking{what}", situation.rows_of(owners[threat] if threat >= 0 else None)
+        maneuver = "" if profile.name == ROUTE else f"{profile.name}; "
+        for cause in options.rolled.cause[best].tolist():
+            if cause >= 0:
+                return f"{maneuver}follow {situation.describe(owners[cause])}", situation.rows_of(owners[cause])
+            if cause <= WALL:
+                wall = options.walls[best][WALL - cause]
+                owner = None if wall.owner is None else owners[wall.owner]
+                return f"{maneuver}{wall.reason}", situation.rows_of(owner)
+        causes = options.rolled.cause[best].tolist()
+        if proposal.share < 1.0:
+            return f"{maneuver}slow down for traffic ahead", ()
+        if LIMIT in causes and causes[0] != FREE:
+            return f"{maneuver}curve or end of route ahead", ()
+        return f"{maneuver}keep speed", ()
+
+
+def _leads(scene: Surroundings, way: Bools, found: list[Conflict], center: float, proposal: Proposal) -> Bools:
+    """Return where hypotheses lead the vehicle (N, K): in its way and not crossing.
+
+    An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way.
+    """
+    leads = way & ~scene.crosses & ~scene.behind[:, None]
+    if proposal.precedence == "all":
+        for conflict in found:
+            row = conflict.hypothesis
+            is_oncoming = float(scene.speed[row, conflict.first]) < -ONCOMING_SPEED
+            if not conflict.crosses and not is_oncoming and float(scene.s[row, 0]) > center:
+                leads[row, : conflict.first] = True
+    return np.asarray(leads)
+
+
+def _only_certain(scene: Surroundings) -> Surroundings:
+    """Return the scene without objects of low existence probability, which neither lead nor collide."""
+    aside = np.where(scene.certain[:, None], scene.d, 1e3)
+    return msgspec.structs.replace(scene, d=aside)

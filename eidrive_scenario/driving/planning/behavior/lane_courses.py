@@ -1,0 +1,116 @@
+"""Courses of lanes ahead, over links and junctions, along which vehicles are predicted."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.roads.routing.movement import Branch
+
+SPACING = 2.0
+"""Distance between the points of a course [m]."""
+LENGTH = 180.0
+"""Minimum length of a course beyond its first lane, unless the lanes end [m]."""
+SIMILAR_TURN = 0.6
+"""Maximum difference of the turn of a branch to the smallest turn at which it is likely, too [rad]."""
+MOST = 4
+"""Maximum number of courses from one lane."""
+
+
+class Course(NamedTuple):
+    """Center line of a lane and its successors: points (M, 2) [m], distances along it (M,) [m]."""
+
+    points: Array
+    along: Array
+
+    def place(self, x: float, y: float) -> tuple[float, float, float]:
+        """Return the distance along the course, the offset to the left and the heading at the nearest point."""
+        gap = (self.points[:, 0] - x) ** 2 + (self.points[:, 1] - y) ** 2
+        index = min(int(np.argmin(gap)), len(gap) - 2)
+        (x0, y0), (x1, y1) = self.points[index].tolist(), self.points[index + 1].tolist()
+        length = math.hypot(x1 - x0, y1 - y0) or 1.0
+        ux, uy = (x1 - x0) / length, (y1 - y0) / length
+        ahead = (x - x0) * ux + (y - y0) * uy
+        return float(self.along[index]) + ahead, (y - y0) * ux - (x - x0) * uy, math.atan2(uy, ux)
+
+    def poses(self, along: Array, left: Array) -> tuple[Array, Array, Array]:
+        """Return x, y and heading (K,) at distances along the course and offsets to the left; straight beyond it."""
+        index = np.clip(np.searchsorted(self.along, along, side="right") - 1, 0, len(self.along) - 2)
+        start, step = self.points[index], self.points[index + 1] - self.points[index]
+        unit = step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
+        ahead = along - self.along[index]
+        x = start[:, 0] + ahead * unit[:, 0] - left * unit[:, 1]
+        y = start[:, 1] + ahead * unit[:, 1] + left * unit[:, 0]
+        return x, y, np.arctan2(unit[:, 1], unit[:, 0])
+
+
+class LaneCourses:
+    """Courses of all lanes of a road network, computed when they are first needed."""
+
+    def __init__(self, roads: RoadNetwork) -> None:
+        self._roads = roads
+        self._courses: dict[int, tuple[Course, ...]] = {}
+        self._keys = [key for key, _ in roads.tables.lane_keys()]
+
+    def ahead(self, row: int) -> tuple[Course, ...]:
+        """Return the likely courses from the start of a lane (running number), in its driving direction."""
+        found = self._courses.get(row)
+        if found is None:
+            chains = self._chains([self._keys[row]], 0.0)[:MOST]
+            found = tuple(course for chain in chains if (course := self._course(chain)) is not None)
+            self._courses[row] = found
+        return found
+
+    def _chains(self, chain: list[LaneKey], length: float) -> list[list[LaneKey]]:
+        """Return the lanes that continue a chain, at most MOST alternatives."""
+        while length < LENGTH:
+            key = chain[-1]
+            direction = self._roads.driving_direction(key.road, key.lane)
+            branches = [branch for branch in self._roads.movement.branches(key, direction) if branch.lane not in chain]
+            branches = _likely(branches)
+            if not branches:
+                break
+            if len(branches) > 1:
+                chains: list[list[LaneKey]] = []
+                for branch in branches:
+                    chains += self._chains([*chain, branch.lane], length + self._length(branch.lane))
+                return chains[:MOST]
+            chain = [*chain, branches[0].lane]
+            length += self._length(branches[0].lane)
+        return [chain]
+
+    def _length(self, key: LaneKey) -> float:
+        return self._roads.road(key.road).sections[key.section].length
+
+    def _course(self, chain: list[LaneKey]) -> Course | None:
+        tables = self._roads.tables
+        rows, places = [], []
+        for key in chain:
+            section = self._roads.road(key.road).sections[key.section]
+            count = max(math.ceil(section.length / SPACING), 1)
+            s = np.linspace(section.s, section.end, count + 1)
+            if self._roads.driving_direction(key.road, key.lane) < 0:
+                s = s[::-1]
+            rows.append(np.full(len(s), tables.row_of(key)))
+            places.append(s)
+        poses = tables.lane_poses(np.concatenate(rows), np.concatenate(places), np.zeros(sum(map(len, places))))
+        points = np.column_stack([poses.x, poses.y])
+        step = np.hypot(*np.diff(points, axis=0).T)
+        points = points[np.concatenate([[True], step > 0.05])]
+        if len(points) < 2:
+            return None
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        return Course(points, along)
+
+
+def _likely(branches: list[Branch]) -> list[Branch]:
+    """Return the branches whose turn is about as small as the smallest."""
+    if len(branches) < 2:
+        return branches
+    least = min(abs(branch.turn) for branch in branches)
+    return [branch for branch in branches if abs(branch.turn) <= least + SIMILAR_TURN]

@@ -1,0 +1,153 @@
+"""Memory of fused objects over time: motion of objects without a velocity, confirmation, and loss."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+
+STILL = 0.5
+"""Speed below which an object stands [m/s]."""
+GATE = 2.5
+"""Maximum distance of an object from its prediction [m]: half the length of a car."""
+USUAL_ERROR = 0.3
+"""Assumed standard deviation of a position without a covariance [m]."""
+SPEED_ERROR = 0.5
+"""Standard deviation of the speed of a lost object [m/s], by which its covariance grows."""
+LARGEST_ERROR = 3.0
+"""Maximum standard deviation that is considered [m]; above it the position says nothing."""
+SMOOTHING = 0.4
+"""Weight of the newest difference quotient in the velocity of an object whose detector estimates none."""
+CHANGING = 0.7
+"""Time constant of the estimate of accelerations [s], which damps the noise of velocities."""
+
+
+class KnownObject(msgspec.Struct):
+    """One object over time."""
+
+    row: int | None
+    """Row of the fused objects; None while the object is lost."""
+    kind: str
+    x: float
+    y: float
+    yaw: float
+    length: float
+    width: float
+    vx: float
+    vy: float
+    has_velocity: bool
+    """Whether the velocity is measured or estimated; it is 0 otherwise."""
+    error: float
+    """Standard deviation of the position [m]."""
+    existence: float
+    seen: float
+    """Time of the last observation [s]."""
+    still_since: float | None = None
+    """Time since which the object stands [s]; None while it moves."""
+    moving_since: float | None = None
+    """Time since which the object moves [s]; None while it stands."""
+    acceleration: float = 0.0
+    """Estimated rate of change of the speed [m/s²]."""
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s]."""
+        return math.hypot(self.vx, self.vy)
+
+
+class ObjectMemory:
+    """Fused objects of one vehicle, associated over time by their predicted positions."""
+
+    def __init__(self, settings: BehaviorSettings) -> None:
+        self._settings = settings
+        self._objects: list[KnownObject] = []
+        self._time = -math.inf
+
+    def update(self, detections: Detections, now: float) -> list[KnownObject]:
+        """Return all objects at `now` [s], lost ones at their predicted positions.
+
+        Objects with an existence probability below `possible_existence` are ignored.
+        """
+        step = now - self._time if self._objects else 0.0
+        for known in self._objects:
+            known.x += known.vx * step
+            known.y += known.vy * step
+            known.row = None
+        self._time = now
+        found = _objects_of(detections, now, self._settings.possible_existence)
+        for index, known in self._pairs(found):
+            _take_over(known, found[index], step)
+            found[index] = known
+        lost = [known for known in self._objects if known.row is None and self._is_kept(known, now)]
+        for known in lost:
+            known.error = min(known.error + SPEED_ERROR * step, LARGEST_ERROR)
+        self._objects = found + lost
+        for known in self._objects:
+            is_still = known.speed < STILL
+            known.still_since = (now if known.still_since is None else known.still_since) if is_still else None
+            known.moving_since = None if is_still else now if known.moving_since is None else known.moving_since
+        return self._objects
+
+    def _pairs(self, found: list[KnownObject]) -> list[tuple[int, KnownObject]]:
+        """Return pairs of the index of a new object and a known one, the nearest first, each in at most one pair."""
+        if not found or not self._objects:
+            return []
+        ahead: Array = np.array([(known.x, known.y) for known in self._objects])
+        places: Array = np.array([(fresh.x, fresh.y) for fresh in found])
+        gap = np.hypot(places[:, None, 0] - ahead[None, :, 0], places[:, None, 1] - ahead[None, :, 1])
+        near = np.argwhere(gap < GATE)
+        order = np.argsort(gap[near[:, 0], near[:, 1]], kind="stable")
+        pairs: list[tuple[int, KnownObject]] = []
+        new: set[int] = set()
+        old: set[int] = set()
+        for first, second in near[order].tolist():
+            if first not in new and second not in old:
+                new.add(first)
+                old.add(second)
+                pairs.append((first, self._objects[second]))
+        return pairs
+
+    def _is_kept(self, known: KnownObject, now: float) -> bool:
+        return now - known.seen <= self._settings.memory and known.existence >= self._settings.min_existence
+
+
+def _objects_of(detections: Detections, now: float, least: float) -> list[KnownObject]:
+    existence = detections.confidence.tolist()
+    variance = detections.covariance[:, [0, 1], [0, 1]].max(axis=1, initial=0.0).tolist()
+    found = []
+    for row, (box, (vx, vy)) in enumerate(zip(detections.boxes.tolist(), detections.velocity.tolist(), strict=True)):
+        if existence[row] < least:
+            continue
+        x, y, _, length, width, _, yaw = box
+        moving = not (math.isnan(vx) or math.isnan(vy))
+        vx, vy = (vx, vy) if moving else (0.0, 0.0)
+        error = math.sqrt(variance[row]) if variance[row] >= 0.0 else USUAL_ERROR
+        kind = detections.classes[row]
+        age = max(now - detections.time, 0.0)
+        x, y, error = x + vx * age, y + vy * age, min(error + SPEED_ERROR * age, LARGEST_ERROR)
+        found.append(KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now))
+    return found
+
+
+def _take_over(known: KnownObject, fresh: KnownObject, step: float) -> None:
+    """Update a known object by its new observation."""
+    before = known.speed if known.has_velocity else None
+    if fresh.has_velocity:
+        known.vx, known.vy = fresh.vx, fresh.vy
+    elif step > 0.0:
+        share = SMOOTHING if known.has_velocity else 1.0
+        known.vx += share * (fresh.x - known.x) / step
+        known.vy += share * (fresh.y - known.y) / step
+    if before is not None and step > 0.0:
+        change = (known.speed - before) / step
+        known.acceleration += (change - known.acceleration) * (1.0 - math.exp(-step / CHANGING))
+    known.has_velocity |= fresh.has_velocity or step > 0.0
+    known.row, known.kind, known.seen = fresh.row, fresh.kind, fresh.seen
+    known.x, known.y, known.yaw = fresh.x, fresh.y, fresh.yaw
+    known.length, known.width = fresh.length, fresh.width
+    known.error, known.existence = fresh.error, fresh.existence

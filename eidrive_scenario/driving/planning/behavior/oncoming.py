@@ -1,0 +1,103 @@
+"""Oncoming traffic while the vehicle uses a lane of the opposite direction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
+from eidrive_scenario.driving.planning.behavior.proposals import inside_way
+from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+
+ONCOMING_SPEED = 0.5
+"""Speed against the direction of the vehicle above which an object is oncoming [m/s]."""
+LANES = 6.0
+"""Offset from the line within which oncoming traffic counts [m]: two lanes."""
+PAUSE = 6.0
+"""Time of waiting without oncoming traffic after which none is expected beyond the view [s], of the order of the
+critical gaps of the Highway Capacity Manual (4.1 to 7.5 s)."""
+FREE_TIME = 1.0
+"""Time without an obstruction after which the vehicle does not wait any more [s]."""
+SAMPLE = 2.0
+"""Spacing of the places on the oncoming lane that are checked for a view [m]."""
+
+
+class OncomingTraffic:
+    """Oncoming traffic that one vehicle observes over time, and what may come from where it has no view.
+
+    view  range of the perception of the vehicle [m]
+    """
+
+    def __init__(self, view: float) -> None:
+        self._view = view
+        self._last = -math.inf
+        self._held_up_since: float | None = None
+        self._held_up_until = -math.inf
+
+    def observe(self, scene: Surroundings, center: float, now: float, *, held_up: bool) -> None:
+        """Update by the objects at `now` [s].
+
+        center   distance of the center of the vehicle along the line [m]
+        held_up  whether the vehicle would pass something
+        """
+        if bool(_ahead(scene, center).any()):
+            self._last = now
+        if held_up:
+            self._held_up_until = now
+            self._held_up_since = now if self._held_up_since is None else self._held_up_since
+        elif now - self._held_up_until > FREE_TIME:
+            self._held_up_since = None
+
+    def first_hidden(self, scene: Surroundings, beside: LanesBeside, ego: tuple[float, float], now: float) -> float:
+        """Return the place nearest to the vehicle from which traffic may come unseen [m]; inf if none is expected.
+
+        None is expected if the vehicle has waited and no oncoming traffic appeared for a time of PAUSE.
+
+        ego  distance of the center of the vehicle along the line, and its offset [m]
+        """
+        since = max(self._last, now if self._held_up_since is None else self._held_up_since)
+        if now - since >= PAUSE or math.isnan(beside.oncoming):
+            return math.inf
+        s, d = ego
+        places = s + np.arange(SAMPLE, self._view + SAMPLE, SAMPLE)
+        hidden = np.zeros(len(places), dtype=bool)
+        for row in range(len(scene)):
+            left, right = scene.d[row, 0] + scene.half_width[row, 0], scene.d[row, 0] - scene.half_width[row, 0]
+            for edge in (scene.s[row, 0] - scene.half_length[row, 0], scene.s[row, 0] + scene.half_length[row, 0]):
+                share = (edge - s) / (places - s)
+                at_edge = d + share * (beside.oncoming - d)
+                hidden |= (share > 0.0) & (share < 1.0) & (at_edge > right) & (at_edge < left)
+        first = int(np.argmax(hidden)) if hidden.any() else len(places)
+        return float(s + first * SAMPLE)
+
+
+def meets_oncoming(
+    profile: LateralProfile,
+    s: Array,
+    times: Array,
+    scene: Surroundings,
+    half_width: float,
+    hidden: tuple[float, float],
+) -> bool:
+    """Return whether the vehicle meets oncoming traffic before it is back on its side, or does not return.
+
+    s       distances along the line (K,) of the vehicle at `times`
+    hidden  place from which traffic may come unseen [m], inf without one, and its speed [m/s]
+    """
+    back = np.flatnonzero(s >= profile.places[-2])
+    if not back.size:
+        return True
+    last = int(back[0])
+    oncoming = (scene.speed < -ONCOMING_SPEED) & (scene.s + scene.half_length > s[0])
+    if bool((inside_way(scene, profile, half_width) & oncoming)[:, : last + 1].any()):
+        return True
+    place, speed = hidden
+    return bool(place - speed * times[last] < s[last])
+
+
+def _ahead(scene: Surroundings, place: float) -> Bools:
+    is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < LANES)
+    return np.asarray(is_oncoming & (scene.s[:, 0] + scene.half_length[:, 0] > place))

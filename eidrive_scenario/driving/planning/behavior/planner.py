@@ -1,0 +1,171 @@
+"""Planner `behavior`: decides on fused objects between proposals along the lane graph."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planner_settings import PlannerSettings
+from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
+from eidrive_scenario.driving.planning.behavior.memory import ObjectMemory
+from eidrive_scenario.driving.planning.behavior.prediction import Predictor
+from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_limits
+from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.situation import Situation
+from eidrive_scenario.driving.planning.path import PlannedPath
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.requests import Goal
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.world.actor import ActorSpec
+
+STEP = 0.25
+"""Time step of rollouts [s]."""
+POINTS = 60
+"""Number of points of a plan."""
+CREEPING = 0.35
+"""Speed of a plan for a vehicle that starts from standstill [m/s]; the controller holds its brake below 0.3."""
+STEEPEST = 0.5
+"""Maximum angle between the vehicle and its line from which a lateral motion starts [rad]."""
+SAME_LINE = 0.3
+"""Maximum difference of the offsets from two lines at which one is the extension of the other [m]."""
+VIEW = 80.0
+"""Assumed range of the perception of a station without a setting `range` [m]."""
+MARGIN_AHEAD = 40.0
+"""Length of the line that is considered beyond the horizon and behind the vehicle [m]."""
+
+
+class BehaviorPlanner(RoutePlanner):
+    """Follow the route, and react to objects: follow, give way, pass, brake.
+
+    In the manner of PDM-Closed (Dauner et al., CoRL 2023): proposals are rolled out by the Intelligent Driver Model
+    against predicted objects and scored. Beyond it: lane changes and passing, giving way at crossing ways, emergency
+    braking at any speed, and objects with covariance and existence probability.
+    """
+
+    settings_type: ClassVar[type[PlannerSettings]] = BehaviorSettings
+    planner_settings: BehaviorSettings
+    max_lateral_offset: ClassVar[float] = 6.0
+
+    def __init__(
+        self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int
+    ) -> None:
+        super().__init__(settings, spec, roads, dt=dt, seed=seed)
+        own = self.planner_settings
+        self._times: Array = np.arange(0.0, own.horizon + 1e-9, STEP)
+        self._memory = ObjectMemory(own)
+        self._predictor = Predictor(roads, self._times)
+        self._decider = Decider(own, spec, self._times, settings.range or VIEW)
+        self._line: ReferenceLine | None = None
+        self._limits: Array = np.empty(0)
+        self._decision: Decision | None = None
+        self._decided = -math.inf
+
+    def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
+        x, y, _ = ego.position.tolist()
+        path = self._advanced_path(x, y, ego.yaw, goal)
+        line = self._line_of(path, x, y)
+        wanted = self._target_speed(ego, goal)
+        if self._decision is None or now - self._decided >= self.planner_settings.period - TIME_TOLERANCE:
+            self._decided = now
+            self._decision = self._decide(ego, objects, line, wanted, now)
+        s = self._place_on(line, x, y)[0]
+        return _trajectory(line, self._decision, s, ego.speed)
+
+    def _line_of(self, path: PlannedPath, x: float, y: float) -> ReferenceLine:
+        """Return the reference line of the path; the current maneuver continues on an extended path."""
+        before = self._line
+        if before is not None and before.path is path:
+            return before
+        line = self._line = ReferenceLine(path, self.roads)
+        self._limits = speed_limits(line.curvature, path.limits, line.spacing, self.planner_settings)
+        shift = None
+        if before is not None:
+            (s, d), (s_before, d_before) = (_nearest(some, x, y) for some in (line, before))
+            shift = s - s_before if abs(d - d_before) < SAME_LINE else None
+        self._decision = None
+        self._decider.line_changed(shift)
+        return line
+
+    def _place_on(self, line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
+        low = max(self._progress - 3, 0)
+        s, d, _ = line.project(np.array([x]), np.array([y]), low, min(low + 12, len(line.points)))
+        return float(s[0]), float(d[0])
+
+    def _front_axle(self, ego: EgoState, line: ReferenceLine) -> tuple[float, float, float]:
+        """Return the place of the front axle on the line and the slope of its motion."""
+        x, y, _ = ego.position.tolist()
+        ahead = self.spec.wheelbase
+        s, d = self._place_on(line, x + ahead * math.cos(ego.yaw), y + ahead * math.sin(ego.yaw))
+        turn = wrap_angle(ego.yaw - float(line.heading[line.index_at(s)]))
+        return s, d, math.tan(min(max(turn, -STEEPEST), STEEPEST))
+
+    def _decide(self, ego: EgoState, objects: Detections, line: ReferenceLine, wanted: float, now: float) -> Decision:
+        x, y, _ = ego.position.tolist()
+        s, d = self._place_on(line, x, y)
+        known = self._memory.update(objects, now)
+        near = [entry for entry in known if math.hypot(entry.x - x, entry.y - y) < self._reach(ego, wanted)]
+        stop = self._stop(line.path, ego, x, y, now)
+        situation = Situation(
+            line=line,
+            limits=self._limits,
+            s=s,
+            d=d,
+            steered=self._front_axle(ego, line),
+            speed=max(ego.speed, 0.0),
+            wanted=wanted,
+            objects=near,
+            prediction=self._predictor.predict(near),
+            window=self._window(line, s, max(ego.speed, wanted)),
+            stop=None if stop is None else Wall(stop.place, math.inf, stop.reason),
+            now=now,
+        )
+        return self._decider.decide(situation)
+
+    def _reach(self, ego: EgoState, wanted: float) -> float:
+        return MARGIN_AHEAD + 2.0 * max(ego.speed, wanted) * self.planner_settings.horizon
+
+    def _window(self, line: ReferenceLine, s: float, speed: float) -> tuple[int, int]:
+        """Return the range of the points of the line that matter."""
+        low = line.index_at(s - MARGIN_AHEAD)
+        high = line.index_at(s + speed * self.planner_settings.horizon + MARGIN_AHEAD) + 1
+        return low, max(high, low + 2)
+
+
+def _nearest(line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
+    """Return distance along a line and offset to its left of a point, nearest among all of its points."""
+    s, d, _ = line.project(np.array([x]), np.array([y]), 0, len(line.points))
+    return float(s[0]), float(d[0])
+
+
+def _trajectory(line: ReferenceLine, decision: Decision, s: float, speed: float) -> Plan:
+    """Return the plan of a decision from the place of the vehicle on."""
+    first = line.index_at(s)
+    last = min(first + POINTS, len(line.points))
+    first = min(first, last - 2)
+    along = line.along[first:last]
+    offset = decision.profile.offset(along)
+    normal = np.column_stack([-line.tangent[first:last, 1], line.tangent[first:last, 0]])
+    points = line.points[first:last] + offset[:, None] * normal
+    squares = np.interp(along, decision.s, decision.speed**2)
+    speeds = np.sqrt(squares)
+    acceleration = decision.acceleration
+    if acceleration > 0.0 and speeds[0] < CREEPING:
+        speeds = np.maximum(speeds, CREEPING)
+    return Plan(
+        points,
+        speeds,
+        decision.reason,
+        acceleration=max(acceleration, 0.0),
+        braking=decision.braking,
+        objects=decision.objects,
+    )

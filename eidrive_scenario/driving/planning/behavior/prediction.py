@@ -1,0 +1,127 @@
+"""Prediction of objects: along lanes for vehicles that follow them, else with constant velocity."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.behavior.lane_courses import Course, LaneCourses
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.roads import RoadNetwork
+
+ON_FOOT = frozenset({"pedestrian"})
+STANDING = 0.3
+"""Speed below which an object is predicted to stand [m/s]; the direction of a slower one is noise."""
+ALIGNED = 0.6
+"""Maximum angle between the motion of a vehicle and a lane that it follows [rad]."""
+LEAVING_RATE = 0.3
+"""Minimum lateral speed of a vehicle that leaves its lane [m/s]; slower motion is its lateral wandering."""
+LANE_WIDTH = 3.5
+"""Lateral distance after which a lane change is predicted to end [m]."""
+NOTICEABLE, GREATEST = 0.8, 4.0
+"""Accelerations below which an object keeps its speed, and maximum acceleration that is considered [m/s²]."""
+PERSISTENCE = 1.5
+"""Time constant with which the predicted acceleration decreases [s]."""
+MOST_HYPOTHESES = 4
+"""Maximum number of hypotheses of one object."""
+
+
+class Prediction(msgspec.Struct, frozen=True):
+    """Predicted motion of N hypotheses at K times; an object may have several hypotheses.
+
+    objects  (N,) index of the object;  x, y, yaw, speed  (N, K) [m, rad, m/s]
+    """
+
+    objects: tuple[int, ...]
+    x: Array
+    y: Array
+    yaw: Array
+    speed: Array
+
+
+class Predictor:
+    """Prediction of objects over a road network, or without one."""
+
+    def __init__(self, roads: RoadNetwork | None, times: Array) -> None:
+        self._roads = roads
+        self._courses = LaneCourses(roads) if roads is not None else None
+        self._times = times
+
+    def predict(self, objects: list[KnownObject]) -> Prediction:
+        """Return the hypotheses of all objects."""
+        owners: list[int] = []
+        rows: list[tuple[Array, Array, Array]] = []
+        speeds: list[Array] = []
+        lanes = self._lanes(objects)
+        for index, known in enumerate(objects):
+            travelled, speed = longitudinal_motion(known.speed, known.acceleration, self._times)
+            for row in self._hypotheses(known, lanes[index], travelled):
+                owners.append(index)
+                rows.append(row)
+                speeds.append(speed)
+        if not rows:
+            nothing = np.empty((0, len(self._times)))
+            return Prediction((), nothing, nothing, nothing, nothing)
+        x, y, yaw = (np.array([row[axis] for row in rows]) for axis in range(3))
+        return Prediction(tuple(owners), x, y, yaw, np.array(speeds))
+
+    def _hypotheses(
+        self, known: KnownObject, courses: list[Course], travelled: Array
+    ) -> list[tuple[Array, Array, Array]]:
+        times = self._times
+        speed = known.speed
+        if speed < STANDING:
+            return [tuple(np.full(len(times), value) for value in (known.x, known.y, known.yaw))]  # type: ignore[list-item]
+        found: list[tuple[Array, Array, Array]] = []
+        direction = math.atan2(known.vy, known.vx)
+        for course in courses:
+            along, left, heading = course.place(known.x, known.y)
+            turn = float(wrap_angle(direction - heading))
+            if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
+                continue
+            aside = speed * math.sin(turn)
+            drift = np.zeros(len(times))
+            if abs(aside) > LEAVING_RATE:
+                drift = np.clip(aside * times, -LANE_WIDTH, LANE_WIDTH)
+            found.append(course.poses(along + travelled, left + drift))
+            if len(found) == MOST_HYPOTHESES:
+                break
+        if not found:
+            x, y = known.x + math.cos(direction) * travelled, known.y + math.sin(direction) * travelled
+            found.append((x, y, np.full(len(times), direction)))
+        return found
+
+    def _lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
+        """Return the courses of the lanes on which each moving vehicle is."""
+        found: list[list[Course]] = [[] for _ in objects]
+        moving = [index for index, known in enumerate(objects) if known.speed >= STANDING and known.kind not in ON_FOOT]
+        if not moving or self._roads is None or self._courses is None:
+            return found
+        x, y = (np.array([getattr(objects[index], axis) for index in moving]) for axis in ("x", "y"))
+        rows, _, owners = self._roads.overlapped_lanes(x, y)
+        drivable = self._roads.tables.lane_drivable
+        for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):
+            if drivable[row]:
+                found[moving[owner]] += self._courses.ahead(row)
+        return found
+
+
+def longitudinal_motion(speed: float, acceleration: float, times: Array) -> tuple[Array, Array]:
+    """Return the distances [m] and speeds [m/s] (K,) of an object; it never moves backward.
+
+    A positive acceleration decreases exponentially; a braking object continues to brake until it stands.
+    """
+    if speed < STANDING:
+        return np.zeros(len(times)), np.zeros(len(times))
+    if abs(acceleration) < NOTICEABLE:
+        return np.asarray(speed * times), np.full(len(times), speed)
+    acceleration = min(max(acceleration, -GREATEST), GREATEST)
+    if acceleration > 0.0:
+        gained = acceleration * PERSISTENCE * (1.0 - np.exp(-times / PERSISTENCE))
+        return np.asarray((speed + acceleration * PERSISTENCE) * times - PERSISTENCE * gained), speed + gained
+    braking = np.minimum(times, -speed / acceleration)
+    return np.asarray(speed * braking + 0.5 * acceleration * braking**2), np.asarray(speed + acceleration * braking)

@@ -1,0 +1,148 @@
+"""Reference line of the route: coordinates along it and to its left, and the lanes beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.path import PlannedPath
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads.geometry.poses import lane_t
+
+NARROWEST = 2.5
+"""Minimum width of a lane to which the vehicle changes [m]."""
+WITHOUT_ROAD = 1.75
+"""Distance from the route to the edge of the way outside of roads [m]: half a lane."""
+
+
+class LanesBeside(NamedTuple):
+    """Lanes at one point of the reference line; offsets to its left [m], NaN without such a lane.
+
+    own                  center of the lane at the point
+    left, right          centers of the neighboring lanes of the same direction
+    oncoming             center of the left neighboring lane of the opposite direction
+    left_edge            edge of the lanes of the same direction;  any_left_edge  edge of all lanes to the left
+    right_edge           edge of the lanes to the right
+    """
+
+    own: float = 0.0
+    left: float = math.nan
+    right: float = math.nan
+    oncoming: float = math.nan
+    left_edge: float = WITHOUT_ROAD
+    any_left_edge: float = WITHOUT_ROAD
+    right_edge: float = -WITHOUT_ROAD
+
+
+class ReferenceLine:
+    """Path of the route with distances along it (s) and to its left (d)."""
+
+    def __init__(self, path: PlannedPath, roads: RoadNetwork | None) -> None:
+        self.path = path
+        self.points: Array = path.points
+        step = np.diff(self.points, axis=0)
+        length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
+        self.along: Array = np.concatenate([[0.0], np.cumsum(length)])
+        self.spacing = float(self.along[-1]) / len(length)
+        middle = np.vstack([self.points[1] - self.points[0], self.points[2:] - self.points[:-2], step[-1]])
+        self.tangent: Array = middle / np.maximum(np.hypot(middle[:, 0], middle[:, 1]), 1e-9)[:, None]
+        self.heading: Array = np.unwrap(np.arctan2(self.tangent[:, 1], self.tangent[:, 0]))
+        self.curvature: Array = np.gradient(self.heading, self.along) if len(self.along) > 1 else np.zeros(1)
+        self._roads = roads
+        self._beside: dict[int, LanesBeside] = {}
+        self._place: LaneLocation | None = None
+
+    @property
+    def length(self) -> float:
+        """Length of the line [m]."""
+        return float(self.along[-1])
+
+    def index_at(self, s: float) -> int:
+        """Return the index of the last point up to a distance along the line."""
+        return min(max(int(np.searchsorted(self.along, s, side="right")) - 1, 0), len(self.along) - 1)
+
+    def project(self, x: Array, y: Array, low: int, high: int) -> tuple[Array, Array, Array]:
+        """Return s, d and heading of the line (…) for points (…), nearest among the points from `low` to `high`."""
+        line = self.points[low:high]
+        flat_x, flat_y = x.ravel(), y.ravel()
+        shifted = line - line[0]
+        gap = np.einsum("mi,mi->m", shifted, shifted) - 2.0 * (
+            np.column_stack([flat_x - line[0, 0], flat_y - line[0, 1]]) @ shifted.T
+        )
+        index = low + np.argmin(gap, axis=1)
+        dx, dy = flat_x - self.points[index, 0], flat_y - self.points[index, 1]
+        tx, ty = self.tangent[index, 0], self.tangent[index, 1]
+        s = self.along[index] + dx * tx + dy * ty
+        d = dy * tx - dx * ty
+        return s.reshape(x.shape), d.reshape(x.shape), self.heading[index].reshape(x.shape)
+
+    def lanes_beside(self, index: int) -> LanesBeside:
+        """Return the lanes at a point of the line."""
+        found = self._beside.get(index)
+        if found is None:
+            found = self._beside[index] = self._lanes_at(index)
+        return found
+
+    def _lanes_at(self, index: int) -> LanesBeside:
+        roads = self._roads
+        if roads is None:
+            return LanesBeside()
+        x, y = self.points[index].tolist()
+        place = self._place = roads.locate_at(x, y, self._place, reach=5.0)
+        if place is None:
+            return LanesBeside()
+        road = roads.road(place.road)
+        section = road.section_at(place.s)
+        # The road may be passed against its driving direction; left is left of the motion.
+        pose = roads.road_pose_at(place.road, place.s)
+        tx, ty = self.tangent[index].tolist()
+        sense = 1 if tx * math.cos(pose.h) + ty * math.sin(pose.h) >= 0.0 else -1
+        order = [number for number in section.lanes if number]
+        order = order if sense > 0 else order[::-1]
+        if place.lane not in order:
+            return LanesBeside()
+        center, half = {}, {}
+        for number in order:
+            lane = section.lanes[number]
+            center[number] = (lane_t(road, section, lane, place.s)[0] - place.t) * sense
+            half[number] = lane.width.value(place.s - section.s) / 2.0
+        own = order.index(place.lane)
+        return _beside(
+            [
+                (center[n], half[n], section.lanes[n].drivable, roads.driving_direction(road.id, n) == sense)
+                for n in order
+            ],
+            own,
+        )
+
+
+def _beside(lanes: list[tuple[float, float, bool, bool]], own: int) -> LanesBeside:
+    """Return the lanes beside one of the lanes of a section, from left to right.
+
+    lanes  center to the left of the line and half width [m], whether it is drivable, and whether its traffic drives in
+           the direction of the line
+    """
+    center, half, _, _ = lanes[own]
+    left_edge = any_left_edge = center + half
+    right_edge = center - half
+    left = right = oncoming = math.nan
+    same = True
+    for place, width, drivable, with_traffic in reversed(lanes[:own]):
+        if not drivable:
+            break
+        same = same and with_traffic
+        any_left_edge = place + width
+        if same:
+            left_edge = any_left_edge
+            left = place if math.isnan(left) and 2.0 * width >= NARROWEST else left
+        elif math.isnan(oncoming) and math.isnan(left):
+            oncoming = place
+    for place, width, drivable, with_traffic in lanes[own + 1 :]:
+        if not drivable or not with_traffic:
+            break
+        right_edge = place - width
+        right = place if math.isnan(right) and 2.0 * width >= NARROWEST else right
+    return LanesBeside(center, left, right, oncoming, left_edge, any_left_edge, right_edge)

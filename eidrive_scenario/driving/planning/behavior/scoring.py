@@ -1,0 +1,151 @@
+"""Evaluation of proposals: collisions, clearance, progress, comfort and the use of other lanes."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
+from eidrive_scenario.driving.planning.behavior.oncoming import meets_oncoming
+from eidrive_scenario.driving.planning.behavior.proposals import Proposal
+from eidrive_scenario.driving.planning.behavior.rollout import Rollout
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+
+CONTACT = 0.1
+"""Distance below which bodies are taken to touch [m]."""
+CLEAR_AHEAD = 1.0
+"""Clearance along the line below which a proposal is risky on a collision course [m]."""
+PROGRESS, RISK, COMFORT, ASIDE, ONCOMING, SWITCH = 5.0, 6.0, 1.5, 0.15, 0.4, 0.3
+"""Weights of the score: progress as in PDM-Closed; the others are relative to it. ASIDE and ONCOMING per use of another
+lane, SWITCH for another maneuver than the current one."""
+SLOWER = 0.05
+"""Weight of a lower target speed than wanted, which decides between proposals that are otherwise alike."""
+GENTLE = 50.0
+"""Weight of a stop for an uncertain object, which is only chosen for such an object."""
+CRASH = 100.0
+"""Weight of a collision, above all other terms."""
+FARTHER = 0.8
+"""Share by which the weight of a risk decreases toward the horizon."""
+LEAST_LACK = 0.3
+"""Risk of a clearance that is just too small; it increases to 1 at a contact."""
+COMFORTABLE = 2.0
+"""Deceleration up to which a proposal is comfortable [m/s²]."""
+
+
+class Evaluation(msgspec.Struct, frozen=True):
+    """Scores (P,); time of the first collision (P,), inf without one [s]; greatest risk (P,) in [0, 1]; speed of the
+    collision (P,) [m/s]; hypothesis that causes the first one (P,), -1 without one."""
+
+    score: Array
+    collision: Array
+    risk: Array
+    impact: Array
+    cause: Array
+
+
+def evaluate(
+    proposals: list[Proposal],
+    profiles: list[LateralProfile],
+    rolled: Rollout,
+    scene: Surroundings,
+    times: Array,
+    ego: Body,
+    settings: BehaviorSettings,
+    wanted: float,
+    current: str,
+    hidden: float,
+) -> Evaluation:
+    """Return the evaluation of all proposals.
+
+    current  name of the maneuver that is being carried out
+    hidden   place from which oncoming traffic may come unseen [m], inf without one
+    """
+    count = len(proposals)
+    front, rear = np.empty_like(rolled.s), np.empty_like(rolled.s)
+    for number, profile in enumerate(profiles):
+        rows = [row for row, proposal in enumerate(proposals) if proposal.profile == number]
+        front[rows], rear[rows] = profile.offset(rolled.s[rows] + ego.wheelbase), profile.offset(rolled.s[rows])
+    collision, risk = np.full(count, np.inf), np.zeros(count)
+    impact, cause = np.zeros(count), np.full(count, -1)
+    if len(scene):
+        touching, lack = _overlaps(rolled, (front, rear), scene, times, ego, settings)
+        collision, step, cause = _first(touching, times)
+        impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
+        risk = (lack.max(axis=1) * (1.0 - FARTHER * times / float(times[-1]))).max(axis=1)
+    horizon = float(times[-1])
+    far = max(wanted * horizon, 1.0)
+    progress = np.clip((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0, 1.0)
+    slowing = np.diff(rolled.speed, axis=1) / np.diff(times)
+    hardest = np.maximum(-slowing.min(axis=1) - COMFORTABLE, 0.0)
+    score = PROGRESS * progress - COMFORT * np.minimum(hardest / settings.hard_deceleration, 2.0)
+    score -= RISK * risk
+    score -= CRASH * np.where(np.isfinite(collision), 1.0 + (1.0 - collision / horizon) + 0.05 * impact, 0.0)
+    for row, proposal in enumerate(proposals):
+        score[row] -= SLOWER * (1.0 - proposal.share) + GENTLE * proposal.is_gentle
+        profile = profiles[proposal.profile]
+        if profile.uses_oncoming and profile.name != current:
+            score[row] -= RISK * meets_oncoming(profile, rolled.s[row], times, scene, ego.half_width, (hidden, wanted))
+        score[row] -= (
+            ASIDE * (profile.side != 0) + ONCOMING * profile.uses_oncoming + SWITCH * (profile.name != current)
+        )
+    return Evaluation(score, collision, risk, impact, cause)
+
+
+def _first(found: Bools, times: Array) -> tuple[Array, Array, Array]:
+    """Return time, its index and hypothesis of the first entry of `found` (P, N, K) for each proposal."""
+    anyone: Bools = np.asarray(found.any(axis=1))
+    step = np.argmax(anyone, axis=1)
+    happens = anyone[np.arange(len(found)), step]
+    cause = np.argmax(found[np.arange(len(found)), :, step], axis=1)
+    return np.where(happens, times[step], np.inf), step, np.where(happens, cause, -1)
+
+
+def _overlaps(
+    rolled: Rollout,
+    offsets: tuple[Array, Array],
+    scene: Surroundings,
+    times: Array,
+    ego: Body,
+    settings: BehaviorSettings,
+) -> tuple[Bools, Array]:
+    """Return where the bodies touch (P, N, K), and the lack of clearance (P, N, K) in [0, 1].
+
+    offsets  of the front and the rear axle (P, K) [m]; each determines the position of its half of the vehicle
+    """
+    shape = (len(rolled.s), len(scene), len(times))
+    touching, lack = np.zeros(shape, dtype=bool), np.zeros(shape)
+    margin = np.maximum(scene.margin, CONTACT)[None, :, None]
+    crossing = np.flatnonzero(scene.crosses.any(axis=1))
+    shift = round(settings.crossing_time / float(times[1] - times[0]))
+    moved = [
+        [_shifted(part[crossing], later) for part in (scene.s, scene.d, scene.half_length, scene.half_width)]
+        for later in (shift, -shift)
+        if crossing.size and shift
+    ]
+    middle = ego.wheelbase / 2.0
+    for d, low, high in ((offsets[0], middle, ego.front), (offsets[1], -ego.rear, middle)):
+        center, half_length = (rolled.s + (low + high) / 2.0)[:, None, :], (high - low) / 2.0
+        beside = d[:, None, :]
+        along = np.abs(scene.s - center) - (scene.half_length + half_length)
+        aside = np.abs(scene.d - beside) - (scene.half_width + ego.half_width)
+        touching |= (along < CONTACT) & (aside < CONTACT)
+        missing = np.where(along < 0.0, (margin - aside) / margin, 0.0)
+        missing = np.maximum(missing, np.where(aside < CONTACT, (CLEAR_AHEAD - along) / CLEAR_AHEAD, 0.0))
+        lack = np.maximum(lack, np.where(missing > 0.0, LEAST_LACK + (1.0 - LEAST_LACK) * missing, 0.0))
+        for s, place, length, width in moved:
+            along = np.abs(s - center) - (length + half_length)
+            aside = np.abs(place - beside) - (width + ego.half_width)
+            lack[:, crossing] = np.maximum(lack[:, crossing], (along < CONTACT) & (aside < CONTACT))
+    ignored = scene.behind | touching[:, :, 0].any(axis=0)
+    keep = ~ignored[None, :, None]
+    at_rest = (rolled.speed < 0.1)[:, None, :]
+    touching &= keep & ~(at_rest & (np.abs(scene.speed)[None] > 0.0))
+    return touching, np.where(keep & ~at_rest, np.minimum(lack, 1.0), 0.0)
+
+
+def _shifted(values: Array, steps: int) -> Array:
+    """Return values (N, K) of `steps` later times; the last or first one is repeated."""
+    index = np.clip(np.arange(values.shape[1]) + steps, 0, values.shape[1] - 1)
+    return np.asarray(values[:, index])

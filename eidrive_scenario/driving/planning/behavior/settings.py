@@ -1,0 +1,53 @@
+"""Settings of the planner `behavior`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, PositiveFloat
+
+from eidrive_scenario.driving.planner_settings import PlannerSettings
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Deceleration = Annotated[float, Field(gt=0.0, le=12.0)]
+
+
+class BehaviorSettings(PlannerSettings):
+    """Settings of the planner `behavior`. Lengths in m, speeds in m/s, times in s, accelerations in m/s².
+
+    time_gap, standstill_gap, acceleration, comfortable_deceleration
+        parameters of the Intelligent Driver Model, by default those that its author advises (1.2, 2, 1.5; Treiber,
+        movsim/traffic-simulation-de) and a comfortable deceleration of 2
+    passing_gap             additional gap behind a standing vehicle, from which the vehicle can pass it
+    hard_deceleration       maximum braking without an emergency; nuPlan's limit of comfort is 4.05
+    emergency_deceleration  braking in an emergency, at most that of the vehicle
+    lateral_acceleration    maximum in curves and lane changes
+    lateral_margin          minimum distance beside vehicles;  pedestrian_margin  beside pedestrians and cyclists
+    crossing_time           minimum time between the vehicle and crossing traffic at a place that both pass
+    horizon                 time for which proposals are rolled out; PDM-Closed plans 8 s
+    period                  time between two decisions
+    lane_changes            whether the vehicle may leave the lane of its route to pass slower traffic and obstacles
+    uncertainty             multiple of the standard deviation of its position by which an object is enlarged; 1.645
+                            covers 95 % on one side
+    possible_existence      existence probability from which an object reduces the speed comfortably; hard braking
+                            needs `min_existence`
+    memory                  time for which a lost object is kept; `lost_detection_timeout` of Autoware
+    """
+
+    time_gap: PositiveFloat = 1.2
+    standstill_gap: PositiveFloat = 2.0
+    passing_gap: Annotated[float, Field(ge=0.0, le=50.0)] = 6.0
+    acceleration: PositiveFloat = 1.5
+    comfortable_deceleration: Deceleration = 2.0
+    hard_deceleration: Deceleration = 4.0
+    emergency_deceleration: Deceleration = 8.0
+    lateral_acceleration: PositiveFloat = 2.0
+    lateral_margin: Annotated[float, Field(ge=0.0, le=3.0)] = 0.4
+    pedestrian_margin: Annotated[float, Field(ge=0.0, le=3.0)] = 0.8
+    crossing_time: Annotated[float, Field(ge=0.0, le=5.0)] = 0.75
+    horizon: Annotated[float, Field(ge=3.0, le=15.0)] = 8.0
+    period: Annotated[float, Field(gt=0.0, le=1.0)] = 0.1
+    lane_changes: bool = True
+    uncertainty: Annotated[float, Field(ge=0.0, le=5.0)] = 1.645
+    possible_existence: Share = 0.3
+    memory: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0

@@ -1,0 +1,67 @@
+"""Situation in which the planner decides."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject
+from eidrive_scenario.driving.planning.behavior.prediction import Prediction
+from eidrive_scenario.driving.planning.behavior.proposals import Wall
+from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+
+
+class Situation(msgspec.Struct, frozen=True):
+    """Position and speed of the vehicle on its line, wanted speed, and the known objects.
+
+    limits  speed limits (M,) at the points of the line [m/s];  s, d  of the reference point [m]
+    steered  s and d of the front axle, which the controller keeps on the trajectory [m], and the slope of its motion
+    window  range of the points that matter
+    stop    place at which a signal requires a stop, or None
+    """
+
+    line: ReferenceLine
+    limits: Array
+    s: float
+    d: float
+    steered: tuple[float, float, float]
+    speed: float
+    wanted: float
+    objects: list[KnownObject]
+    prediction: Prediction
+    window: tuple[int, int]
+    stop: Wall | None
+    now: float
+
+    def kind_of(self, owner: int) -> str:
+        """Return the class of an object."""
+        return self.objects[owner].kind
+
+    def describe(self, owner: int) -> str:
+        """Return class, distance and speed of an object as text."""
+        known = self.objects[owner]
+        x, y = self.line.points[self.line.index_at(self.s)].tolist()
+        distance = math.hypot(known.x - x, known.y - y)
+        return f"{known.kind} {distance:.0f} m ahead at {known.speed:.1f} m/s"
+
+    def rows_of(self, owner: int | None) -> tuple[int, ...]:
+        """Return the row of an object among the fused objects; none if it is lost."""
+        row = None if owner is None else self.objects[owner].row
+        return () if row is None else (row,)
+
+    def free_progress(self, horizon: float, acceleration: float) -> float:
+        """Return the distance that the vehicle covers without objects [m], by limits, walls and acceleration."""
+        speed, s, step = self.speed, self.s, 0.5
+        end = math.inf if self.stop is None else self.stop.s
+        for _ in range(round(horizon / step)):
+            limit = float(self.limits[min(int(s / self.line.spacing), len(self.limits) - 1)])
+            speed = min(speed + acceleration * step, self.wanted, limit)
+            s = min(s + speed * step, end)
+        return s - self.s
+
+    def lanes_at(self, s: float) -> int:
+        """Return the index of the point of the line at a distance along it."""
+        return int(np.clip(self.line.index_at(s), 0, len(self.line.points) - 1))

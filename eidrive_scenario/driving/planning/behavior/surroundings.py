@@ -1,0 +1,92 @@
+"""Predicted objects in the coordinates of the reference line."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject
+from eidrive_scenario.driving.planning.behavior.prediction import Prediction
+from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+
+VULNERABLE = frozenset({"pedestrian", "bicycle", "motorbike"})
+LARGEST_LATERAL_ERROR = 0.75
+"""Maximum enlargement of an object to the side [m]: half of what a lane leaves beside a car, else neighbors block."""
+LARGEST_ERROR_ALONG = 3.0
+"""Maximum enlargement of an object along the line [m]."""
+FAR_ASIDE = 12.0
+"""Distance from the line beyond which an object has no effect at that time [m]."""
+ACROSS = np.cos(np.radians(40.0))
+"""Cosine of the angle between the motion of an object and the line from which on it crosses."""
+
+
+class Surroundings(msgspec.Struct, frozen=True):
+    """N hypotheses at K times in coordinates of the reference line.
+
+    s, d, half_length, half_width  (N, K) [m];  speed  (N, K) along the line [m/s];  margin  (N,) to the side [m]
+    owner  (N,) index of the object;  certain  (N,) whether its existence is certain enough for hard braking
+    passing_gap  (N,) additional gap behind standing vehicles [m]
+    crosses  (N, K) whether it moves across the line;  behind  (N,) whether it follows the ego in its lane
+    """
+
+    s: Array
+    d: Array
+    half_length: Array
+    half_width: Array
+    speed: Array
+    margin: Array
+    owner: tuple[int, ...]
+    certain: Bools
+    passing_gap: Array
+    crosses: Bools
+    behind: Bools
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+
+def surroundings(
+    objects: list[KnownObject],
+    prediction: Prediction,
+    line: ReferenceLine,
+    window: tuple[int, int],
+    settings: BehaviorSettings,
+    ego: tuple[float, float, float, float],
+) -> Surroundings:
+    """Return the predicted objects along the points of the line in `window`.
+
+    ego  distance along the line of the center of the ego, its offset, half length and half width [m]
+    """
+    s, d, heading = line.project(prediction.x, prediction.y, *window)
+    turn = prediction.yaw - heading
+    cos, sin = np.cos(turn), np.sin(turn)
+    owners = [objects[index] for index in prediction.objects]
+    half = np.array([(known.length / 2.0, known.width / 2.0) for known in owners]).reshape(-1, 2, 1)
+    error = settings.uncertainty * np.array([known.error for known in owners])[:, None]
+    half_length = np.abs(cos) * half[:, 0] + np.abs(sin) * half[:, 1] + np.minimum(error, LARGEST_ERROR_ALONG)
+    half_width = np.abs(sin) * half[:, 0] + np.abs(cos) * half[:, 1] + np.minimum(error, LARGEST_LATERAL_ERROR)
+    margin = np.array(
+        [settings.pedestrian_margin if known.kind in VULNERABLE else settings.lateral_margin for known in owners]
+    )
+    moving = prediction.speed[:, :1] > 0.0
+    center, offset, length, width = ego
+    behind = (s[:, 0] + half_length[:, 0] < center - length) & (np.abs(d[:, 0] - offset) < half_width[:, 0] + width)
+    return Surroundings(
+        s,
+        np.where(np.abs(d) < FAR_ASIDE, d, 1e3),
+        half_length,
+        half_width,
+        prediction.speed * cos,
+        margin,
+        prediction.objects,
+        np.array([known.existence >= settings.min_existence for known in owners], dtype=bool),
+        np.array([settings.passing_gap if _may_be_passed(known) else 0.0 for known in owners]),
+        moving & (np.abs(cos) < ACROSS),
+        behind,
+    )
+
+
+def _may_be_passed(known: KnownObject) -> bool:
+    return known.still_since is not None and known.kind not in VULNERABLE

@@ -1,0 +1,199 @@
+"""Decisions of the planner in closed loop: what probability, covariance and age of an object change, and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detections, two_lane_road
+
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.requests import Goal
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState
+
+DEFAULTS = BehaviorSettings()
+PEDESTRIAN = KnownBox(90.0, kind="pedestrian", size=(0.5, 0.5))
+
+
+@pytest.fixture(scope="module")
+def roads() -> RoadNetwork:
+    return two_lane_road()
+
+
+def drive(
+    roads: RoadNetwork,
+    objects: Callable[[float], Sequence[KnownBox]],
+    seconds: float,
+    *,
+    age: float = 0.0,
+    **settings: float | bool,
+) -> PlannedDrive:
+    run = PlannedDrive(behavior(roads, **settings), roads)
+    run.run(seconds, objects, age=age)
+    run.world.close()
+    return run
+
+
+def appears_ahead(gap: float, score: float = 1.0) -> Callable[[float], Sequence[KnownBox]]:
+    """Return a standing car that appears after 1 s, `gap` [m] ahead of the front of the car, which drives 10 m/s."""
+    car = KnownBox(20.0 + 10.0 + FRONT + gap + 2.25)._replace(score=score)
+    return lambda now: [car] if now >= 1.0 else []
+
+
+def emergency(run: PlannedDrive) -> bool:
+    return any(plan.braking for plan in run.plans)
+
+
+def test_free_road_is_driven_at_target_speed(roads: RoadNetwork) -> None:
+    run = drive(roads, lambda now: [], 10.0)
+    assert run.speeds[-1] == pytest.approx(10.0, abs=0.3)
+    assert set(run.reasons) == {"keep speed"}
+
+
+def test_ghost_of_low_score_causes_comfortable_braking_only(roads: RoadNetwork) -> None:
+    # From 10 m/s within 12 m: 4.2 m/s². A certain object causes that much, a possible one 2 m/s² at most.
+    ghost = drive(roads, appears_ahead(12.0, score=0.3), 8.0)
+    assert not emergency(ghost)
+    assert ghost.hardest_braking < DEFAULTS.comfortable_deceleration + 0.2
+    assert min(ghost.speeds) < 9.0
+    assert "slow down for a possible car" in ghost.reasons
+    possible = [plan for plan in ghost.plans if plan.reason == "slow down for a possible car"]
+    assert all(plan.objects == (0,) for plan in possible)
+    real = drive(roads, appears_ahead(12.0, score=0.9), 8.0)
+    assert real.front < 45.85, "behind it"
+    assert real.hardest_braking > 4.0
+    assert "emergency braking: collision course with car" in real.reasons
+
+
+def test_ghost_below_possible_existence_changes_nothing(roads: RoadNetwork) -> None:
+    run = drive(roads, appears_ahead(12.0, score=0.29), 4.0)
+    assert set(run.reasons) == {"keep speed"}
+
+
+def test_possible_existence_and_min_existence_are_settings(roads: RoadNetwork) -> None:
+    ghost = appears_ahead(12.0, score=0.3)
+    assert set(drive(roads, ghost, 4.0, possible_existence=0.4).reasons) == {"keep speed"}
+    assert emergency(drive(roads, ghost, 4.0, min_existence=0.25))
+
+
+def test_distant_ghost_is_approached_as_an_object(roads: RoadNetwork) -> None:
+    """Comfortable braking is sufficient, so that the probability makes little difference."""
+    ghost = drive(roads, lambda now: [PEDESTRIAN._replace(score=0.3)], 25.0)
+    certain = drive(roads, lambda now: [PEDESTRIAN], 25.0)
+    assert ghost.speeds[-1] < 0.1
+    assert ghost.front == pytest.approx(certain.front, abs=0.5)
+
+
+@pytest.mark.parametrize("deviation", [0.5, 1.0])
+def test_doubled_covariance_increases_the_gap_by_its_growth(roads: RoadNetwork, deviation: float) -> None:
+    fronts = [
+        drive(roads, lambda now, d=d: [PEDESTRIAN._replace(deviation=d)], 30.0).front  # type: ignore[misc]
+        for d in (deviation, deviation * math.sqrt(2.0))
+    ]
+    growth = DEFAULTS.uncertainty * deviation * (math.sqrt(2.0) - 1.0)
+    assert fronts[0] - fronts[1] == pytest.approx(growth, abs=0.2)
+    # With a known position the car stops the standstill gap before the pedestrian.
+    expected = 90.0 - 0.25 - DEFAULTS.uncertainty * deviation - DEFAULTS.standstill_gap
+    assert fronts[0] == pytest.approx(expected, abs=0.6)
+
+
+def test_doubled_covariance_increases_the_clearance_of_a_passed_car(roads: RoadNetwork) -> None:
+    parked = KnownBox(100.0, LANE - 1.3, deviation=0.2)
+    clearance = []
+    for deviation in (0.2, 0.2 * math.sqrt(2.0)):
+        run = drive(roads, lambda now, d=deviation: [parked._replace(deviation=d)], 14.0)  # type: ignore[misc]
+        beside = [y for x, y, _ in run.path if 96.0 < x + 1.4 < 104.0]
+        assert beside, "the car passes"
+        clearance.append(min(beside) - 0.5 * 1.837 - (parked.y + 0.9))
+    assert clearance[0] > DEFAULTS.lateral_margin
+    growth = DEFAULTS.uncertainty * 0.2 * (math.sqrt(2.0) - 1.0)
+    assert clearance[1] - clearance[0] == pytest.approx(growth, abs=0.05)
+
+
+def test_message_of_half_a_second_ago_is_moved_to_the_present(roads: RoadNetwork) -> None:
+    # At constant speed only the uncertainty grows, by 0.5 m/s · 0.5 s per deviation.
+    def lead(now: float) -> list[KnownBox]:
+        return [KnownBox(45.0 + 8.0 * now, vx=8.0)]
+
+    fresh, old = drive(roads, lead, 25.0), drive(roads, lead, 25.0, age=0.5)
+    assert fresh.front - old.front == pytest.approx(DEFAULTS.uncertainty * 0.25, abs=0.15)
+    assert old.speeds[-1] == pytest.approx(8.0, abs=0.05)
+
+
+def test_message_of_half_a_second_ago_delays_the_reaction_to_braking(roads: RoadNetwork) -> None:
+    def lead(now: float) -> list[KnownBox]:
+        slowing = min(max(now - 3.0, 0.0), 2.5)
+        return [KnownBox(45.0 + 10.0 * now - 10.0 * max(now - 5.5, 0.0) - 2.0 * slowing**2, vx=10.0 - 4.0 * slowing)]
+
+    starts = []
+    for age in (0.0, 0.5):
+        run = drive(roads, lead, 12.0, age=age)
+        assert run.front < lead(12.0)[0].x - 2.25, "no contact"
+        slow = np.array([speed < run.speeds[58] - 0.3 for speed in run.speeds])
+        slow[:60] = False
+        starts.append(int(np.argmax(slow)) * 0.05)
+    assert starts[1] - starts[0] == pytest.approx(0.5, abs=0.15)
+
+
+def test_standing_queue_is_not_passed(roads: RoadNetwork) -> None:
+    run = drive(roads, lambda now: [KnownBox(100.0), KnownBox(107.0), KnownBox(114.0)], 18.0)
+    assert run.front < 97.75
+    assert run.speeds[-1] < 0.1
+
+
+def test_oncoming_traffic_is_awaited_before_passing(roads: RoadNetwork) -> None:
+    def traffic(now: float) -> list[KnownBox]:
+        oncoming = [KnownBox(190.0 + 15.0 * k - 10.0 * now, 1.75, vx=-10.0, yaw=math.pi) for k in range(6)]
+        return [KnownBox(100.0), *oncoming]
+
+    run = drive(roads, traffic, 35.0)
+    last_passed = (265.0 - 90.0) / 10.0
+    beside = [number * 0.05 for number, (_, y, _) in enumerate(run.path) if y > 0.0]
+    assert beside, "the car passes"
+    assert min(beside) > last_passed
+    assert run.front > 130.0
+
+
+def test_lane_changes_can_be_switched_off(roads: RoadNetwork) -> None:
+    run = drive(roads, lambda now: [KnownBox(100.0)], 25.0, lane_changes=False)
+    assert run.front < 97.75
+    assert max(y for _, y, _ in run.path) < LANE + 0.3
+
+
+def test_crossing_pedestrian_is_given_way(roads: RoadNetwork) -> None:
+    def walker(now: float) -> list[KnownBox]:
+        return [KnownBox(80.0, -8.0 + 1.4 * now, vy=1.4, kind="pedestrian", size=(0.5, 0.5), yaw=math.pi / 2)]
+
+    run = drive(roads, walker, 16.0)
+    gaps = [
+        math.hypot(max(abs(x + 1.4 - 80.0) - 2.446 - 0.25, 0.0), max(abs(y - walker(k * 0.05)[0].y) - 0.92 - 0.25, 0.0))
+        for k, (x, y, _) in enumerate(run.path)
+    ]
+    assert min(gaps) > 0.5
+    assert "give way to pedestrian" in run.reasons
+    assert run.front > 100.0
+
+
+def test_object_outside_of_the_way_changes_nothing(roads: RoadNetwork) -> None:
+    run = drive(
+        roads, lambda now: [KnownBox(100.0, 8.0), KnownBox(60.0, -9.0, kind="pedestrian", size=(0.5, 0.5))], 15.0
+    )
+    assert set(run.reasons) == {"keep speed"}
+
+
+def test_decisions_have_the_period_of_the_settings(roads: RoadNetwork) -> None:
+    planner = behavior(roads, period=0.2)
+    changes = []
+    before = None
+    for tick in range(20):
+        now = 0.05 * tick
+        state = EgoState(now, np.array([20.0 + 10.0 * now, LANE, 0.0]), 0.0, 0.0, 0.0, 10.0, 0.0, 0.0)
+        objects = [KnownBox(60.0)] if tick >= 5 else []
+        reason = planner.plan(state, detections(now, *objects), Goal(), now).reason
+        if before is not None and reason != before:
+            changes.append(now)
+        before = reason
+    assert changes[0] == pytest.approx(0.4), "decisions at 0, 0.2 and 0.4 s; the object appears at 0.25 s"

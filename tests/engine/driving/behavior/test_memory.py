@@ -1,0 +1,86 @@
+"""Memory of the planner: association, velocity, acceleration, loss."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from planned_drive import KnownBox, detections
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.behavior.memory import ObjectMemory
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+
+
+def memory(**settings: float) -> ObjectMemory:
+    return ObjectMemory(BehaviorSettings.model_validate(settings))
+
+
+def test_velocity_is_estimated_where_the_detector_has_none() -> None:
+    objects = memory()
+    for tick in range(20):
+        now = 0.1 * tick
+        (known,) = objects.update(detections(now, KnownBox(50.0 - 8.0 * now, vx=math.nan, vy=math.nan)), now)
+    assert (known.vx, known.vy) == pytest.approx((-8.0, 0.0), abs=1e-6)
+
+
+def test_measured_velocity_is_taken_as_it_is() -> None:
+    objects = memory()
+    for now in (0.0, 0.1):
+        (known,) = objects.update(detections(now, KnownBox(10.0, vx=3.0, vy=-4.0)), now)
+    assert (known.vx, known.vy, known.speed) == (3.0, -4.0, 5.0)
+
+
+def test_acceleration_converges_to_that_of_the_object() -> None:
+    objects = memory()
+    for tick in range(30):
+        now = 0.1 * tick
+        (known,) = objects.update(detections(now, KnownBox(20.0 * now - 1.5 * now**2, vx=20.0 - 3.0 * now)), now)
+    assert known.acceleration == pytest.approx(-3.0, rel=0.02)
+
+
+def test_two_objects_that_exchange_rows_keep_their_motion() -> None:
+    objects = memory()
+    first, second = KnownBox(0.0, 0.0, vx=math.nan, vy=math.nan), KnownBox(10.0, 4.0, vx=math.nan, vy=math.nan)
+    objects.update(detections(0.0, first, second), 0.0)
+    objects.update(detections(0.1, first._replace(x=1.0), second), 0.1)
+    known = objects.update(detections(0.2, second, first._replace(x=2.0)), 0.2)
+    assert [(round(entry.vx, 6), entry.row) for entry in known] == [(0.0, 0), (10.0, 1)]
+
+
+def test_lost_object_moves_on_grows_and_is_dropped() -> None:
+    objects = memory(memory=1.0)
+    objects.update(detections(0.0, KnownBox(0.0, vx=10.0)), 0.0)
+    nothing = Detections(0.0)
+    (known,) = objects.update(nothing, 0.6)
+    assert known.row is None
+    assert known.x == pytest.approx(6.0)
+    assert known.error == pytest.approx(0.1 + 0.5 * 0.6)
+    assert objects.update(nothing, 1.0)
+    assert not objects.update(nothing, 1.1)
+
+
+def test_lost_object_of_low_existence_is_dropped_at_once() -> None:
+    objects = memory(possible_existence=0.3, min_existence=0.5)
+    assert objects.update(detections(0.0, KnownBox(0.0, score=0.4)), 0.0)
+    assert not objects.update(Detections(0.1), 0.1)
+
+
+def test_object_below_possible_existence_is_ignored() -> None:
+    assert not memory(possible_existence=0.3).update(detections(0.0, KnownBox(0.0, score=0.29)), 0.0)
+
+
+def test_old_detections_are_moved_to_the_present() -> None:
+    (known,) = memory().update(detections(1.0, KnownBox(0.0, 0.0, vx=4.0, vy=2.0)), 1.5)
+    assert (known.x, known.y) == pytest.approx((2.0, 1.0))
+    assert known.error == pytest.approx(0.1 + 0.5 * 0.5)
+
+
+def test_time_since_an_object_stands() -> None:
+    objects = memory()
+    for tick in range(41):
+        now = 0.1 * tick
+        speed = max(4.0 - 4.0 * now, 0.0)
+        (known,) = objects.update(detections(now, KnownBox(4.0 * now - 2.0 * min(now, 1.0) ** 2, vx=speed)), now)
+    assert known.still_since == pytest.approx(0.9)
+    assert known.moving_since is None
