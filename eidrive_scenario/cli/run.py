@@ -14,8 +14,8 @@ from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
 from eidrive_scenario.cli.streams import has_all_characters
 from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError
-from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.errors import ConstraintError, Diagnostic, EidriveError, InputError, SettingError
+from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
@@ -150,8 +150,12 @@ def run(
                     explanations=explanations,
                     wall_limit=wall_limit,
                 )
-            except InputError:
-                raise
+            except InputError as error:
+                if not codes or isinstance(error, ConstraintError):
+                    raise
+                typer.echo(f"seed {each}: {error}", err=True)  # The values that it draws are invalid
+                codes.append(INVALID_INPUT)
+                continue
             except EidriveError as error:
                 failures.report(error)
                 codes.append(ABORTED)

@@ -62,6 +62,6 @@ def _with_planner(scenario: Scenario, name: str, controller: Controller, planner
         return controller
     replaced = ("planner", "planner_settings")
     kept = tuple(entry for entry in property_entries(controller) if entry.name not in replaced)
-    selected = Property(name="planner", value=planner, scope=scenario.scope, line=0, source=OPTION)
+    selected = Property(name="planner", value=planner, scope=scenario.scope, line=controller.line, source=OPTION)
     line, source = controller.line, controller.source
     return replace(controller, properties=Properties(property=(*kept, selected), line=line, source=source))

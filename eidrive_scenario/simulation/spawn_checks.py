@@ -39,23 +39,24 @@ def check_spawns(scenario: Scenario, roads: RoadNetwork | None, world: World, dr
 
 
 def overlapping_spawns(scenario: Scenario, view: WorldView, names: Collection[str]) -> Iterator[Diagnostic]:
-    """Yield the overlaps of these actors with any actor, each pair once. A train of vehicle and trailers has none."""
+    """Yield those of these actors that overlap another one; a pair of them is one diagnostic.
+
+    Vehicle and trailers of a train do not count.
+    """
     present = [name for name in scenario.entities if name in view.rows]
     boxes = {name: _core(view.plain_boxes[view.rows[name]]) for name in present}
     trains = _trains(scenario)
     done: set[str] = set()
     for name in names:
         done.add(name)
-        for other in present:
-            is_pair = other not in done and trains.get(name, name) != trains.get(other, other)
-            if is_pair and overlap(boxes[name], boxes[other]):
-                x, y, *_ = boxes[other]
-                yield _at(
-                    scenario,
-                    name,
-                    f"{quoted(name)} starts inside of {quoted(other)}, whose center is at ({x:.1f}, {y:.1f}) m",
-                    "move one of them",
-                )
+        train = trains.get(name, name)
+        candidates = [other for other in present if other not in done and trains.get(other, other) != train]
+        others = [other for other in candidates if overlap(boxes[name], boxes[other])]
+        if others:
+            x, y, *_ = boxes[others[0]]
+            more = f", and of {len(others) - 1} more" if len(others) > 1 else ""
+            message = f"{quoted(name)} starts inside of {quoted(others[0])}, whose center is at ({x:.1f}, {y:.1f}) m"
+            yield _at(scenario, name, message + more, "move one of them")
 
 
 def _core(box: Sequence[float]) -> list[float]:

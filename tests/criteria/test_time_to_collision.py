@@ -11,6 +11,7 @@ from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionS
 from msgspec.structs import replace
 
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
+from eidrive_scenario.geometry import overlap
 
 
 def box(x: float, y: float = 0.0, yaw: float = 0.0, z: float = 0.75) -> list[float]:
@@ -137,3 +138,39 @@ def test_criterion_with_accelerations(frame: Any, car: Any) -> None:
     assert not braking_lead(frame, car, -4.0, accelerations=True, at_least=3.17).passed
     assert braking_lead(frame, car, -4.0).value is None
     assert braking_lead(frame, car, -200.0, accelerations=True).value is None, "a step of the speed"
+
+
+def test_contact_with_accelerations_agrees_with_stepped_motion() -> None:
+    """Random courses, followed in steps of 10 ms with the overlap test of the geometry, for 6 s."""
+    rng = np.random.default_rng(5)
+    times = np.arange(0.0, 6.0, 0.01)
+    contacts = 0
+    for _ in range(120):
+        boxes, courses = [], []
+        for place in ((0.0, 0.0), rng.uniform(-12, 12, 2)):
+            yaw, speed, rate = rng.uniform(-math.pi, math.pi), rng.uniform(0, 15), rng.uniform(-6, 4)
+            along = math.cos(yaw), math.sin(yaw), 0.0
+            stop = speed / -rate if rate < 0.0 else math.inf
+            courses.append(
+                Course(
+                    (speed * along[0], speed * along[1], 0.0),
+                    (rate * along[0], rate * along[1], 0.0),
+                    stop,
+                )
+            )
+            boxes.append(box(float(place[0]), float(place[1]), yaw))
+        found = accelerated_contact(boxes[0], boxes[1], courses[0], courses[1])
+        stepped = next((time for time in times if overlap(*_moved(boxes, courses, time))), math.inf)
+        if stepped < 5.98 or found < 5.98:
+            assert found == pytest.approx(stepped, abs=0.0101)
+            contacts += 1
+    assert contacts > 10
+
+
+def _moved(boxes: list[list[float]], courses: list[Course], time: float) -> list[list[float]]:
+    moved = []
+    for body, way in zip(boxes, courses, strict=True):
+        until = min(time, way.stop)
+        shift = [v * until + a * until * until / 2.0 for v, a in zip(way.velocity, way.acceleration, strict=True)]
+        moved.append([body[0] + shift[0], body[1] + shift[1], *body[2:]])
+    return moved

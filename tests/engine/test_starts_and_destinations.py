@@ -120,6 +120,21 @@ def test_all_errors_are_reported_at_once(tmp_path: Path) -> None:
     assert [" off " in one for one in errors(path)] == [False, True]
 
 
+def test_many_vehicles_at_one_place_are_one_error_each() -> None:
+    names = [f"Car{number}" for number in range(5)]
+    source = scenario_xml(
+        entities="".join(object_xml(name, controller=agent_xml()) for name in names),
+        init="".join(init_xml(name, teleport_xml(world_position_xml(0))) for name in names),
+        stop=end_xml(0.1),
+    )
+    with pytest.raises(InputError) as caught:
+        run_file(source)
+    assert [one.message.split(", whose")[0] for one in caught.value.diagnostics] == [
+        f"'Car{number}' starts inside of 'Car{number + 1}'" for number in range(4)
+    ]
+    assert caught.value.diagnostics[0].message.endswith(" m, and of 3 more")
+
+
 def test_selection_that_is_placed_as_a_whole_has_the_line_of_its_action(tmp_path: Path) -> None:
     path = write(tmp_path, lane_position_xml(-1, 20))
     both = '<EntitySelection name="Both"><Members><EntityRef entityRef="Ego"/><EntityRef entityRef="Other"/></Members>'

@@ -10,11 +10,13 @@ from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive
+from openscenario_xml import agent_xml, object_xml, parameters_xml, scenario_xml
+from storyboard_xml import end_xml, init_xml, teleport_xml, world_position_xml
 
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.verdicts import show
 from eidrive_scenario.recording import read_recording
-from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings
+from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, load_for_seed
 
 
 def test_run_of_passing_scenario_prints_verdicts(eidrive: Eidrive, passing_by: Path) -> None:
@@ -218,3 +220,29 @@ def test_controller_option_for_station_is_a_warning(eidrive: Eidrive) -> None:
     warned = eidrive(*short, "--controller", "EgoStack=alks").stderr
     assert "warning: --controller: controller 'EgoStack' belongs to a station" in warned
     assert eidrive(*short).stderr == ""
+
+
+def test_invalid_start_of_one_seed_does_not_end_the_other_runs(eidrive: Eidrive, tmp_path: Path) -> None:
+    """The bodies are 4.5 m long; the distance of their places is drawn."""
+    distance = "<CustomCommandAction type='eidrive.variation'>Distance: {uniform: [0, 9]}</CustomCommandAction>"
+    path = tmp_path / "a.xosc"
+    path.write_bytes(
+        scenario_xml(
+            declarations=parameters_xml(Distance=("double", "9")),
+            entities=object_xml("Ego", controller=agent_xml(target_speed=5)) + object_xml("Other"),
+            init=f"<UserDefinedAction>{distance}</UserDefinedAction>"
+            + init_xml("Ego", teleport_xml(world_position_xml(0)))
+            + init_xml("Other", teleport_xml("<WorldPosition x='$Distance' y='0'/>")),
+            stop=end_xml(0.1),
+        )
+    )
+    drawn = [float(load_for_seed(path, seed, {}).parameters["Distance"]) for seed in range(1, 9)]
+    invalid = [seed for seed, distance in enumerate(drawn, 1) if distance < 4.5]
+    assert 1 not in invalid, "an error of the first run ends the command"
+    assert 0 < len(invalid) < 7
+    result = eidrive("run", path, "--repeat", "8", "--no-record")
+    assert result.exit_code == 2
+    assert result.stdout.count("trace ") == 8 - len(invalid)
+    assert re.findall(r"^seed (\d+): .* 'Ego' starts inside of 'Other'", result.stderr, re.MULTILINE) == [
+        str(seed) for seed in invalid
+    ]
