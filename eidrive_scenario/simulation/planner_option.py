@@ -51,7 +51,7 @@ def _planner_of(scenario: Scenario, name: str, controller: Controller) -> str | 
     try:
         planner = agent_settings(controller).planner
     except SettingError:  # The stack reports the errors of the properties
-        return None
+        return ""
     return None if planner == NO_PLANNER else planner or ""
 
 

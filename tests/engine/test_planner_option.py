@@ -90,3 +90,9 @@ def test_invalid_planner_is_an_error_before_the_run(planner: object, message: st
 def test_missing_setting_of_the_planner_is_an_error_with_the_line_of_the_controller() -> None:
     with pytest.raises(InputError, match="conflict_area"):
         run_file(scenario(object_xml("Ego", controller=agent_xml())), settings=RunSettings(planner="conflict_area"))
+
+
+def test_invalid_property_of_the_station_is_the_only_error() -> None:
+    with pytest.raises(InputError) as caught:
+        run_file(scenario(object_xml("Ego", controller=agent_xml(speed=3))), settings=RunSettings(planner="route"))
+    assert ["unknown setting 'speed'" in one.message for one in caught.value.diagnostics] == [True]
