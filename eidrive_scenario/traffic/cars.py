@@ -42,6 +42,7 @@ class Cars:
     turns         number of branches selected so far
     number        running number, constant for the lifetime of the car
     walks         True for pedestrians, which use sidewalks
+    ignores_lights  whether the driver ignores traffic lights
     """
 
     progress: Array = field(default_factory=_floats)
@@ -62,6 +63,7 @@ class Cars:
     turns: Integers = field(default_factory=_integers)
     number: Integers = field(default_factory=_integers)
     walks: Bools = field(default_factory=lambda: np.empty(0, dtype=bool))
+    ignores_lights: Bools = field(default_factory=lambda: np.empty(0, dtype=bool))
     plan: Integers = field(default_factory=lambda: np.empty((0, PLANNED + 1), dtype=np.int64))
     granted: Bools = field(default_factory=lambda: np.empty((0, PLANNED + 1), dtype=bool))
     drivers: Drivers = field(default_factory=lambda: Drivers.of([]))

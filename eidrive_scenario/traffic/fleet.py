@@ -146,11 +146,13 @@ class Fleet:
         driver: IntelligentDriver | None = None,
         factor: float = 1.0,
         fallback: float = FREE,
+        ignores_lights: bool = False,
     ) -> Placement:
         """Add a car by lane row and progress.
 
-        factor    share of the speed limit that is the desired speed
-        fallback  desired speed on lanes without a limit [m/s]
+        factor          share of the speed limit that is the desired speed
+        fallback        desired speed on lanes without a limit [m/s]
+        ignores_lights  whether the driver ignores traffic lights
         """
         if spec.name in self._index:
             raise ValueError(f"car {spec.name!r} is in the fleet already")
@@ -169,6 +171,7 @@ class Fleet:
             asked=math.nan,
             number=self._made,
             walks=bool(self.lanes.walkable[row]),
+            ignores_lights=ignores_lights,
         )
         self._made += 1
         self._index[spec.name] = index

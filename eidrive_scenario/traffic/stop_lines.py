@@ -71,9 +71,9 @@ class StopLines:
         return self._closed
 
     def ahead(self, cars: Cars) -> Leaders:
-        """Return the stop lines at which cars have to stop, without those that require too hard braking."""
+        """Return the stop lines at which cars stop, without those that require too hard braking."""
         none = np.zeros(len(cars))
         lines = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, none, self.closed())
         late = cars.speed**2 > 2.0 * TOO_LATE * np.maximum(lines.gap, 0.0)
-        binding = (lines.gap >= 0.0) & ~late & ~cars.walks
+        binding = (lines.gap >= 0.0) & ~late & ~cars.walks & ~cars.ignores_lights
         return Leaders(np.where(binding, np.maximum(lines.gap - STOP_LINE, 1e-3), np.inf), lines.speed)

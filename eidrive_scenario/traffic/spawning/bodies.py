@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Generic, TypeVar
+from typing import Annotated, Generic, TypeVar
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from eidrive_scenario.car_following import IntelligentDriver
 from eidrive_scenario.errors import Diagnostic, ScenarioError
@@ -42,7 +42,8 @@ WALKING = 1.34
 class DriverSettings(Settings):
     """Properties of a controller with module `eidrive.traffic`; units as in IntelligentDriver.
 
-    speed_factor  mean share of the speed limit that is the desired speed
+    speed_factor   mean share of the speed limit that is the desired speed
+    ignore_lights  share of the drivers that ignore traffic lights
     """
 
     module: str = MODULE
@@ -51,6 +52,7 @@ class DriverSettings(Settings):
     acceleration: PositiveFloat | None = None
     deceleration: PositiveFloat | None = None
     speed_factor: PositiveFloat = 1.0
+    ignore_lights: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
 
     def driver(self, usual: IntelligentDriver) -> IntelligentDriver:
         """Return the default driver with these parameters."""
@@ -65,6 +67,7 @@ class Participant:
     spec: ActorSpec
     driver: IntelligentDriver
     speed_factor: float = 1.0
+    ignore_lights: float = 0.0
 
     @property
     def walks(self) -> bool:
@@ -173,7 +176,7 @@ class TrafficMix:
 
 def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:
     usual = ON_FOOT if spec.category == "pedestrian" else _driver_of(spec)
-    return Participant(spec, settings.driver(usual), settings.speed_factor)
+    return Participant(spec, settings.driver(usual), settings.speed_factor, settings.ignore_lights)
 
 
 def _driver_of(spec: ActorSpec) -> IntelligentDriver:

@@ -144,6 +144,8 @@ class Population:
         name = self._new_name(group.name)
         spec = replace(participant.spec, name=name)
         factor = float(np.clip(rng.normal(participant.speed_factor, SPREAD), LEAST, MOST))
+        # Without such drivers nothing is drawn, so that all other draws of the attempt remain the same.
+        ignores = participant.ignore_lights > 0.0 and bool(rng.uniform() < participant.ignore_lights)
         placement = self.fleet.add_at(
             spec,
             int(some.row[n]),
@@ -153,6 +155,7 @@ class Population:
             driver=participant.driver,
             factor=factor,
             fallback=FREE if given_speed is None else given_speed,
+            ignores_lights=ignores,
         )
         group.members[name] = None
         self._groups[name] = group

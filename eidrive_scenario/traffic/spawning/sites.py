@@ -22,6 +22,8 @@ SPACING = 5.0
 """Distance between the sites along a lane [m]."""
 WIDEST = 2.55
 """Maximum vehicle width for which a lane is required to be wide enough [m]; Directive 96/53/EC."""
+FINE_SPACING = 0.5
+"""Distance between the sites in an area without sites of the usual distance [m]."""
 REACH = 30.0
 """Maximum distance of a traffic position from a lane [m]."""
 AIR = 0.5
@@ -40,9 +42,9 @@ class SpawnSites:
     width: Array
 
     @classmethod
-    def along(cls, lanes: TrafficLanes, rows: Integers) -> SpawnSites:
+    def along(cls, lanes: TrafficLanes, rows: Integers, spacing: float = SPACING) -> SpawnSites:
         """Return equidistant sites along lanes."""
-        counts = np.maximum(np.floor(lanes.length[rows] / SPACING).astype(np.int64), 1)
+        counts = np.maximum(np.floor(lanes.length[rows] / spacing).astype(np.int64), 1)
         row = np.repeat(rows, counts)
         number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
         return cls.at(lanes, row, (number + 0.5) * lanes.length[row] / np.repeat(counts, counts))
@@ -93,14 +95,26 @@ class SpawnAreas:
     @cached_property
     def driving(self) -> SpawnSites:
         """Sites for vehicles, without lanes that end."""
-        lanes = self._lanes
-        fit = lanes.tables.lane_drivable & ~lanes.in_junction & np.isinf(lanes.ends_at)
-        return SpawnSites.along(lanes, np.flatnonzero(fit))
+        return SpawnSites.along(self._lanes, self._rows(walks=False))
 
     @cached_property
     def walking(self) -> SpawnSites:
         """Sites for pedestrians."""
-        return SpawnSites.along(self._lanes, np.flatnonzero(self._lanes.walkable & ~self._lanes.in_junction))
+        return SpawnSites.along(self._lanes, self._rows(walks=True))
+
+    def _rows(self, *, walks: bool) -> Integers:
+        lanes = self._lanes
+        fit = lanes.walkable if walks else lanes.tables.lane_drivable & np.isinf(lanes.ends_at)
+        return np.flatnonzero(fit & ~lanes.in_junction)
+
+    def covered(self, participant: Participant, covers: Covers) -> SpawnSites:
+        """Return the sites in an area at which a participant fits; closer ones if none of the usual ones is inside."""
+        sites = self.for_body(participant)
+        inside = sites.subset(covers(sites))
+        if len(inside):
+            return inside
+        sites = SpawnSites.along(self._lanes, self._rows(walks=participant.walks), FINE_SPACING)
+        return sites.subset(covers(sites))
 
     def for_body(self, participant: Participant) -> SpawnSites:
         """Return the sites at which a participant fits."""

@@ -129,3 +129,13 @@ def test_red_light_holds_car_before_junction_until_green(library_roads: RoadNetw
     for _ in range(900):
         fleet.step(None, 0.05)
     assert "me" not in fleet
+
+
+def test_driver_who_ignores_lights_does_not_stop() -> None:
+    roads = street(right=1, extra=light())
+    fleet = Fleet(roads, must_stop=Lights())
+    row, progress = fleet.lanes.of(roads.location("1", -1, 60.0))
+    fleet.add_at(car("me"), row, progress, speed=14.0, desired_speed=14.0, ignores_lights=True)
+    for _ in range(300):
+        place = fleet.step(None, 0.05)["me"]
+    assert place.x == pytest.approx(60.0 + 14.0 * 15.0, abs=2.0)
