@@ -73,3 +73,10 @@ def test_time_at_the_stop_line_is_that_of_the_original_distance() -> None:
     assert at is not None
     expected = (48.9 - 4.892 / 2) / 3.3333 + 3.3333 / (2 * 3.0)
     assert float(at[1]) == pytest.approx(expected, abs=0.75 / 3.3333 + 0.05)
+
+
+@pytest.mark.parametrize(
+    "name", ["coop/scenario_1", "coop/scenario_2", *(f"pipeline/scenario_{number}" for number in range(1, 5))]
+)
+def test_planner_behavior_passes(name: str) -> None:
+    assert play(name, Planner="behavior").passed
