@@ -82,6 +82,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
     options = parser.parse_args(arguments)
+    if options.workers is not None and options.workers < 1:
+        parser.error(f"--workers: not a positive number (got {options.workers})")
     invalid = [text for text in options.param if "=" not in text]
     if invalid:
         parser.error(f"--param: not NAME=VALUE (got {invalid[0]!r})")

@@ -7,6 +7,7 @@ import re
 import pytest
 
 from eidrive_scenario.api.run import RunResult, RunSettings, Simulation, load_distribution, run_file
+from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import library_path
 
 CROSSINGS = {"crossing_car": ("Other", "OtherKmh", 25.0), "crossing_child": ("Walker", "WalkerKmh", 3.8)}
@@ -96,3 +97,10 @@ def test_distribution_varies_both_speeds(name: str, count: int) -> None:
     runs = load_distribution(library_path() / "ncap" / f"{name}.xosc")
     assert len(runs) == count
     assert {"EgoKmh", CROSSINGS[name.rpartition("_")[0]][1]} <= runs[0].parameters.keys()
+
+
+@pytest.mark.parametrize("name", CROSSINGS)
+@pytest.mark.parametrize(("parameter", "value"), [("EgoKmh", "0"), ("LeadTime", "30"), ("Latency", "-0.1")])
+def test_value_outside_the_constraints_is_an_error(name: str, parameter: str, value: str) -> None:
+    with pytest.raises(InputError, match=parameter):
+        play(name, 1, **{parameter: value})

@@ -82,3 +82,11 @@ def test_command_writes_one_figure_per_distribution(write: Write, tmp_path: Path
     assert main([str(path), "--out", str(tmp_path / "maps"), "--workers", "1", "--param", "LeadTime=2"]) == 0
     image = matplotlib.image.imread(tmp_path / "maps" / "grid.png")
     assert image.shape[1] > image.shape[0] > 100
+
+
+@pytest.mark.parametrize(("option", "message"), [("--workers=0", "not a positive number"), ("--param=A", "NAME=VALUE")])
+def test_invalid_option_is_an_error(option: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main([option])
+    assert caught.value.code == 2
+    assert message in capsys.readouterr().err
