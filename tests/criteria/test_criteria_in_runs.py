@@ -80,7 +80,7 @@ BY_CHANNEL: dict[str, tuple[dict[str, Any], Any, Any]] = {
 truck hides the incoming car from the Ego until the crossing, and the roadside unit sees it from the start on."""
 
 SEPARATE = {"monitor", "running_red_light"}
-"""Criteria whose runs have tests of their own below."""
+"""Criteria whose runs are separate tests below."""
 
 
 def test_every_criterion_has_runs() -> None:

@@ -57,7 +57,7 @@ def test_run_with_the_option_equals_a_file_with_the_planner(tmp_path: Path) -> N
     assert "--planner route" in command_of(tmp_path / "a.xosc", 1, RunSettings(planner="route"))
 
 
-def test_settings_of_the_planner_of_the_file_do_not_apply_to_another_one() -> None:
+def test_planner_settings_of_the_file_do_not_apply_to_another_planner() -> None:
     nested = agent_xml(planner="conflict_area", planner_settings=f"{{conflict_area: {AREA}}}")
     assert planners(scenario(object_xml("Ego", controller=nested)), planner="route") == {"Ego": "route"}
 
@@ -87,9 +87,11 @@ def test_invalid_planner_is_an_error_before_the_run(planner: object, message: st
     assert message in str(caught.value)
 
 
-def test_missing_setting_of_the_planner_is_an_error_with_the_line_of_the_controller() -> None:
-    with pytest.raises(InputError, match="conflict_area"):
-        run_file(scenario(object_xml("Ego", controller=agent_xml())), settings=RunSettings(planner="conflict_area"))
+def test_missing_setting_has_the_line_of_the_controller() -> None:
+    source = scenario(object_xml("Ego", controller=agent_xml()))
+    line = 1 + source[: source.index(b"<Controller ")].count(b"\n")
+    with pytest.raises(InputError, match=f":{line}: setting 'conflict_area' is missing"):
+        run_file(source, settings=RunSettings(planner="conflict_area"))
 
 
 def test_invalid_property_of_the_station_is_the_only_error() -> None:

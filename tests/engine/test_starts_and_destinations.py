@@ -135,7 +135,7 @@ def test_many_vehicles_at_one_place_are_one_error_each() -> None:
     assert caught.value.diagnostics[0].message.endswith(" m, and of 3 more")
 
 
-def test_selection_that_is_placed_as_a_whole_has_the_line_of_its_action(tmp_path: Path) -> None:
+def test_placed_selection_has_the_line_of_its_action(tmp_path: Path) -> None:
     path = write(tmp_path, lane_position_xml(-1, 20))
     both = '<EntitySelection name="Both"><Members><EntityRef entityRef="Ego"/><EntityRef entityRef="Other"/></Members>'
     text = path.read_text().replace("</Entities>", f"{both}</EntitySelection></Entities>")
