@@ -77,6 +77,7 @@ class Decider:
         self._current: LateralProfile | None = None
         self._switched = -math.inf
         self._oncoming = OncomingTraffic(view)
+        self._held_up = False
 
     def line_changed(self, shift: float | None) -> None:
         """Move the current maneuver to another line.
@@ -99,17 +100,15 @@ class Decider:
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._towards(situation, ROUTE, 0.0))
-        options = self._options(situation, scene, profiles)
-        best = int(np.argmax(options.evaluation.score))
-        held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
-        self._oncoming.observe(scene, body[0], situation.now, held_up=held_up)
-        if held_up:
-            more = passing_profiles(situation, scene, settings, self._body)
-            if more:
-                beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
-                hidden = self._oncoming.first_hidden(scene, beside, body[:2], situation.now)
-                options = options.extend(self._options(situation, scene, more, hidden=hidden))
-                best = int(np.argmax(options.evaluation.score))
+        expects = self._held_up and settings.lane_changes
+        options = self._options(situation, scene, profiles, body[:2], with_maneuvers=expects)
+        best = options.best(len(profiles))
+        self._held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
+        self._oncoming.observe(scene, body[0], situation.now, held_up=self._held_up)
+        if self._held_up:
+            if not expects:
+                options = self._options(situation, scene, profiles, body[:2], with_maneuvers=True)
+            best = options.best()
         best = self._kept(options, best, situation.now)
         threat = -1 if bool(scene.certain.all()) else self._uncertain_threat(scene, options, best)
         if threat >= 0:
@@ -137,7 +136,7 @@ class Decider:
         self, situation: Situation, scene: Surroundings, options: Options, threat: int
     ) -> Decision:
         """Return the decision if a hypothesis of uncertain existence is no reason for more than a gentle stop."""
-        certain = self._options(situation, _only_certain(scene), options.profiles[:1])
+        certain = self._options(situation, _only_certain(scene), options.profiles[:1], (situation.s, situation.d))
         choice, stop = int(np.argmax(certain.evaluation.score)), certain.gentle
         if self._acceleration(certain, choice) < self._acceleration(certain, stop):
             return self._decision(situation, certain, choice)
@@ -175,13 +174,20 @@ class Decider:
         situation: Situation,
         scene: Surroundings,
         profiles: list[LateralProfile],
+        ego: tuple[float, float],
         *,
-        hidden: float | None = None,
+        with_maneuvers: bool = False,
     ) -> Options:
-        """Return the proposals along profiles, the first of which is the current one.
+        """Return the proposals along profiles, the first of which is the current one, and along new maneuvers.
 
-        hidden  for new maneuvers instead: the place from which oncoming traffic may come unseen [m]
+        ego  distance of the center of the vehicle along the line, and its offset [m]
         """
+        hidden = math.inf
+        more = passing_profiles(situation, scene, self._settings, self._body) if with_maneuvers else []
+        if more:
+            beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
+            hidden = self._oncoming.first_hidden(scene, beside, ego, situation.now)
+            profiles = profiles + more
         proposals: list[Proposal] = []
         walls: list[list[Wall]] = []
         leads: list[Bools] = []
@@ -190,9 +196,7 @@ class Decider:
             found = conflicts(scene, way, situation.s)
             reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
             here = (self._front, situation.s, situation.speed)
-            made = proposals_for(
-                number, found, self._settings, emergency=self._emergency, is_current=hidden is None and number == 0
-            )
+            made = proposals_for(number, found, self._settings, emergency=self._emergency, is_current=number == 0)
             for proposal in made:
                 rows = crossing_walls(found, self._times, here, proposal.precedence, reasons)
                 walls.append([*rows, *([situation.stop] if situation.stop is not None else [])])
@@ -218,7 +222,7 @@ class Decider:
             self._settings,
             situation.wanted,
             current,
-            math.inf if hidden is None else hidden,
+            hidden,
         )
         return Options(profiles, proposals, walls, rolled, evaluation)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
-
 import msgspec
 import numpy as np
 
@@ -11,8 +9,6 @@ from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import Evaluation
-
-Record = TypeVar("Record", Rollout, Evaluation)
 
 
 class Options(msgspec.Struct, frozen=True):
@@ -29,17 +25,9 @@ class Options(msgspec.Struct, frozen=True):
         """Index of the gentle stop."""
         return next(row for row, proposal in enumerate(self.proposals) if proposal.is_gentle)
 
-    def extend(self, other: Options) -> Options:
-        """Return these options, and after them the others."""
-        shift = len(self.profiles)
-        moved = [msgspec.structs.replace(proposal, profile=proposal.profile + shift) for proposal in other.proposals]
-        rolled = _concatenated(self.rolled, other.rolled)
-        evaluation = _concatenated(self.evaluation, other.evaluation)
-        proposals = self.proposals + moved
-        return Options(self.profiles + other.profiles, proposals, self.walls + other.walls, rolled, evaluation)
-
-
-def _concatenated(one: Record, other: Record) -> Record:
-    """Return the record whose arrays are those of both."""
-    pairs = zip(msgspec.structs.astuple(one), msgspec.structs.astuple(other), strict=True)
-    return type(one)(*(np.concatenate(pair) for pair in pairs))
+    def best(self, profiles: int | None = None) -> int:
+        """Return the index of the proposal with the highest score, among those along the first `profiles`."""
+        count = len(self.proposals)
+        if profiles is not None:
+            count = sum(proposal.profile < profiles for proposal in self.proposals)
+        return int(np.argmax(self.evaluation.score[:count]))

@@ -1,0 +1,96 @@
+"""Predicted motion against uniformly accelerated motion and the geometry of lanes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from opendrive_xml import map_xml, road_xml
+from planned_drive import KnownBox, detections
+
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
+from eidrive_scenario.driving.planning.behavior.prediction import Predictor, longitudinal_motion
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.roads import RoadNetwork
+
+TIMES = np.arange(0.0, 8.01, 0.25)
+
+
+def known(*boxes: KnownBox) -> list[KnownObject]:
+    return ObjectMemory(BehaviorSettings()).update(detections(0.0, *boxes), 0.0)
+
+
+def test_braking_object_stops_after_its_braking_distance() -> None:
+    way, speed = longitudinal_motion(10.0, -2.5, TIMES)
+    assert way[-1] == pytest.approx(10.0**2 / (2.0 * 2.5))
+    assert speed[-1] == 0.0
+    np.testing.assert_allclose(way[TIMES <= 4.0], 10.0 * TIMES[TIMES <= 4.0] - 1.25 * TIMES[TIMES <= 4.0] ** 2)
+    assert (np.diff(way) >= 0.0).all()
+
+
+def test_acceleration_fades() -> None:
+    way, speed = longitudinal_motion(5.0, 2.0, TIMES)
+    assert speed[-1] == pytest.approx(5.0 + 2.0 * 1.5 * (1.0 - math.exp(-8.0 / 1.5)))
+    np.testing.assert_allclose(np.gradient(way, TIMES)[1:-1], speed[1:-1], rtol=0.01)
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(0.0, 3.0), (0.2, -3.0), (0.29, 0.0)])
+def test_slow_object_stands(speed: float, acceleration: float) -> None:
+    way, speeds = longitudinal_motion(speed, acceleration, TIMES)
+    assert not way.any()
+    assert not speeds.any()
+
+
+def test_small_acceleration_is_noise() -> None:
+    way, _ = longitudinal_motion(10.0, 0.5, TIMES)
+    np.testing.assert_allclose(way, 10.0 * TIMES)
+
+
+def test_vehicle_follows_its_lane_around_a_curve() -> None:
+    # A left curve of radius 50 m: the right lane is at a radius of 51.75 m.
+    roads = RoadNetwork.parse(map_xml(road_xml(length=250.0, curvature=1.0 / 50.0)))
+    pose = roads.lane_pose_at("1", -1, 10.0)
+    box = KnownBox(pose.x, pose.y, 8.0 * math.cos(pose.h), 8.0 * math.sin(pose.h), yaw=pose.h)
+    found = Predictor(roads, TIMES).predict(known(box))
+    assert found.objects == (0,)
+    radius = np.hypot(found.x[0], found.y[0] - 50.0)
+    np.testing.assert_allclose(radius, 51.75, atol=0.15)
+    steps = np.hypot(np.diff(found.x[0]), np.diff(found.y[0]))
+    np.testing.assert_allclose(steps.sum(), 8.0 * 8.0, rtol=0.02)
+
+
+def test_pedestrian_on_a_lane_keeps_its_velocity() -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml(length=250.0, curvature=1.0 / 50.0)))
+    walker = KnownBox(10.0, -1.0, 1.0, 0.0, kind="pedestrian", size=(0.5, 0.5))
+    found = Predictor(roads, TIMES).predict(known(walker))
+    np.testing.assert_allclose(found.x[0], 10.0 + TIMES)
+    np.testing.assert_allclose(found.y[0], -1.0)
+
+
+def test_without_roads_velocity_is_constant() -> None:
+    found = Predictor(None, TIMES).predict(known(KnownBox(0.0, 0.0, 3.0, 4.0, yaw=0.5)))
+    np.testing.assert_allclose(found.x[0], 3.0 * TIMES)
+    np.testing.assert_allclose(found.y[0], 4.0 * TIMES)
+    np.testing.assert_allclose(found.speed[0], 5.0)
+
+
+def test_no_objects_have_no_hypotheses() -> None:
+    found = Predictor(None, TIMES).predict([])
+    assert found.objects == ()
+    assert found.x.shape == (0, len(TIMES))
+
+
+def test_vehicle_across_its_lane_is_not_led_along_it() -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml(length=250.0)))
+    found = Predictor(roads, TIMES).predict(known(KnownBox(100.0, -1.75, 0.0, 8.0, yaw=math.pi / 2)))
+    np.testing.assert_allclose(found.x[0], 100.0)
+    np.testing.assert_allclose(found.y[0], -1.75 + 8.0 * TIMES)
+
+
+def test_vehicle_that_changes_lanes_ends_on_the_next_one() -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml(length=400.0)))
+    box = KnownBox(100.0, -1.75, 10.0, 1.0, yaw=0.1)
+    found = Predictor(roads, TIMES).predict(known(box))
+    assert found.y[0, -1] == pytest.approx(-1.75 + 3.5, abs=0.05)
+    assert found.y[0, 4] == pytest.approx(-1.75 + 1.0, abs=0.05)

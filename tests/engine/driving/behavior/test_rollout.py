@@ -1,0 +1,84 @@
+"""Rollouts against the equilibrium and the limits of the Intelligent Driver Model."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall, speed_limits
+from eidrive_scenario.driving.planning.behavior.rollout import Course, Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+
+SETTINGS = BehaviorSettings()
+TIMES = np.arange(0.0, 60.01, 0.25)
+FRONT, CENTER = 3.8, 1.4
+ALONG = np.arange(0.0, 1001.0)
+
+
+def leader(gap: float, speed: float) -> Surroundings:
+    """Return an object of 5 m length whose rear is `gap` ahead of the front of a vehicle at 0."""
+    shape = (1, len(TIMES))
+    s = (FRONT + gap + 2.5 + speed * TIMES)[None]
+    ones = np.ones(shape)
+    still = np.zeros(1)
+    return Surroundings(
+        s, 0 * ones, 2.5 * ones, ones, speed * ones, still, (0,), np.ones(1, bool), still, ones < 0, np.zeros(1, bool)
+    )
+
+
+def roll(
+    proposal: Proposal, speed: float, scene: Surroundings, walls: list[Wall] | None = None, wanted: float = 15.0
+) -> Rollout:
+    course = Course(ALONG, np.full(len(ALONG), 50.0), wanted)
+    leads = np.ones((1, len(scene), len(TIMES)), dtype=bool)
+    return Roller(SETTINGS, TIMES).roll([proposal], course, (0.0, speed), (FRONT, CENTER), scene, leads, [walls or []])
+
+
+FREE = Proposal(0, 1.0, "all", SETTINGS.hard_deceleration)
+
+
+def test_gap_behind_a_steady_leader_is_the_equilibrium_of_the_model() -> None:
+    # Stationary IDM: s = (s0 + v T) / sqrt(1 - (v / v0)^4)
+    rolled = roll(FREE, 10.0, leader(30.0, 10.0))
+    gap = 30.0 + 10.0 * TIMES[-1] - rolled.s[0, -1]
+    expected = (SETTINGS.standstill_gap + 10.0 * SETTINGS.time_gap) / math.sqrt(1.0 - (10.0 / 15.0) ** 4)
+    assert rolled.speed[0, -1] == pytest.approx(10.0, abs=0.05)
+    assert gap == pytest.approx(expected, abs=0.1)
+
+
+def test_standing_leader_is_approached_to_the_standstill_gap() -> None:
+    rolled = roll(FREE, 12.0, leader(80.0, 0.0))
+    assert rolled.s[0, -1] <= 80.0 - SETTINGS.standstill_gap + 0.05
+    assert rolled.s[0, -1] == pytest.approx(80.0 - SETTINGS.standstill_gap, abs=0.6)
+    assert (np.diff(rolled.speed[0]) >= -SETTINGS.hard_deceleration * 0.25 - 1e-9).all()
+
+
+def test_free_vehicle_accelerates_to_the_wanted_speed() -> None:
+    none = leader(900.0, 40.0)
+    rolled = roll(FREE, 0.0, none)
+    assert rolled.speed[0, 4] == pytest.approx(SETTINGS.acceleration, rel=0.1)
+    assert rolled.speed[0, -1] == pytest.approx(15.0, rel=0.02)
+
+
+def test_vehicle_waits_before_a_wall_until_its_end() -> None:
+    rolled = roll(FREE, 10.0, leader(900.0, 40.0), [Wall(60.0, 20.0, "give way")])
+    waiting = (TIMES > 12.0) & (TIMES < 20.0)
+    assert (rolled.s[0, waiting] <= 60.0 + 0.05).all()
+    assert rolled.s[0, waiting].min() > 57.0
+    assert rolled.s[0, -1] > 200.0
+
+
+def test_emergency_braking_is_constant() -> None:
+    rolled = roll(Proposal(0, 0.0, "all", 8.0, is_emergency=True), 12.0, leader(900.0, 40.0))
+    assert rolled.s[0, -1] == pytest.approx(12.0**2 / 16.0, abs=0.2)
+
+
+def test_speed_limit_of_a_curve_and_its_approach() -> None:
+    curvature = np.where((ALONG > 100) & (ALONG < 150), 1.0 / 50.0, 0.0)
+    limits = speed_limits(curvature, np.full(len(ALONG), 30.0), 1.0, SETTINGS)
+    assert limits[125] == pytest.approx(math.sqrt(SETTINGS.lateral_acceleration * 50.0), rel=0.01)
+    assert limits[200] == pytest.approx(30.0)
+    np.testing.assert_allclose(np.diff(limits[60:95] ** 2), -2.0 * SETTINGS.comfortable_deceleration, rtol=1e-6)
