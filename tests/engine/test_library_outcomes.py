@@ -61,14 +61,15 @@ def test_lane_follower_hits_the_slower_vehicle(number: int, other: str, seed: in
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize(("number", "rule"), [(3, "running_red_light"), (4, "running_stop_sign")])
 def test_signal_criterion_depends_on_obedience_only(number: int, rule: str, seed: int) -> None:
-    obeying, ignoring = (play(f"pipeline/scenario_{number}", seed, ObeySignals=value) for value in ("true", "false"))
+    name = f"pipeline/scenario_{number}"
+    obeying, ignoring = (play(name, seed, ObeySignals=value, Planner="route") for value in ("true", "false"))
     assert obeying.passed
     assert [name for name, success in passed(ignoring).items() if not success] == [rule]
 
 
 def test_time_at_the_stop_line_is_that_of_the_original_distance() -> None:
     """The line is 48.9 m ahead of the center in EI-Drive; 3.33 m/s is reached at 3 m/s². Sites deviate by 0.75 m."""
-    result = play("pipeline/scenario_3", ObeySignals="false", EgoOffset="0", EgoSpeedOffset="0")
+    result = play("pipeline/scenario_3", ObeySignals="false", Planner="route", EgoOffset="0", EgoSpeedOffset="0")
     at = re.search(r"at (\d+\.\d+) s", result.criteria[0].reason)
     assert at is not None
     expected = (48.9 - 4.892 / 2) / 3.3333 + 3.3333 / (2 * 3.0)

@@ -3,9 +3,12 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import Frame, RunLog
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
@@ -29,7 +32,7 @@ def lines(make_frame: Callable[..., Frame], tmp_path: Path) -> Lines:
     def write(*frames: tuple[StateChange, ...]) -> list[str]:
         log = RunLog(tmp_path / "logs" / "run.log")
         for changes in frames:
-            log.observe(replace(make_frame(), changes=changes))
+            log.observe(replace(make_frame(), changes=changes, steps={}))
         log.close()
         return (tmp_path / "logs" / "run.log").read_text(encoding="utf-8").splitlines()
 
@@ -76,7 +79,7 @@ def test_run_log_of_hyphen_writes_to_standard_output(
     make_frame: Callable[..., Frame], capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = RunLog("-")
-    log.observe(make_frame())
+    log.observe(replace(make_frame(), steps={}))
     log.close()
     assert capsys.readouterr().out == "    0.000 s  event Stop (in Story/Act) starts: t > 3 s\n"
 
@@ -85,3 +88,21 @@ def test_run_log_of_unwritable_path_raises_setting_error(tmp_path: Path) -> None
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(SettingError, match="cannot write"):
         RunLog(tmp_path / "file" / "run.log")
+
+
+def test_run_log_writes_a_decision_when_more_than_its_numbers_change(
+    make_frame: Callable[..., Frame], tmp_path: Path
+) -> None:
+    log = RunLog(tmp_path / "run.log")
+    empty = Detections(0.0)
+    points = np.array([[0.0, 0.0], [1.0, 0.0]])
+    frame = replace(make_frame(), changes=())
+    for reason in ("follow car 12 m ahead at 3.1 m/s", "follow car 9 m ahead at 0.0 m/s", "keep speed", "keep speed"):
+        plan = Plan(points, np.ones(2), reason)
+        log.observe(replace(frame, steps={"Ego": AgentStep(empty, (), empty, plan, None, ())}))
+    log.close()
+    written = (tmp_path / "run.log").read_text(encoding="utf-8").splitlines()
+    assert [line.partition("s  ")[2] for line in written] == [
+        "Ego: follow car 12 m ahead at 3.1 m/s",
+        "Ego: keep speed",
+    ]
