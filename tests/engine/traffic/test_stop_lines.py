@@ -131,7 +131,7 @@ def test_red_light_holds_car_before_junction_until_green(library_roads: RoadNetw
     assert "me" not in fleet
 
 
-def test_driver_who_ignores_lights_does_not_stop() -> None:
+def test_driver_that_ignores_lights_does_not_stop() -> None:
     roads = street(right=1, extra=light())
     fleet = Fleet(roads, must_stop=Lights())
     row, progress = fleet.lanes.of(roads.location("1", -1, 60.0))
