@@ -15,7 +15,7 @@ from eidrive_scenario.settings import Settings, parse_settings
 NO_PLANNER = "none"
 """Planner of a station that does not drive: a parked vehicle, which holds its brake."""
 
-DEFAULT_PLANNER = "route"
+DEFAULT_PLANNER = "behavior"
 """Planner of a vehicle whose controller names none."""
 
 Polygon = tuple[tuple[float, float], ...]

@@ -212,7 +212,8 @@ def test_route_of_the_scenario(tmp_path: Path, drive: str | None, x: float, pass
     )
     path.write_text(text, encoding="utf-8")
     recorder = Recorder(tmp_path / "recording.mcap", metadata={})
-    (verdict,) = run_file(path, settings=RunSettings(drive=drive), observers=[recorder]).criteria
+    settings = RunSettings(drive=drive, planner="route" if drive else None)
+    (verdict,) = run_file(path, settings=settings, observers=[recorder]).criteria
     assert verdict.passed == passed
     criterion = RouteCompletion(RouteCompletionSettings(of="Ego", at_least=0.9))
     recorded = judge(criterion, list(read_recording(tmp_path / "recording.mcap").frames()))

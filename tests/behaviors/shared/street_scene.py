@@ -20,7 +20,7 @@ from storyboard_xml import (
     trigger_xml,
 )
 
-AGENT = controller_xml({"module": "eidrive"}, attributes='controllerType="movement"')
+AGENT = controller_xml({"module": "eidrive", "planner": "route"}, attributes='controllerType="movement"')
 LANES = lanes_xml(1, 2, 4)
 NOTHING = private_xml('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
 """Action without effect."""

@@ -232,7 +232,7 @@ def test_plan_and_control_depend_on_wheels_and_planner(car: ActorSpec) -> None:
     assert parked.plan is None
     assert parked.control is not None
     assert parked.control.brake == 1.0
-    moving = agent(car, target_speed=8.0).act(here, (), 0.0, None)
+    moving = agent(car, target_speed=8.0, planner="route").act(here, (), 0.0, None)
     assert moving.plan is not None
     assert moving.control is not None
     assert moving.control.throttle == pytest.approx(3.5 / 5.0)
