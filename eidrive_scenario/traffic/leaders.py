@@ -9,7 +9,6 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.world.view import WorldView
 
 BIG = 1e5
 """Offset between lanes on a common axis, more than the length of any lane [m]."""
@@ -17,13 +16,8 @@ LOOK_AHEAD = 120.0
 """Maximum distance of a leader [m]."""
 LOOK_BACK = 3
 """Maximum number of preceding lanes in which a follower is searched."""
-STANDING = 0.5
-"""Maximum speed of a standing actor [m/s]."""
 FOREIGN, FIXED = -1, -2
 """Owners of occupants outside the fleet: other actors, and the ends of lanes."""
-OUTLINE = np.array(
-    [(0.5, 0.5), (0.5, 0.0), (0.5, -0.5), (0.0, 0.5), (0.0, -0.5), (-0.5, 0.5), (-0.5, 0.0), (-0.5, -0.5)]
-)
 
 
 @dataclass(frozen=True)
@@ -171,38 +165,6 @@ def no_occupants() -> Occupants:
     """Return empty occupants."""
     none = np.empty(0)
     return Occupants(np.empty(0, dtype=np.int64), none, none, none, none, np.empty(0, dtype=np.int64))
-
-
-def obstacles(
-    lanes: TrafficLanes, view: WorldView, own: frozenset[str], near: Array | None = None
-) -> tuple[Occupants, set[int]]:
-    """Return the outlines of all actors not in `own` on every lane that they overlap, and the lanes of moving ones.
-
-    In a junction with overlapping roads an actor occupies all lanes below it.
-    near  (K, 2) positions [m]; actors beyond the range of sight from all of them are ignored
-    """
-    rows = np.array([row for row, name in enumerate(view.names) if name not in own], dtype=np.int64)
-    if near is not None and rows.size:
-        reach = LOOK_AHEAD + np.hypot(view.size[rows, 0], view.size[rows, 1])
-        square = np.sum((view.position[rows, None, :2] - near[None]) ** 2, axis=2)
-        rows = rows[np.any(square < reach[:, None] ** 2, axis=1)] if len(near) else rows[:0]
-    if not rows.size:
-        return no_occupants(), set()
-    boxes = view.boxes[rows]
-    corners = OUTLINE[None] * boxes[:, None, 3:5]
-    cos, sin = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
-    x = (boxes[:, 0, None] + cos * corners[..., 0] - sin * corners[..., 1]).ravel()
-    y = (boxes[:, 1, None] + sin * corners[..., 0] + cos * corners[..., 1]).ravel()
-    z = np.repeat(view.position[rows, 2], len(OUTLINE))
-    velocity = np.repeat(view.velocity[rows, :2], len(OUTLINE), axis=0)
-    row, s, point = lanes.roads.overlapped_lanes(x, y, z)
-    progress = lanes.progress(row, s)
-    heading = lanes.tables.curves.at(lanes.road[row], s)[2]
-    along = velocity[point, 0] * np.cos(heading) + velocity[point, 1] * np.sin(heading)
-    speed = np.maximum(along * lanes.direction[row], 0.0)
-    moving = np.hypot(*velocity[point].T) > STANDING
-    found = Occupants(row, progress, progress, progress, speed, np.full(len(row), FOREIGN))
-    return found, set(row[moving].tolist())
 
 
 def concatenate_occupants(*parts: Occupants) -> Occupants:

@@ -14,30 +14,30 @@ from eidrive_scenario.traffic.leaders import (
     Occupants,
     concatenate_occupants,
     find_leaders,
-    no_occupants,
-    obstacles,
 )
+from eidrive_scenario.traffic.obstacles import Obstacles
 from eidrive_scenario.world.view import WorldView
 
 
 class Occupancy:
-    """Occupancy of the lanes of one fleet.
-
-    moving  lanes that moving actors outside the fleet overlap
-    """
+    """Occupancy of the lanes of one fleet."""
 
     def __init__(self, lanes: TrafficLanes, changes: LaneChanges) -> None:
         self._lanes = lanes
         self._changes = changes
-        self.moving = set[int]()
-        self._foreign = no_occupants()
+        self._obstacles = Obstacles(lanes)
         row = np.flatnonzero(np.isfinite(lanes.ends_at))
         at = lanes.ends_at[row]
         self._ends = Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
 
     def observe(self, view: WorldView, own: frozenset[str], near: Array | None) -> None:
         """Observe the actors outside the fleet `own`; with positions `near` (K, 2) [m] only those near one of them."""
-        self._foreign, self.moving = obstacles(self._lanes, view, own, near)
+        self._obstacles.observe(view, own, near)
+
+    @property
+    def moving(self) -> set[int]:
+        """Lanes that moving actors outside the fleet overlap."""
+        return self._obstacles.moving
 
     def occupants(self, cars: Cars) -> Occupants:
         """Return all occupants: cars (also on lanes that they are leaving), other actors, lane ends."""
@@ -46,7 +46,7 @@ class Occupancy:
         indices, row = np.concatenate([own, still]), np.concatenate([cars.row, lane])
         key = cars.progress[indices]
         mine = Occupants(row, key, key + cars.rear[indices], key + cars.front[indices], cars.speed[indices], indices)
-        return concatenate_occupants(mine, self._foreign, self._ends)
+        return concatenate_occupants(mine, self._obstacles.occupants, self._ends)
 
     def leaders(self, cars: Cars, occupants: Occupants) -> Leaders:
         """Return the leaders of all cars. During a lane change it is the nearer one of both lanes.

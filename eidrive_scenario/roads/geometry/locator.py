@@ -44,12 +44,7 @@ class Locator:
 
     def locate(self, x: Array, y: Array, z: Array | None, reach: float = REACH) -> LaneLocations:
         """Return road and lane coordinates of points (N,). Without z, the nearest road in plan view is selected."""
-        solid = z is not None and self._solid is not None
-        tree = self._solid if solid and self._solid is not None else self._flat
-        points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
-        # A point that is far from all samples is outside the reach of every road.
-        hopeless = np.inf if solid else reach + self._from_samples
-        distance, nearest = (np.asarray(part) for part in tree.query(points, k=1, distance_upper_bound=hopeless))
+        tree, points, distance, nearest = self._nearest_samples(x, y, z, reach)
         if len(points) <= MANY and distance.max(initial=0.0) < np.inf:
             return self._located(tree, points, nearest, reach)
         # Sorted points make the lookup in the tables faster.
@@ -61,19 +56,24 @@ class Locator:
             getattr(found, entry.name)[order] = getattr(some, entry.name)
         return found
 
+    def _nearest_samples(
+        self, x: Array, y: Array, z: Array | None, reach: float
+    ) -> tuple[cKDTree, Array, Array, Integers]:
+        """Return the tree of samples, the points in its coordinates, and distance and index of their nearest samples.
+
+        The distance is inf for a point that is farther than `reach` from all roads.
+        """
+        solid = z is not None and self._solid is not None
+        tree = self._solid if solid and self._solid is not None else self._flat
+        points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
+        # A point that is far from all samples is outside the reach of every road.
+        hopeless = np.inf if solid else reach + self._from_samples
+        distance, nearest = (np.asarray(part) for part in tree.query(points, k=1, distance_upper_bound=hopeless))
+        return tree, points, distance, nearest
+
     def _located(self, tree: cKDTree, points: Array, nearest: Integers, reach: float) -> LaneLocations:
         """Return locations of points (N, 2), or (N, 3) with heights, by the nearest samples of `tree`."""
-        x, y, z = points[:, 0], points[:, 1], points[:, 2] if points.shape[1] > 2 else None
-        road, s = self._road[nearest], self._s[nearest]
-        s, t, beyond = self._refine(road, s, x, y)
-        row, outside = self._tables.lane_beside(road, s, t)
-        outside = np.hypot(outside, beyond)
-        uncertain = np.flatnonzero(outside > 0.0)
-        if uncertain.size and len(self._s) > 1:
-            height = None if z is None else z[uncertain]
-            limit = outside[uncertain] + self._from_samples if z is None else np.full(len(uncertain), np.inf)
-            best = self._compare(tree, points[uncertain], x[uncertain], y[uncertain], height, limit)
-            road[uncertain], s[uncertain], t[uncertain], row[uncertain], outside[uncertain] = best
+        road, s, t, row, outside = self._best_roads(tree, points, nearest, np.inf)
         heading = self._tables.curves.at(road, s)[2]
         far = outside > reach
         center, _ = self._tables.lane_t(row, s)
@@ -88,13 +88,37 @@ class Locator:
             outside=outside,
         )
 
+    def _best_roads(
+        self, tree: cKDTree, points: Array, nearest: Integers, reach: float
+    ) -> tuple[Integers, Array, Array, Integers, Array]:
+        """Return roads, s, t, lane rows and distances from the road of points, by the nearest samples of `tree`.
+
+        The result may be another road than the nearest one for a point farther than `reach` from all roads.
+        """
+        x, y, z = points[:, 0], points[:, 1], points[:, 2] if points.shape[1] > 2 else None
+        road, s = self._road[nearest], self._s[nearest]
+        s, t, beyond = self._refine(road, s, x, y)
+        row, outside = self._tables.lane_beside(road, s, t)
+        outside = np.hypot(outside, beyond)
+        uncertain = np.flatnonzero(outside > 0.0)
+        if uncertain.size and len(self._s) > 1:
+            height = None if z is None else z[uncertain]
+            limit = np.minimum(outside[uncertain], reach) + self._from_samples
+            limit = limit if z is None else np.full(len(uncertain), np.inf)
+            best = self._compare(tree, points[uncertain], x[uncertain], y[uncertain], height, limit)
+            road[uncertain], s[uncertain], t[uncertain], row[uncertain], outside[uncertain] = best
+        return road, s, t, row, outside
+
     def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
         """Return all lanes that overlap points (N,): lane rows, s on their roads, and indices of the points."""
-        found = self.locate(x, y, z)
-        on = np.flatnonzero((found.road >= 0) & (found.outside <= 0.0))
-        pair, other, guess = self._overlaps.beneath(found.road[on], x[on], y[on])
-        roads = np.concatenate([found.road[on], other])
-        guesses, points = np.concatenate([found.s[on], guess]), np.concatenate([on, on[pair]])
+        tree, places, distance, nearest = self._nearest_samples(x, y, z, reach=0.0)
+        near = np.flatnonzero(distance < np.inf)
+        road, s, _, _, outside = self._best_roads(tree, places[near], nearest[near], reach=0.0)
+        inside = np.flatnonzero(outside <= 0.0)
+        on, road, s = near[inside], road[inside], s[inside]
+        pair, other, guess = self._overlaps.beneath(road, x[on], y[on])
+        roads = np.concatenate([road, other])
+        guesses, points = np.concatenate([s, guess]), np.concatenate([on, on[pair]])
         refined, t, beyond = self._refine(roads, guesses, x[points], y[points])
         row, outside = self._tables.lane_beside(roads, refined, t)
         hit = np.flatnonzero((beyond <= 0.0) & (outside <= 0.0))
@@ -133,32 +157,38 @@ class Locator:
 
     def _refine(self, road: Integers, s: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Return s, t and the distance beyond an end of the road by Newton's method from an initial s."""
-        curves, length = self._tables.curves, self._tables.length[road]
-        s, t, beyond = s.copy(), np.empty_like(s), np.zeros_like(s)
-        open_ = np.arange(len(s))
+        tables, length = self._tables, self._tables.length[road]
+        open_: Integers | None = None
+        """Points whose s is not found yet; None for all."""
+        found_s, found_t, found_beyond = s, s, s
         for _ in range(10):
-            px, py, h, curvature, speed = curves.at(road[open_], s[open_])
+            px, py, h, curvature, speed = tables.curves.at(road, s)
             cos, sin = np.cos(h), np.sin(h)
-            dx, dy = x[open_] - px, y[open_] - py
+            dx, dy = x - px, y - py
             along, left = cos * dx + sin * dy, cos * dy - sin * dx
-            t[open_] = left
-            if self._tables.banked:
-                ahead, level, _, _ = self._tables.lateral_axis(road[open_], s[open_])
-                t[open_] = left / level
-                along = along - t[open_] * ahead
-                stretch = self._tables.stretch_at(road[open_], s[open_], t[open_], curvature, speed)
+            t = left
+            if tables.banked:
+                ahead, level, _, _ = tables.lateral_axis(road, s)
+                t = left / level
+                along = along - t * ahead
+                stretch = tables.stretch_at(road, s, t, curvature, speed)
             else:
                 stretch = speed * (1.0 - curvature * left)
             step = along / np.maximum(np.maximum(stretch, 0.2 * speed), 2e-4)
-            moved = np.clip(s[open_] + step, 0.0, length[open_])
-            change = np.abs(moved - s[open_])
-            s[open_] = moved
-            at_end = (moved <= 0.0) | (moved >= length[open_])
-            beyond[open_] = np.where(at_end & (np.abs(along) > 1e-6), np.abs(along), 0.0)
-            open_ = open_[change > 1e-6]
-            if not open_.size:
+            moved = np.minimum(np.maximum(s + step, 0.0), length)
+            change = np.abs(moved - s)
+            off = np.abs(along)
+            beyond = np.where(((moved <= 0.0) | (moved >= length)) & (off > 1e-6), off, 0.0)
+            if open_ is None:
+                found_s, found_t, found_beyond = moved, t, beyond
+            else:
+                found_s[open_], found_t[open_], found_beyond[open_] = moved, t, beyond
+            going = (change > 1e-6).nonzero()[0]
+            if not going.size:
                 break
-        return s, t, beyond
+            open_ = going if open_ is None else open_[going]
+            road, s, x, y, length = road[going], moved[going], x[going], y[going], length[going]
+        return found_s, found_t, found_beyond
 
 
 def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:

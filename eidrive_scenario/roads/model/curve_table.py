@@ -11,6 +11,9 @@ from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.model.curves import Cubic, Curve, ReferenceLine, Spiral
 from eidrive_scenario.roads.model.polynomials import spread
 
+EPSILON = float(np.finfo(np.float64).eps)
+"""Argument of the cardinal sine in place of 0, as in numpy.sinc."""
+
 
 class CurveTable:
     """Reference lines of many roads for joint evaluation: line i covers [base[i], base[i] + length + 1)."""
@@ -24,31 +27,38 @@ class CurveTable:
         self._starts = np.array([curve.s for curve in curves])
         first = np.diff(owner, prepend=-1) > 0
         self._keys = self.base[owner] + np.where(first, 0.0, np.maximum(self._starts, 0.0))
-        self._x, self._y, self._h = (np.array([getattr(curve, name) for curve in curves]) for name in ("x", "y", "h"))
+        x, y, h = (np.array([getattr(curve, name) for curve in curves]) for name in ("x", "y", "h"))
         self._kind = np.array([_kind(curve) for curve in curves], dtype=np.int8)
         self._curvature = np.array([getattr(curve, "curvature", 0.0) for curve in curves])
         self._rate = np.array([getattr(curve, "rate", 0.0) for curve in curves])
+        self._placing = np.column_stack([self._starts, self._curvature, x, y, h, np.cos(h), np.sin(h)])
+        """Columns of the curves that each evaluation needs: start, curvature, x, y, heading, its cosine and sine."""
+        self._spiral = _spiral_columns(self._curvature, self._rate)
+        self._is_curved = bool(self._kind.any())
+        """Whether any curve is neither a line nor an arc."""
         self._cubic = np.array(
             [(*curve.u, *curve.v, curve.pace) if isinstance(curve, Cubic) else (0.0,) * 9 for curve in curves]
         ).reshape(-1, 9)
 
     def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return x, y, heading, curvature and path length per meter of s at s (N,) of lines (N,)."""
-        curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
-        ds = s - self._starts[curve]
-        kind = self._kind[curve]
-        curvature = self._curvature[curve]
-        half = 0.5 * curvature * ds
-        chord = ds * np.sinc(half / np.pi)
-        u, v = chord * np.cos(half), chord * np.sin(half)
-        turn, speed = 2.0 * half, np.ones_like(ds)
-        for number, evaluate in ((1, self._spirals), (2, self._cubics)):
-            mask = kind == number
-            if mask.any():
-                u[mask], v[mask], turn[mask], curvature[mask], speed[mask] = evaluate(curve[mask], ds[mask])
-        h = self._h[curve]
-        cos, sin = np.cos(h), np.sin(h)
-        return self._x[curve] + cos * u - sin * v, self._y[curve] + sin * u + cos * v, h + turn, curvature, speed
+        curve = np.maximum(self._keys.searchsorted(self.base[line] + s, side="right") - 1, 0)
+        start, curvature, x, y, h, cos, sin = self._placing[curve].T
+        ds = s - start
+        turn = curvature * ds
+        half = 0.5 * turn
+        # As numpy.sinc(half / pi), bit for bit, at half of the time.
+        angle = np.pi * (half / np.pi)
+        angle = np.where(angle, angle, EPSILON)
+        chord = ds * (np.sin(angle) / angle)
+        u, v, speed = chord * np.cos(half), chord * np.sin(half), np.ones(len(ds))
+        if self._is_curved:
+            kind = self._kind[curve]
+            for number, evaluate in ((1, self._spirals), (2, self._cubics)):
+                some = (kind == number).nonzero()[0]
+                if some.size:
+                    u[some], v[some], turn[some], curvature[some], speed[some] = evaluate(curve[some], ds[some])
+        return x + cos * u - sin * v, y + sin * u + cos * v, h + turn, curvature, speed
 
     def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
         """Return the curvature and path length per meter of s at s (N,) of lines (N,), as `at` does."""
@@ -61,15 +71,11 @@ class CurveTable:
         return curvature, speed
 
     def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
-        k, rate = self._curvature[curve], self._rate[curve]
-        scale = np.sqrt(np.abs(rate) / np.pi)
-        shift = k / rate
-        sine, cosine = fresnel(np.stack([shift, ds + shift]) * scale)
-        along, across = (cosine[1] - cosine[0]) / scale, np.sign(rate) * (sine[1] - sine[0]) / scale
-        phase = -0.5 * k * shift
-        cos, sin = np.cos(phase), np.sin(phase)
+        k, rate, shift, scale, cosine0, sine0, sign, cos, sin = self._spiral[curve].T
+        sine, cosine = fresnel((ds + shift) * scale)
+        along, across = (cosine - cosine0) / scale, sign * (sine - sine0) / scale
         turn = ds * (k + 0.5 * rate * ds)
-        return cos * along - sin * across, sin * along + cos * across, turn, k + rate * ds, np.ones_like(ds)
+        return cos * along - sin * across, sin * along + cos * across, turn, k + rate * ds, np.ones(len(ds))
 
     def _cubics(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
         u0, u1, u2, u3, v0, v1, v2, v3, pace = self._cubic[curve].T
@@ -80,6 +86,15 @@ class CurveTable:
         bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > 0.0)
         u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
         return u, v, np.arctan2(dv, du), bend, norm * pace
+
+
+def _spiral_columns(curvature: Array, rate: Array) -> Array:
+    """Return what the evaluation of spirals needs beside the distance: (C, 9), without meaning for other curves."""
+    rate = np.where(rate, rate, 1.0)
+    scale, shift = np.sqrt(np.abs(rate) / np.pi), curvature / rate
+    sine, cosine = fresnel(shift * scale)
+    phase = -0.5 * curvature * shift
+    return np.column_stack([curvature, rate, shift, scale, cosine, sine, np.sign(rate), np.cos(phase), np.sin(phase)])
 
 
 def _kind(curve: Curve) -> int:
