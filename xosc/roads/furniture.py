@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from xosc.roads.layout import Arm, Junction, Road
+from xosc.roads.layout import Arm, Junction, Road, Tunnel
 from xosc.roads.opendrive import Element, add
 
 HOUSES = ((14.0, 10.0, 9.5), (11.0, 9.0, 6.5), (18.0, 12.0, 13.0))
@@ -17,6 +17,8 @@ SIGNALS = {
     "yield": ("205", "-1", "no", 0.9, 0.9, "yield"),
 }
 """Type, subtype, whether it is dynamic, height, width [m] and name of the signal of a control."""
+WALL_HEIGHT, WALL_WIDTH = 4.7, 0.4
+"""Of the walls of a tunnel [m]; the clearance of German tunnels is 4.50 m (RABT)."""
 CROSSWALK = (0.8, 3.8)
 """Distances of the edges of a crosswalk from the junction [m]."""
 LINE_WIDTH, LINE_BEFORE_SIGNAL = 0.4, 0.6
@@ -27,6 +29,8 @@ FLAT = {"hdg": 0.0, "pitch": 0.0, "roll": 0.0}
 def write_objects_and_signals(road: Element, arms: Sequence[Arm], described: Road) -> None:
     """Add crosswalk, stop line and signal for the traffic that enters a junction at an end of the road, and houses."""
     objects = add(road, "objects")
+    if described.tunnel is not None:
+        _write_tunnel(objects, described, described.tunnel)
     for number, arm in enumerate(arms):
         _write_markings(objects, arm, 40 * number)
         if described.houses is not None:
@@ -116,6 +120,54 @@ def _write_houses(objects: Element, arm: Arm, clearance: float) -> None:
                 **FLAT,
             )
             from_junction += length + HOUSE_GAP
+
+
+def _write_tunnel(objects: Element, road: Road, tunnel: Tunnel) -> None:
+    """Add the walls of a tunnel at the edges of the road, and the tunnel itself."""
+    street = road.sections[0].street
+    for side in (1, -1):
+        t = side * (sum(spec.width for spec in street.side(side)) + WALL_WIDTH / 2)
+        wall = add(
+            objects,
+            "object",
+            id=f"{8 if side > 0 else 9}0",
+            name=f"tunnel wall {'left' if side > 0 else 'right'}",
+            type="wall",
+            s=tunnel.s,
+            t=t,
+            zOffset=0.0,
+            orientation="none",
+            length=tunnel.length,
+            width=WALL_WIDTH,
+            height=WALL_HEIGHT,
+            **FLAT,
+        )
+        add(
+            wall,
+            "repeat",
+            s=tunnel.s,
+            length=tunnel.length,
+            distance=0.0,
+            tStart=t,
+            tEnd=t,
+            widthStart=WALL_WIDTH,
+            widthEnd=WALL_WIDTH,
+            heightStart=WALL_HEIGHT,
+            heightEnd=WALL_HEIGHT,
+            zOffsetStart=0.0,
+            zOffsetEnd=0.0,
+        )
+    add(
+        objects,
+        "tunnel",
+        s=tunnel.s,
+        length=tunnel.length,
+        id="70",
+        name="tunnel",
+        type="underpass",
+        lighting=0.5,
+        daylight=0.0,
+    )
 
 
 def _write_area(objects: Element, number: str, kind: str, s: float, s_end: float, t: float, t_end: float) -> None:

@@ -9,8 +9,18 @@ import math
 
 from eidrive_scenario.roads.model import curves
 from xosc.roads.crossings import Crossing
-from xosc.roads.layout import Arm, Junction, Layout, Piece, Road, Section, Way, movement
-from xosc.roads.streets import ARTERIAL, COUNTRY_ROAD, LOCAL_STREET, MOTORWAY_LANE, PLAIN_STREET, RING, motorway
+from xosc.roads.layout import Arm, Junction, Layout, Piece, Road, Section, Slope, Tunnel, Way, movement
+from xosc.roads.streets import (
+    ARTERIAL,
+    COUNTRY_ROAD,
+    DUAL_CARRIAGEWAY,
+    LOCAL_STREET,
+    MOTORWAY_LANE,
+    PLAIN_STREET,
+    RING,
+    TUNNEL_STREET,
+    motorway,
+)
 
 QUARTER = math.pi / 2
 
@@ -27,6 +37,26 @@ def winding_road() -> Layout:
     right = (Piece(20.0, 0.0, -1 / 50), Piece(40.0, -1 / 50), Piece(20.0, -1 / 50, 0.0))
     pieces = (Piece(120.0), *left, *right, Piece(200.0))
     return Layout("winding_road", (Road("1", "road", (Section(0.0, COUNTRY_ROAD),), -80.0, 2.0, 0.0, pieces),))
+
+
+def crest_road() -> Layout:
+    """Dual carriageway over a crest of 800 m radius at x = 0: a car is hidden until about 100 m."""
+    hill = (Slope(150.0, 0.0), Slope(90.0, 0.06), Slope(60.0, 0.06), Slope(96.0, -0.06), Slope(60.0, -0.06))
+    profile = (*hill, Slope(90.0, 0.0))
+    section = Section(0.0, DUAL_CARRIAGEWAY)
+    lane = -DUAL_CARRIAGEWAY.center_of(-3)
+    road = Road("1", "crest", (section,), -348.0, lane, 0.0, (Piece(800.0),), profile=profile)
+    return Layout("crest_road", (road,), kind="rural", speed_limit="100")
+
+
+def tunnel_road() -> Layout:
+    """Road with one lane per direction through a tunnel with a bend of 150 m radius to the right."""
+    bend = (Piece(40.0, 0.0, -1 / 150), Piece(160.0, -1 / 150), Piece(40.0, -1 / 150, 0.0))
+    pieces = (Piece(160.0), *bend, Piece(160.0))
+    lane = -TUNNEL_STREET.center_of(-1)
+    section = Section(0.0, TUNNEL_STREET)
+    road = Road("1", "tunnel", (section,), -80.0, lane, 0.0, pieces, tunnel=Tunnel(120.0, 320.0))
+    return Layout("tunnel_road", (road,), kind="rural", speed_limit="80")
 
 
 def motorway_with_on_ramp() -> Layout:
@@ -103,6 +133,8 @@ FOUR_WAY_JUNCTION = Crossing(
 JUNCTIONS_AND_ROADS: tuple[Layout, ...] = (
     four_lane_road(),
     winding_road(),
+    crest_road(),
+    tunnel_road(),
     motorway_with_on_ramp(),
     roundabout(),
     FOUR_WAY_SIGNALS.layout(),

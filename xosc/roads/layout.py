@@ -96,10 +96,31 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Road:
-    """Road outside junctions; its reference line starts at x, y with `heading`.
+class Slope:
+    """Part of an elevation profile: its length and the grade at its end [m/m]; the grade changes linearly from that before.
 
-    houses  distance of the rows of houses from a junction at one end of the road [m]; None for no houses
+    A change of grade over a length is a parabola, whose radius is about length over change.
+    """
+
+    length: float
+    grade: float
+
+
+@dataclass(frozen=True)
+class Tunnel:
+    """Tunnel of a road, with a wall at each edge of the road."""
+
+    s: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Road:
+    """Road outside junctions; its reference line starts at x, y with `heading`, and at z = 0 without grade.
+
+    houses   distance of the rows of houses from a junction at one end of the road [m]; None for no houses
+    profile  elevation, from the start on; the last grade continues to the end of the road
+    tunnel   tunnel of the road, if it has one
     """
 
     id: str
@@ -110,6 +131,8 @@ class Road:
     heading: float
     pieces: tuple[Piece, ...]
     houses: float | None = None
+    profile: tuple[Slope, ...] = ()
+    tunnel: Tunnel | None = None
 
     @cached_property
     def line(self) -> tuple[curves.Curve, ...]:

@@ -78,7 +78,9 @@ def reference_line_bounds(layout: Layout) -> tuple[float, float, float, float]:
 
 def write_road(root: Element, road: Road, layout: Layout) -> None:
     """Append a road outside junctions."""
-    item, link, plan = add_road(root, road.id, road.name, road.length, "-1", layout.kind, layout.speed_limit)
+    item, link, plan = add_road(
+        root, road.id, road.name, road.length, "-1", layout.kind, layout.speed_limit, road.profile
+    )
     for tag, contact in (("predecessor", "start"), ("successor", "end")):
         for junction in layout.junctions:
             if any(arm.road.id == road.id and arm.contact == contact for arm in junction.arms):

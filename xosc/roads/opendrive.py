@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from lxml import etree
 
 from eidrive_scenario.roads.model import curves
-from xosc.roads.layout import LaneSpec
+from xosc.roads.layout import LaneSpec, Slope
 
 CURB = 0.12
 """Height of a sidewalk [m]."""
@@ -67,16 +67,33 @@ def add_lane(side: Element, number: int, spec: LaneSpec, length: float = 0.0) ->
 
 
 def add_road(
-    root: Element, number: str, name: str, length: float, junction: str, kind: str = "town", speed_limit: str = "50"
+    root: Element,
+    number: str,
+    name: str,
+    length: float,
+    junction: str,
+    kind: str = "town",
+    speed_limit: str = "50",
+    profile: Sequence[Slope] = (),
 ) -> tuple[Element, Element, Element]:
     """Append a road with its fixed children. Return the road, its link and its planView."""
     road = add(root, "road", rule="RHT", name=name, length=length, id=number, junction=junction)
     link = add(road, "link")
     add(add(road, "type", s=0.0, type=kind), "speed", max=speed_limit, unit="km/h")
     plan = add(road, "planView")
-    add(add(road, "elevationProfile"), "elevation", s=0.0, a=0.0, b=0.0, c=0.0, d=0.0)
+    add_elevation(add(road, "elevationProfile"), profile)
     add(road, "lateralProfile")
     return road, link, plan
+
+
+def add_elevation(element: Element, profile: Sequence[Slope]) -> None:
+    """Append the pieces of an elevation profile, a level one by default."""
+    s, z, grade = 0.0, 0.0, 0.0
+    for part in profile:
+        change = (part.grade - grade) / (2.0 * part.length)
+        add(element, "elevation", s=s, a=z, b=grade, c=change, d=0.0)
+        s, z, grade = s + part.length, z + (grade + part.grade) / 2.0 * part.length, part.grade
+    add(element, "elevation", s=s, a=z, b=grade, c=0.0, d=0.0)
 
 
 def add_line(plan: Element, line: Sequence[curves.Curve]) -> None:

@@ -55,6 +55,12 @@ ARTERIAL_WITH_PARKING = two_way(DRIVING_INNER, DRIVING_OUTER, LaneSpec("parking"
 
 PLAIN_STREET = two_way(DRIVING_OUTER, STRIP, GUTTER, WIDE_WALK, center=("solid", "white"))
 """Street with one lane per direction and no parking."""
+DUAL_CARRIAGEWAY = two_way(
+    MEDIAN, DRIVING_INNER, DRIVING_OUTER, LaneSpec("shoulder", 1.5), LaneSpec("border", 6.0), center=("none", "white")
+)
+"""Country road with two lanes per direction, a median and grass."""
+TUNNEL_STREET = two_way(DRIVING_OUTER, STRIP, center=("solid", "white"))
+"""One lane per direction between the walls of a tunnel."""
 RING = Street(
     left=(GUTTER,), right=(LaneSpec("driving", 4.5, ("solid", "white")), STRIP, GUTTER, WALK), center=("none", "white")
 )

@@ -32,6 +32,8 @@ SOFTENING = 1.0
 """Softening constant of the Stanley law, for calm steering near standstill [m/s]."""
 STANDSTILL = 0.3
 """Speed below which a stopping vehicle holds its brake [m/s]."""
+GRAVITY = 9.81
+"""[m/s²]; the pedals compensate its part along a slope."""
 HOLDING = 3.0
 """Deceleration that corresponds to the held brake: sufficient on a slope of 30 % [m/s²]."""
 
@@ -55,8 +57,9 @@ class PidController(VehicleController):
         steering = self._steer(ego, plan)
         if plan.braking is not None:
             self._speed.reset()
-            return Control(0.0, _pedal(plan.braking, self.spec.max_deceleration), steering)
-        return self._pedals(self._accelerate(ego, plan), steering)
+            braking = max(plan.braking + _downhill(ego), 0.0)
+            return Control(0.0, _pedal(braking, self.spec.max_deceleration), steering)
+        return self._pedals(self._accelerate(ego, plan) - _downhill(ego), steering)
 
     def hold_standstill(self) -> Control:
         """Return full brake with the last steering angle."""
@@ -85,6 +88,14 @@ class PidController(VehicleController):
         turn = math.atan2(back, SOFTENING + max(ego.speed, 0.0))
         self._steering = self._direction.update(turn, feed_forward=wrap_angle(heading - ego.yaw))
         return self._steering
+
+
+def _downhill(ego: EgoState) -> float:
+    """Return the acceleration by the slope of the road [m/s²], positive downhill.
+
+    The integral of the PID does not replace it: a plan that begins with the present speed has no speed error.
+    """
+    return GRAVITY * math.sin(ego.pitch)
 
 
 def _pedal(acceleration: float, maximum: float) -> float:
