@@ -97,9 +97,9 @@ class Piece:
 
 @dataclass(frozen=True)
 class Slope:
-    """Part of an elevation profile: its length and the grade at its end [m/m]; the grade changes linearly from that before.
+    """Part of an elevation profile: its length and the grade at its end [m/m].
 
-    A change of grade over a length is a parabola, whose radius is about length over change.
+    The grade changes linearly from that before: a parabola, whose radius is about its length over the change.
     """
 
     length: float

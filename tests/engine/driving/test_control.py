@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -166,6 +167,23 @@ def test_braking_to_standstill_has_time_and_distance_of_deceleration(car: ActorS
         ego.drive(controller.control(ego.state(), Plan(points, np.full(60, 8.0), "", braking=5.0)))
     assert 1.5 <= ego.time < 1.61
     assert 6.0 < ego.x < 6.4
+
+
+@pytest.mark.parametrize("grade", [-0.1, -0.02, 0.02, 0.06, 0.1])
+def test_pedals_compensate_the_slope(car: ActorSpec, vehicle: Any, grade: float) -> None:
+    """At the planned speed only the slope accelerates: g sin(atan(grade)); a positive pitch is downhill."""
+    pitch = math.atan(grade)
+    ego = msgspec.structs.replace(vehicle(speed=8.0).state(), pitch=pitch)
+    control = PidController(car, 0.05).control(ego, Plan(STRAIGHT, np.full(3, 8.0), ""))
+    along = 9.81 * math.sin(pitch)
+    assert control.brake == pytest.approx(max(along, 0.0) / car.max_deceleration)
+    assert control.throttle == pytest.approx(max(-along, 0.0) / car.max_acceleration)
+
+
+def test_braking_of_plan_is_reached_on_a_slope(car: ActorSpec, vehicle: Any) -> None:
+    ego = msgspec.structs.replace(vehicle(speed=8.0).state(), pitch=math.atan(0.06))
+    control = PidController(car, 0.05).control(ego, Plan(STRAIGHT, np.full(3, 8.0), "", braking=5.0))
+    assert control.brake == pytest.approx((5.0 + 9.81 * 0.06 / math.hypot(1.0, 0.06)) / car.max_deceleration)
 
 
 @pytest.mark.parametrize(

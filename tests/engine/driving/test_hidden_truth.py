@@ -19,7 +19,7 @@ from eidrive_scenario.recording.frame import Frame
 
 EGO = "Ego"
 WITHOUT_DRIVER = ("coop/scenario_3", "coop/scenario_4")
-WITH_STATIONS = ("coop", "ei", "ncap")
+WITH_STATIONS = ("coop", "corner_cases", "ei", "ncap")
 CASES = [
     (entry.name, channel)
     for entry in describe_scenarios()

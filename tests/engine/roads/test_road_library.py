@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import RoadNetwork, placed_objects
 from xosc.roads.courses import connect
 from xosc.roads.layout import Layout
 from xosc.roads.make_roads import LAYOUTS, write
@@ -155,6 +155,26 @@ def test_one_way_road_opens_a_lane_and_takes_the_ramp(library: Path) -> None:
     assert [key.road for key in route.lanes][0::2] == ["5", "3"]
     exit_ = network.route(network.location("1", -1, 120.0), network.location("4", -1, 30.0))
     assert [key.road for key in exit_.lanes][-1] == "4"
+
+
+def test_crest_has_its_height_and_radius(library: Path) -> None:
+    """Climb: 90 m at a mean grade of 3 %, 60 m at 6 %, 48 m at a mean of 3 %. Radius: 1 / z'' = 96 m / 0.12."""
+    network = RoadNetwork.load(library / "crest_road.xodr")
+    s = (150.0, 348.0, 546.0)
+    assert [network.road_pose_at("1", at, 0.0).z for at in s] == pytest.approx([0.0, 7.74, 0.0], abs=1e-9)
+    assert network.road_pose_at("1", 348.0, 0.0).p == pytest.approx(0.0, abs=1e-9)
+    below = [7.74 - network.road_pose_at("1", 348.0 + ds, 0.0).z for ds in (-20.0, 20.0)]
+    assert below == pytest.approx([20.0**2 / (2 * 800.0)] * 2)
+
+
+def test_tunnel_walls_follow_the_edges_of_the_road(library: Path) -> None:
+    network = RoadNetwork.load(library / "tunnel_road.xodr")
+    walls = [placed for placed in placed_objects(network) if placed.object.type == "wall"]
+    assert {round(placed.height, 3) for placed in walls} == {4.7}
+    assert sum(placed.length for placed in walls) == pytest.approx(2 * 320.0)
+    middle = network.road_pose_at("1", 282.5, 0.0)
+    nearest = sorted(math.dist(placed.pose[:2], middle[:2]) for placed in walls)[:2]
+    assert nearest == pytest.approx([4.2, 4.2], abs=0.03)  # 3.5 m lane, 0.5 m margin, half of the wall
 
 
 def test_connecting_curve_reaches_its_end_with_continuous_curvature() -> None:
