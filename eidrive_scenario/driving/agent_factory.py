@@ -22,6 +22,7 @@ from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerSettings
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.coverage import view_sectors
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
 from eidrive_scenario.settings import Settings
@@ -129,13 +130,24 @@ def build_agent(
         fusion=fusion,
         planner=None
         if planner == NO_PLANNER
-        else construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed),
+        else _planner(planner, settings, installation, detector, dt=dt, seed=seed),
         controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
         message_generator=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
         receives_messages=listens,
         points=points,
     )
+
+
+def _planner(
+    name: str, settings: AgentSettings, installation: DetectorContext, detector: Detector, *, dt: float, seed: int
+) -> Planner:
+    """Build the planner of a vehicle, with the sectors that its detector covers."""
+    kind = registry("planners").load(name, Planner)
+    planner: Planner = construct(kind, settings, installation.spec, installation.roads, dt=dt, seed=seed)
+    used = [sensor for sensor in installation.sensors.values() if sensor.kind in detector.needs]
+    planner.view = view_sectors(used, installation.spec) if used else None
+    return planner
 
 
 def _vehicle_controller(settings: AgentSettings, spec: ActorSpec, dt: float) -> VehicleController:

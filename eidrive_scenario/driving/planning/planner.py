@@ -12,6 +12,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.coverage import ViewSector
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.world.actor import ActorSpec
@@ -28,6 +29,8 @@ class Planner(ABC):
     """Type of the settings that the controller may give the planner, each as a property of its name or in the property
     `planner_settings`."""
     planner_settings: PlannerSettings
+    view: tuple[ViewSector, ...] | None = None
+    """Sectors around the vehicle in which its detector can detect objects; None: in all directions."""
 
     def __init__(
         self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int

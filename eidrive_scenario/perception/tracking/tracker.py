@@ -25,6 +25,8 @@ MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnR
 
 MOVING = 1.0
 """Minimum speed at which the front of an object is taken from its direction of motion [m/s]."""
+ACROSS = math.cos(math.pi / 4.0)
+"""Cosine of the angle between two axes from which on one is across the other."""
 SMOOTHING = 0.2
 """Weight of a new box in the size, height and heading of an object with many detections."""
 
@@ -125,13 +127,26 @@ class Tracker(TrackingMethod):
     def _correct(self, rows: list[int], detections: Detections, columns: list[int], noise: Array) -> None:
         boxes = detections.boxes[columns]
         before = Estimates(self._tracks.state[rows], self._tracks.covariance[rows])
-        state, covariance = self._model.update(before, boxes, noise[columns])
+        noise = noise[columns] + self._axis_noise(rows, boxes)
+        state, covariance = self._model.update(before, boxes, noise)
         self._tracks.state[rows], self._tracks.covariance[rows] = state, covariance
         share = np.array([max(SMOOTHING, 1.0 / (self._histories[row].hits + 1.0)) for row in rows])
         shape = self._shape[rows]
         shape[:, :4] += share[:, None] * (boxes[:, 2:6] - shape[:, :4])
         shape[:, 4] = self._headings(shape[:, 4], boxes[:, 6], state, share)
         self._shape[rows] = shape
+
+    def _axis_noise(self, rows: list[int], boxes: Array) -> Array:
+        """Return the covariance (N, 2, 2) of centers of boxes whose axis is across that of their confirmed track [m²].
+
+        The same visible corner belongs to a box along the track or across it; their centers differ by half the
+        difference of length and width in both directions.
+        """
+        confirmed = np.array([self._histories[row].number is not None for row in rows], dtype=bool)
+        shape = self._shape[rows]
+        across = confirmed & (np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS)
+        shift = np.where(across, (shape[:, 1] - shape[:, 2]) / 2.0, 0.0)
+        return np.asarray((shift**2)[:, None, None] * np.eye(2))
 
     def _headings(self, held: Array, measured: Array, state: Array, share: Array) -> Array:
         """Return headings (N,): the axis of the boxes, with the front in the direction of motion or else unchanged."""
@@ -140,7 +155,7 @@ class Tracker(TrackingMethod):
         turned = np.where(np.cos(measured - course) < 0.0, measured + math.pi, measured)
         held = np.where(np.cos(held - course) < 0.0, held + math.pi, held)
         # An axis across the course is the other axis of the box: the L-shape fit mistook the width for the length.
-        turned = np.where(np.cos(turned - course) < math.cos(math.pi / 4), held, turned)
+        turned = np.where(np.cos(turned - course) < ACROSS, held, turned)
         return np.asarray(held + share * ((turned - held + math.pi) % (2.0 * math.pi) - math.pi))
 
     def _initiate(self, detections: Detections, columns: list[int], noise: Array) -> None:

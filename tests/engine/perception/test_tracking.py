@@ -186,6 +186,18 @@ def test_velocity_and_heading_are_estimated_from_motion(kind: str) -> None:
     assert max(headings) < 0.25
 
 
+def test_box_across_a_track_hardly_moves_it() -> None:
+    """A fit that mistakes the width for the length completes the visible corner of the car in the wrong direction."""
+    track, alike = tracker(), tracker()
+    for tick in range(30):
+        track.update(cars(tick * DT, (2.0 * tick * DT, 0.0, 0.0)))
+        alike.update(cars(tick * DT, (2.0 * tick * DT, 0.0, 0.0)))
+    moved = alike.update(cars(3.0, (6.0, -0.4, 0.0))).boxes[0, 1]
+    found = track.update(cars(3.0, (6.0, -0.4, math.pi / 2)))
+    assert abs(found.boxes[0, 1]) < 0.1 * abs(moved)
+    assert found.boxes[0, 6] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_ctrv_has_smaller_error_than_cv_in_curve() -> None:
     """The same circle, measured at 2 Hz, where constant velocity cuts the curve."""
     means = {}

@@ -26,6 +26,7 @@ from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, surroundings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
 ROUTE = "route"
@@ -36,6 +37,8 @@ SATISFIED = 0.85
 """Share of the wanted progress from which on no other maneuver is considered."""
 DWELL = 2.0
 """Time for which a maneuver is kept unless it becomes risky [s]."""
+PERSISTENT = 0.5
+"""Time for which another maneuver has to be the best one before it starts [s]."""
 URGENT = 4.0
 """Time before a collision at which the emergency brake may act [s]."""
 
@@ -76,6 +79,8 @@ class Decider:
         self._emergency = min(settings.emergency_deceleration, spec.max_deceleration)
         self._current: LateralProfile | None = None
         self._switched = -math.inf
+        self._challenger: tuple[str, float] = (ROUTE, math.inf)
+        """Another maneuver than the current one that has been best, and the time since when [s]."""
         self._oncoming = OncomingTraffic(view)
         self._held_up = False
 
@@ -234,10 +239,21 @@ class Decider:
         return way < SATISFIED * situation.free_progress(float(self._times[-1]), self._settings.acceleration)
 
     def _kept(self, options: Options, best: int, now: float) -> int:
-        """Return the best proposal of the current maneuver during its dwell time, unless it is risky."""
-        if now - self._switched >= DWELL or self._current is None:
+        """Return the best proposal; that of the current maneuver during its dwell time, unless it is risky.
+
+        Another maneuver has to be the best one for some time, so that noise of velocities does not start it.
+        """
+        if self._current is None:
             return best
-        name = self._current.name
+        name, wanted = self._current.name, options.name_of(best)
+        if wanted == name:
+            self._challenger = (name, math.inf)
+            return best
+        if self._challenger[0] != wanted or math.isinf(self._challenger[1]):
+            self._challenger = (wanted, now)
+        is_due = now - self._switched >= DWELL and now - self._challenger[1] >= PERSISTENT - TIME_TOLERANCE
+        if is_due:
+            return best
         same = [row for row, p in enumerate(options.proposals) if options.profiles[p.profile].name == name]
         if not same:
             return best

@@ -23,10 +23,14 @@ MOST = 4
 
 
 class Course(NamedTuple):
-    """Center line of a lane and its successors: points (M, 2) [m], distances along it (M,) [m]."""
+    """Center line of a lane and its successors: points (M, 2) [m], distances along it (M,) [m].
+
+    half_width  of the lane at its start [m]
+    """
 
     points: Array
     along: Array
+    half_width: float
 
     def place(self, x: float, y: float) -> tuple[float, float, float]:
         """Return the distance along the course, the offset to the left and the heading at the nearest point."""
@@ -105,7 +109,10 @@ class LaneCourses:
         if len(points) < 2:
             return None
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        return Course(points, along)
+        first = chain[0]
+        section = self._roads.road(first.road).sections[first.section]
+        width = section.lanes[first.lane].width
+        return Course(points, along, max(width.value(0.0), width.value(section.length)) / 2.0)
 
 
 def _likely(branches: list[Branch]) -> list[Branch]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
+ON_FOOT = frozenset({"pedestrian"})
 STILL = 0.5
 """Speed below which an object stands [m/s]."""
 GATE = 2.5
@@ -23,6 +26,12 @@ LARGEST_ERROR = 3.0
 """Maximum standard deviation that is considered [m]; above it the position says nothing."""
 SMOOTHING = 0.4
 """Weight of the newest difference quotient in the velocity of an object whose detector estimates none."""
+LASTING = 1.0
+"""Time constant of the mean speed [s], with which a lost object moves on."""
+ALONG = math.cos(math.radians(40.0))
+"""Cosine of the angle between axis and motion up to which an object moves along its axis."""
+LONGEST_HIDDEN = 10.0
+"""Time for which an object is kept whose place is out of view [s], about that of passing it."""
 CHANGING = 0.7
 """Time constant of the estimate of accelerations [s], which damps the noise of velocities."""
 
@@ -51,8 +60,12 @@ class KnownObject(msgspec.Struct):
     """Time since which the object stands [s]; None while it moves."""
     moving_since: float | None = None
     """Time since which the object moves [s]; None while it stands."""
+    hidden_since: float | None = None
+    """Time since which the place of a lost object is out of view [s]."""
     acceleration: float = 0.0
     """Estimated rate of change of the speed [m/s²]."""
+    mean_speed: float = 0.0
+    """Speed over about the last second [m/s]."""
 
     @property
     def speed(self) -> float:
@@ -68,10 +81,15 @@ class ObjectMemory:
         self._objects: list[KnownObject] = []
         self._time = -math.inf
 
-    def update(self, detections: Detections, now: float) -> list[KnownObject]:
+    def update(
+        self, detections: Detections, now: float, in_view: Callable[[Sequence[KnownObject]], Bools] | None = None
+    ) -> list[KnownObject]:
         """Return all objects at `now` [s], lost ones at their predicted positions.
 
-        Objects with an existence probability below `possible_existence` are ignored.
+        Objects with an existence probability below `possible_existence` are ignored. A lost object is kept while its
+        place is out of view.
+
+        in_view  returns whether the sensors of the vehicle show the places of objects; None: all of them
         """
         step = now - self._time if self._objects else 0.0
         for known in self._objects:
@@ -83,7 +101,12 @@ class ObjectMemory:
         for index, known in self._pairs(found):
             _take_over(known, found[index], step)
             found[index] = known
-        lost = [known for known in self._objects if known.row is None and self._is_kept(known, now)]
+        lost = [known for known in self._objects if known.row is None]
+        for known in lost:
+            if now - step - known.seen < TIME_TOLERANCE:
+                _keep_course(known)
+        self._note_hidden(lost, now, in_view)
+        lost = [known for known in lost if self._is_kept(known, now) and not _is_among(known, found)]
         for known in lost:
             known.error = min(known.error + SPEED_ERROR * step, LARGEST_ERROR)
         self._objects = found + lost
@@ -112,8 +135,23 @@ class ObjectMemory:
                 pairs.append((first, self._objects[second]))
         return pairs
 
+    def _note_hidden(
+        self, lost: list[KnownObject], now: float, in_view: Callable[[Sequence[KnownObject]], Bools] | None
+    ) -> None:
+        """Update since when the places of lost objects are out of view; an object that should be in view is forgotten
+        in `memory`."""
+        shown = np.ones(len(lost), dtype=bool) if in_view is None or not lost else in_view(lost)
+        for known, is_shown in zip(lost, shown.tolist(), strict=True):
+            if is_shown and known.hidden_since is not None:
+                known.seen += now - known.hidden_since
+            known.hidden_since = None if is_shown else now if known.hidden_since is None else known.hidden_since
+
     def _is_kept(self, known: KnownObject, now: float) -> bool:
-        return now - known.seen <= self._settings.memory and known.existence >= self._settings.min_existence
+        if known.existence < self._settings.min_existence:
+            return False
+        if known.hidden_since is not None:
+            return self._settings.memory > 0.0 and now - known.hidden_since <= LONGEST_HIDDEN
+        return now - known.seen <= self._settings.memory
 
 
 def _objects_of(detections: Detections, now: float, least: float) -> list[KnownObject]:
@@ -130,8 +168,28 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         kind = detections.classes[row]
         age = max(now - detections.time, 0.0)
         x, y, error = x + vx * age, y + vy * age, min(error + SPEED_ERROR * age, LARGEST_ERROR)
-        found.append(KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now))
+        known = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
+        known.mean_speed = known.speed
+        found.append(known)
     return found
+
+
+def _is_among(lost: KnownObject, found: list[KnownObject]) -> bool:
+    """Return whether a lost object is at the place of one in view, of which it was another track."""
+    return any(math.hypot(other.x - lost.x, other.y - lost.y) < GATE for other in found)
+
+
+def _keep_course(known: KnownObject) -> None:
+    """Let an object that has just been lost move along its axis with its mean speed, if it moves about that way.
+
+    Velocities at the edge of the view are noisy.
+    """
+    ahead = known.vx * math.cos(known.yaw) + known.vy * math.sin(known.yaw)
+    if known.kind in ON_FOOT or abs(ahead) < ALONG * known.speed or known.speed < STILL:
+        return
+    speed = math.copysign(known.mean_speed, ahead)
+    known.vx, known.vy = speed * math.cos(known.yaw), speed * math.sin(known.yaw)
+    known.acceleration = min(known.acceleration, 0.0)
 
 
 def _take_over(known: KnownObject, fresh: KnownObject, step: float) -> None:
@@ -146,7 +204,10 @@ def _take_over(known: KnownObject, fresh: KnownObject, step: float) -> None:
     if before is not None and step > 0.0:
         change = (known.speed - before) / step
         known.acceleration += (change - known.acceleration) * (1.0 - math.exp(-step / CHANGING))
+    share = 1.0 if before is None else 1.0 - math.exp(-step / LASTING)
+    known.mean_speed += (known.speed - known.mean_speed) * share
     known.has_velocity |= fresh.has_velocity or step > 0.0
+    known.hidden_since = None
     known.row, known.kind, known.seen = fresh.row, fresh.kind, fresh.seen
     known.x, known.y, known.yaw = fresh.x, fresh.y, fresh.yaw
     known.length, known.width = fresh.length, fresh.width

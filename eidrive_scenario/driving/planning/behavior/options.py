@@ -25,6 +25,10 @@ class Options(msgspec.Struct, frozen=True):
         """Index of the gentle stop."""
         return next(row for row, proposal in enumerate(self.proposals) if proposal.is_gentle)
 
+    def name_of(self, row: int) -> str:
+        """Return the maneuver of a proposal."""
+        return self.profiles[self.proposals[row].profile].name
+
     def best(self, profiles: int | None = None) -> int:
         """Return the index of the proposal with the highest score, among those along the first `profiles`."""
         count = len(self.proposals)

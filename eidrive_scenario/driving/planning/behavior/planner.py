@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
-from eidrive_scenario.driving.planning.behavior.memory import ObjectMemory
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
@@ -112,7 +113,8 @@ class BehaviorPlanner(RoutePlanner):
     def _decide(self, ego: EgoState, objects: Detections, line: ReferenceLine, wanted: float, now: float) -> Decision:
         x, y, _ = ego.position.tolist()
         s, d = self._place_on(line, x, y)
-        known = self._memory.update(objects, now)
+        known = self._memory.update(objects, now, self._in_view(ego))
+        self._predictor.follow_lanes(known)
         near = [entry for entry in known if math.hypot(entry.x - x, entry.y - y) < self._reach(ego, wanted)]
         stop = self._stop(line.path, ego, x, y, now)
         situation = Situation(
@@ -130,6 +132,22 @@ class BehaviorPlanner(RoutePlanner):
             now=now,
         )
         return self._decider.decide(situation)
+
+    def _in_view(self, ego: EgoState) -> Callable[[Sequence[KnownObject]], Bools] | None:
+        """Return a function that determines which objects are in view of the sensors; None: all of them."""
+        sectors = self.view
+        if sectors is None or all(sector.half_angle >= math.pi for sector in sectors):
+            return None
+
+        def in_view(objects: Sequence[KnownObject]) -> Bools:
+            places = np.array([(known.x, known.y) for known in objects]) - ego.position[:2]
+            radius = np.array([known.width / 2.0 for known in objects])
+            cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+            x, y = cos * places[:, 0] + sin * places[:, 1], cos * places[:, 1] - sin * places[:, 0]
+            shown = [sector.contains(x, y, radius) for sector in sectors]
+            return np.asarray(np.logical_or.reduce(shown))
+
+        return in_view
 
     def _reach(self, ego: EgoState, wanted: float) -> float:
         return MARGIN_AHEAD + 2.0 * max(ego.speed, wanted) * self.planner_settings.horizon

@@ -9,17 +9,22 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.planning.behavior.lane_courses import Course, LaneCourses
-from eidrive_scenario.driving.planning.behavior.memory import KnownObject
+from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
 
-ON_FOOT = frozenset({"pedestrian"})
 STANDING = 0.3
 """Speed below which an object is predicted to stand [m/s]; the direction of a slower one is noise."""
 ALIGNED = 0.6
 """Maximum angle between the motion of a vehicle and a lane that it follows [rad]."""
 LEAVING_RATE = 0.3
 """Minimum lateral speed of a vehicle that leaves its lane [m/s]; slower motion is its lateral wandering."""
+LEAVING_ERROR = 3.5
+"""Lateral speed of a vehicle that leaves its lane per standard deviation of its position [1/s], if that is larger: with
+a velocity from noisy positions."""
+SPEED_ERROR = 1.5
+"""Assumed standard deviation of the velocity of a vehicle per standard deviation of its position [1/s]. Below it the
+direction of its motion is unknown: it is that of its lane."""
 LANE_WIDTH = 3.5
 """Lateral distance after which a lane change is predicted to end [m]."""
 NOTICEABLE, GREATEST = 0.8, 4.0
@@ -34,6 +39,7 @@ class Prediction(msgspec.Struct, frozen=True):
     """Predicted motion of N hypotheses at K times; an object may have several hypotheses.
 
     objects  (N,) index of the object;  x, y, yaw, speed  (N, K) [m, rad, m/s]
+    room     (N,) distance of the center from the nearer edge of the lane that it follows, inf for other objects [m]
     """
 
     objects: tuple[int, ...]
@@ -41,6 +47,7 @@ class Prediction(msgspec.Struct, frozen=True):
     y: Array
     yaw: Array
     speed: Array
+    room: Array
 
 
 class Predictor:
@@ -51,48 +58,67 @@ class Predictor:
         self._courses = LaneCourses(roads) if roads is not None else None
         self._times = times
 
+    def follow_lanes(self, objects: list[KnownObject]) -> None:
+        """Let lost vehicles move along their lanes."""
+        lost = [known for known in objects if known.row is None]
+        for known, courses in zip(lost, self._lanes(lost) if lost else [], strict=True):
+            for course in courses:
+                _, left, heading = course.place(known.x, known.y)
+                turn = float(wrap_angle(math.atan2(known.vy, known.vx) - heading))
+                if abs(turn) <= ALIGNED and abs(left) <= course.half_width:
+                    known.vx, known.vy = known.speed * math.cos(heading), known.speed * math.sin(heading)
+                    break
+
     def predict(self, objects: list[KnownObject]) -> Prediction:
         """Return the hypotheses of all objects."""
         owners: list[int] = []
         rows: list[tuple[Array, Array, Array]] = []
         speeds: list[Array] = []
+        rooms: list[float] = []
         lanes = self._lanes(objects)
         for index, known in enumerate(objects):
             travelled, speed = longitudinal_motion(known.speed, known.acceleration, self._times)
-            for row in self._hypotheses(known, lanes[index], travelled):
+            for row, room in self._hypotheses(known, lanes[index], travelled):
                 owners.append(index)
                 rows.append(row)
                 speeds.append(speed)
+                rooms.append(room)
         if not rows:
             nothing = np.empty((0, len(self._times)))
-            return Prediction((), nothing, nothing, nothing, nothing)
+            return Prediction((), nothing, nothing, nothing, nothing, np.empty(0))
         x, y, yaw = (np.array([row[axis] for row in rows]) for axis in range(3))
-        return Prediction(tuple(owners), x, y, yaw, np.array(speeds))
+        return Prediction(tuple(owners), x, y, yaw, np.array(speeds), np.array(rooms))
 
     def _hypotheses(
         self, known: KnownObject, courses: list[Course], travelled: Array
-    ) -> list[tuple[Array, Array, Array]]:
+    ) -> list[tuple[tuple[Array, Array, Array], float]]:
+        """Return the poses (K,) of each hypothesis, and its room in the lane [m]."""
         times = self._times
         speed = known.speed
         if speed < STANDING:
-            return [tuple(np.full(len(times), value) for value in (known.x, known.y, known.yaw))]  # type: ignore[list-item]
-        found: list[tuple[Array, Array, Array]] = []
+            x, y, yaw = (np.full(len(times), value) for value in (known.x, known.y, known.yaw))
+            return [((x, y, yaw), math.inf)]
+        found: list[tuple[tuple[Array, Array, Array], float]] = []
         direction = math.atan2(known.vy, known.vx)
+        is_unknown = speed < SPEED_ERROR * known.error
         for course in courses:
             along, left, heading = course.place(known.x, known.y)
             turn = float(wrap_angle(direction - heading))
+            if is_unknown:
+                travelled, turn = travelled * max(math.cos(turn), 0.0), 0.0
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
             aside = speed * math.sin(turn)
             drift = np.zeros(len(times))
-            if abs(aside) > LEAVING_RATE:
+            if abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error):
                 drift = np.clip(aside * times, -LANE_WIDTH, LANE_WIDTH)
-            found.append(course.poses(along + travelled, left + drift))
+            room = max(course.half_width - abs(left), 0.0)
+            found.append((course.poses(along + travelled, left + drift), room))
             if len(found) == MOST_HYPOTHESES:
                 break
         if not found:
             x, y = known.x + math.cos(direction) * travelled, known.y + math.sin(direction) * travelled
-            found.append((x, y, np.full(len(times), direction)))
+            found.append(((x, y, np.full(len(times), direction)), math.inf))
         return found
 
     def _lanes(self, objects: list[KnownObject]) -> list[list[Course]]:

@@ -66,7 +66,10 @@ def surroundings(
     half = np.array([(known.length / 2.0, known.width / 2.0) for known in owners]).reshape(-1, 2, 1)
     error = settings.uncertainty * np.array([known.error for known in owners])[:, None]
     half_length = np.abs(cos) * half[:, 0] + np.abs(sin) * half[:, 1] + np.minimum(error, LARGEST_ERROR_ALONG)
-    half_width = np.abs(sin) * half[:, 0] + np.abs(cos) * half[:, 1] + np.minimum(error, LARGEST_LATERAL_ERROR)
+    half_width = np.abs(sin) * half[:, 0] + np.abs(cos) * half[:, 1]
+    widened = half_width + np.minimum(error, LARGEST_LATERAL_ERROR)
+    # A vehicle that follows its lane is within it, whatever the error of its position.
+    half_width = np.maximum(half_width, np.minimum(widened, prediction.room[:, None]))
     margin = np.array(
         [settings.pedestrian_margin if known.kind in VULNERABLE else settings.lateral_margin for known in owners]
     )

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
 import pytest
 from planned_drive import KnownBox, detections
 
+from eidrive_scenario.arrays import Bools
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.behavior.memory import ObjectMemory
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 
 
@@ -58,6 +61,36 @@ def test_lost_object_moves_on_grows_and_is_dropped() -> None:
     assert known.error == pytest.approx(0.1 + 0.5 * 0.6)
     assert objects.update(nothing, 1.0)
     assert not objects.update(nothing, 1.1)
+
+
+def test_lost_object_out_of_view_is_kept_until_its_place_is_in_view() -> None:
+    objects = memory(memory=1.0)
+    objects.update(detections(0.0, KnownBox(0.0, vx=10.0)), 0.0)
+    for tick in range(1, 60):
+        (known,) = objects.update(Detections(0.1 * tick), 0.1 * tick, lambda lost: np.zeros(len(lost), dtype=bool))
+    assert known.x == pytest.approx(59.0)
+
+    def shown(lost: Sequence[KnownObject]) -> Bools:
+        return np.ones(len(lost), dtype=bool)
+
+    assert objects.update(Detections(6.0), 6.0, shown)
+    assert objects.update(Detections(6.8), 6.8, shown)
+    assert not objects.update(Detections(7.1), 7.1, shown)
+
+
+def test_object_out_of_view_is_forgotten_after_some_time() -> None:
+    objects = memory()
+    objects.update(detections(0.0, KnownBox(0.0)), 0.0)
+    for tick in range(1, 110):
+        kept = objects.update(Detections(0.1 * tick), 0.1 * tick, lambda lost: np.zeros(len(lost), dtype=bool))
+        assert bool(kept) == (tick <= 100)
+
+
+def test_lost_track_of_an_object_in_view_is_dropped() -> None:
+    objects = memory()
+    objects.update(detections(0.0, KnownBox(0.0), KnownBox(2.0, -1.0), KnownBox(8.0)), 0.0)
+    kept = objects.update(detections(0.1, KnownBox(0.1)), 0.1)
+    assert [(known.row, round(known.x, 1)) for known in kept] == [(0, 0.1), (None, 8.0)]
 
 
 def test_lost_object_of_low_existence_is_dropped_at_once() -> None:

@@ -9,6 +9,7 @@ import pytest
 from opendrive_xml import map_xml, road_xml
 from planned_drive import KnownBox, detections
 
+from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor, longitudinal_motion
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -94,3 +95,39 @@ def test_vehicle_that_changes_lanes_ends_on_the_next_one() -> None:
     found = Predictor(roads, TIMES).predict(known(box))
     assert found.y[0, -1] == pytest.approx(-1.75 + 3.5, abs=0.05)
     assert found.y[0, 4] == pytest.approx(-1.75 + 1.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("deviation", "leaves"), [(0.1, True), (0.5, False)])
+def test_lateral_speed_counts_if_it_exceeds_the_noise(deviation: float, leaves: bool) -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml(length=400.0)))
+    box = KnownBox(100.0, -1.75, 10.0, 1.0, yaw=0.1, deviation=deviation)
+    found = Predictor(roads, TIMES).predict(known(box))
+    assert found.y[0, -1] == pytest.approx(1.75 if leaves else -1.75, abs=0.05)
+
+
+def test_room_is_the_distance_from_the_edge_of_the_lane() -> None:
+    # Lanes of 3.5 m: 0.5 m off the center, 1.25 m are left.
+    roads = RoadNetwork.parse(map_xml(road_xml(length=400.0)))
+    on_lane, standing = KnownBox(100.0, -1.25, 10.0), KnownBox(150.0, -1.25)
+    found = Predictor(roads, TIMES).predict(known(on_lane, standing))
+    assert found.room == pytest.approx([1.25, math.inf])
+
+
+def test_lost_vehicle_follows_the_curve_of_its_lane() -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml(length=250.0, curvature=1.0 / 50.0)))
+    pose = roads.lane_pose_at("1", -1, 10.0)
+    objects, predictor = ObjectMemory(BehaviorSettings()), Predictor(roads, TIMES)
+    objects.update(detections(0.0, KnownBox(pose.x, pose.y, 8.0, 0.5, yaw=pose.h)), 0.0)
+    for tick in range(1, 30):
+        (lost,) = objects.update(Detections(0.1 * tick), 0.1 * tick, lambda lost: np.zeros(len(lost), dtype=bool))
+        predictor.follow_lanes([lost])
+    assert lost.speed == pytest.approx(math.hypot(8.0, 0.5), rel=0.05)
+    assert math.hypot(lost.x, lost.y - 50.0) == pytest.approx(51.75, abs=0.4)
+
+
+def test_slow_vehicle_with_an_uncertain_position_moves_along_its_lane() -> None:
+    # 2 m/s against the lane, at a deviation of 2 m: it stands.  At 8 m/s it is a wrong-way driver.
+    roads = RoadNetwork.parse(map_xml(road_xml(length=400.0)))
+    slow, fast = KnownBox(200.0, -1.75, -2.0, deviation=2.0), KnownBox(200.0, -1.75, -8.0, deviation=2.0)
+    np.testing.assert_allclose(Predictor(roads, TIMES).predict(known(slow)).x[0], 200.0)
+    np.testing.assert_allclose(Predictor(roads, TIMES).predict(known(fast)).x[0], 200.0 - 8.0 * TIMES)

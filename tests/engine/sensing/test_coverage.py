@@ -1,0 +1,59 @@
+"""Sectors in which sensors detect objects."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.sensing.coverage import ViewSector, view_sectors
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
+from eidrive_scenario.world.actor import ActorSpec
+
+CAR = ActorSpec("Ego", "vehicle", "car", size=(4.9, 1.8, 1.5), offset=(1.4, 0.0, 0.75), wheelbase=2.9)
+
+
+def contains(sector: ViewSector, *discs: tuple[float, float, float]) -> list[bool]:
+    x, y, radius = np.array(discs).T
+    return [bool(inside) for inside in sector.contains(x, y, radius)]
+
+
+def test_disc_is_inside_up_to_the_tangent_of_the_edge() -> None:
+    # The edge is at 45°: a disc of 1 m on the axis at x touches it at x·sin(45°) = 1.
+    sector = ViewSector(0.0, 0.0, 0.0, math.pi / 4, 50.0)
+    touching = math.sqrt(2.0)
+    assert contains(sector, (touching + 0.01, 0.0, 1.0), (touching - 0.01, 0.0, 1.0)) == [True, False]
+    assert contains(sector, (20.0, 0.0, 1.0), (10.0, 9.9, 0.0), (10.0, 10.1, 0.0), (-20.0, 0.0, 0.1)) == [
+        True,
+        True,
+        False,
+        False,
+    ]
+
+
+def test_disc_is_inside_up_to_the_range() -> None:
+    sector = ViewSector(2.0, 0.0, 0.0, math.pi, 50.0)
+    assert contains(sector, (51.0, 0.0, 1.0), (51.1, 0.0, 1.0), (-47.0, 0.0, 1.0), (-47.1, 0.0, 1.0)) == [
+        True,
+        False,
+        True,
+        False,
+    ]
+
+
+def test_sector_to_the_rear_contains_what_is_behind() -> None:
+    sector = ViewSector(-2.0, 0.0, math.pi, math.radians(50.0), math.inf)
+    assert contains(sector, (-12.0, 3.0, 1.0), (-12.0, -3.0, 1.0), (12.0, 0.0, 1.0)) == [True, True, False]
+
+
+def test_sectors_are_those_of_the_settings() -> None:
+    mount = Mount(x=1.0, y=-0.5, z=1.0, yaw=90.0, pitch=0.0)
+    camera, lidar, truth = view_sectors(
+        [CameraSettings(fov=80.0), LidarSettings(range=60.0), TruthSettings(mount=mount, field_of_view=120.0)], CAR
+    )
+    # The front camera is 2.5 m ahead of the center of a car of 4.892 m.
+    assert camera.x == pytest.approx(1.4 + 4.9 / 2 + 0.054)
+    assert (camera.half_angle, camera.range) == (math.radians(40.0), math.inf)
+    assert (lidar.half_angle, lidar.range) == (math.pi, 60.0)
+    assert truth == (1.0, -0.5, math.pi / 2, math.radians(60.0), 50.0)
