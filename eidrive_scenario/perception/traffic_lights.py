@@ -12,7 +12,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
-from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop
+from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.signals import is_stop_sign
 
@@ -41,7 +41,8 @@ class StopLine(NamedTuple):
 class SignalAhead(NamedTuple):
     """Signal on the path: the distance to its stop line [m], its state, and whether it requires a stop.
 
-    `state` is None until the signal has been in sight. A stop sign that has been in sight requires a stop.
+    `state` is None until the signal has been in sight. A stop sign that has been in sight requires a stop. `is_yellow`
+    is True for a light that requires a stop if that is possible, before it shows red.
     """
 
     signal: str
@@ -49,6 +50,7 @@ class SignalAhead(NamedTuple):
     distance: float
     state: str | None
     must_stop: bool
+    is_yellow: bool = False
 
 
 def stop_lines(roads: RoadNetwork) -> tuple[StopLine, ...]:
@@ -87,10 +89,12 @@ class SignalsAhead:
         for place, line in self._on_path:
             if place > progress:
                 state = self._states.get(line.signal)
-                stop = state is not None
+                stop, is_yellow = state is not None, False
                 if stop and line.kind == "light":
-                    stop = must_stop(state or "", self._colors[line.signal])
-                yield SignalAhead(line.signal, line.kind, place - progress, state, stop)
+                    colors = self._colors[line.signal]
+                    stop = must_stop(state or "", colors)
+                    is_yellow = stop and not shows_red(state or "", colors)
+                yield SignalAhead(line.signal, line.kind, place - progress, state, stop, is_yellow)
 
 
 def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[StopLine]:

@@ -17,7 +17,14 @@ from eidrive_scenario.world.actor import ActorSpec
 BEFORE_LINE = 1.5
 """Distance between the front of a stopped vehicle and the stop line [m]."""
 TOO_LATE = 5.0
-"""Maximum deceleration for a light that has just changed [m/s²]; a vehicle that would need more passes."""
+"""Maximum deceleration before a light that is red, or will be before the vehicle arrives [m/s²]; a vehicle
+that would need more passes."""
+COMFORTABLE = 3.05
+"""Deceleration at which traffic stops at a yellow light [m/s²]: 10 ft/s², Institute of Transportation Engineers."""
+PERCEPTION = 1.0
+"""Time from the change to yellow to the braking of a driver [s], of the same source."""
+REACTION = 0.1
+"""Time until this vehicle brakes [s]."""
 STANDING = 0.1
 """Maximum speed of a stopped vehicle [m/s]."""
 AT_LINE = 2.0
@@ -43,6 +50,8 @@ class SignalStops:
         self._front = spec.offset[0] + spec.size[0] / 2.0
         self._stopping: set[str] = set()
         self._too_late: set[str] = set()
+        self._yellow_since: dict[str, float] = {}
+        """Time at which each light was first seen in yellow [s], until another state."""
         self._standing_since: dict[str, float] = {}
         self._served: set[str] = set()
         self._distances: dict[str, float] = {}
@@ -76,6 +85,7 @@ class SignalStops:
         """Delete the state of a signal that the vehicle has passed."""
         self._stopping.discard(name)
         self._too_late.discard(name)
+        self._yellow_since.pop(name, None)
         self._served.discard(name)
         self._standing_since.pop(name, None)
 
@@ -92,13 +102,19 @@ class SignalStops:
         return float(self._along[index]) + min(max(share, 0.0), length)
 
     def _light_holds(self, light: SignalAhead, left: float, speed: float, now: float) -> bool:
+        """Return whether a light holds the vehicle. It decides when a phase begins, and keeps this decision."""
         name = light.signal
+        if not light.is_yellow and self._yellow_since.pop(name, None) is not None:
+            self._too_late.discard(name)  # a vehicle that meant to pass at yellow may still be able to stop at red
         if not light.must_stop:
             self._stopping.discard(name)
             self._too_late.discard(name)
             return False
         if name not in self._stopping and name not in self._too_late:
-            can_stop = left > 0.0 and speed * speed <= 2.0 * TOO_LATE * left
+            remaining = 0.0
+            if light.is_yellow:
+                remaining = yellow_time(speed) - (now - self._yellow_since.setdefault(name, now))
+            can_stop = can_stop_for_light(left, speed, passes_in_time=left + BEFORE_LINE <= speed * remaining)
             (self._stopping if can_stop or speed < STANDING else self._too_late).add(name)
         return name in self._stopping
 
@@ -113,3 +129,14 @@ class SignalStops:
                 self._served.add(name)
                 return False
         return True
+
+
+def yellow_time(speed: float) -> float:
+    """Return the usual duration of yellow for traffic of a speed [m/s], by the formula of the ITE [s]."""
+    return PERCEPTION + speed / (2.0 * COMFORTABLE)
+
+
+def can_stop_for_light(left: float, speed: float, *, passes_in_time: bool) -> bool:
+    """Return whether a vehicle should stop `left` meters ahead: comfortably if it would pass in time, else firmly."""
+    deceleration = COMFORTABLE if passes_in_time else TOO_LATE
+    return left > 0.0 and speed * REACTION + speed * speed / (2.0 * deceleration) <= left

@@ -28,7 +28,13 @@ from storyboard_xml import (
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
-from eidrive_scenario.driving.planning.signal_stops import BEFORE_LINE, WAIT, SignalStops
+from eidrive_scenario.driving.planning.signal_stops import (
+    BEFORE_LINE,
+    WAIT,
+    SignalStops,
+    can_stop_for_light,
+    yellow_time,
+)
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.requests import Goal
@@ -111,6 +117,53 @@ def test_car_stops_and_waits_at_stop_sign() -> None:
     assert np.count_nonzero(standing) * 0.05 == pytest.approx(WAIT, abs=0.6)
     assert fronts[-1] > 110.0
     drive.world.close()
+
+
+def front_at(distance: float) -> float:
+    """Return the place of the car on the street whose front is at a distance before the light at 120 m."""
+    return 120.0 - distance - CAR.offset[0] - CAR.size[0] / 2.0
+
+
+def seen_at_yellow(distance: float, speed: float = 10.0) -> tuple[SignalStops, bool]:
+    """Return stops, and whether they hold the car that sees a light change to yellow at a distance [m]."""
+    stops = SignalStops(street(light("east", 120.0)), CAR)
+    stops.follow(EAST)
+    stops.signals.update([SignalReading("east", "yellow")])
+    return stops, stops.next(front_at(distance), speed, 0.0) is not None
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(8.33, 2.37), (13.89, 3.28)])
+def test_yellow_time_is_that_of_the_ite(speed: float, expected: float) -> None:
+    assert yellow_time(speed) == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("distance", "stops"),
+    # At 10 m/s: 26.4 m are passed in the 2.64 s of yellow; a stop at 3.05 m/s² takes 17.4 m to a point 1.5 m before.
+    [(10.0, False), (18.0, False), (20.0, True), (25.0, True), (60.0, True)],
+)
+def test_car_passes_at_yellow_if_it_would_have_to_brake_hard(distance: float, stops: bool) -> None:
+    assert seen_at_yellow(distance)[1] == stops
+
+
+def test_car_brakes_harder_if_red_would_come_before_it_passes() -> None:
+    # 15.5 m before the stop point at 10 m/s: 3.05 m/s² need 17.4 m, 5 m/s² need 11 m.
+    assert not can_stop_for_light(15.5, 10.0, passes_in_time=True)
+    assert can_stop_for_light(15.5, 10.0, passes_in_time=False)
+    assert not can_stop_for_light(10.9, 10.0, passes_in_time=False)
+
+
+def test_car_that_is_delayed_at_yellow_stops_at_red() -> None:
+    stops, holds = seen_at_yellow(15.0)
+    assert not holds
+    stops.signals.update([SignalReading("east", "red")])
+    assert stops.next(front_at(8.0), 3.0, 2.6) is not None
+
+
+def test_car_that_passes_at_yellow_does_not_stop_on_the_line_at_red() -> None:
+    stops, _ = seen_at_yellow(15.0)
+    stops.signals.update([SignalReading("east", "red")])
+    assert stops.next(front_at(3.0), 10.0, 1.2) is None
 
 
 def test_interrupted_wait_at_stop_sign_restarts() -> None:

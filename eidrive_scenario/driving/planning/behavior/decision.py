@@ -39,6 +39,8 @@ DWELL = 2.0
 """Time for which a maneuver is kept unless it becomes risky [s]."""
 PERSISTENT = 0.5
 """Time for which another maneuver has to be the best one before it starts [s]."""
+RELEASE = 0.75
+"""Share of the hard deceleration below which a proposal ends emergency braking."""
 URGENT = 4.0
 """Time before a collision at which the emergency brake may act [s]."""
 
@@ -63,6 +65,8 @@ class Decision(msgspec.Struct, frozen=True):
     braking: float | None
     reason: str
     objects: tuple[int, ...]
+    is_free: bool = False
+    """Whether only the wanted speed determines the next motion."""
 
 
 class Decider:
@@ -83,6 +87,8 @@ class Decider:
         """Another maneuver than the current one that has been best, and the time since when [s]."""
         self._oncoming = OncomingTraffic(view)
         self._held_up = False
+        self._brakes = False
+        """Whether the last decision was emergency braking."""
 
     def line_changed(self, shift: float | None) -> None:
         """Move the current maneuver to another line.
@@ -114,11 +120,20 @@ class Decider:
             if not expects:
                 options = self._options(situation, scene, profiles, body[:2], with_maneuvers=True)
             best = options.best()
-        best = self._kept(options, best, situation.now)
+        best = self._with_brake(options, self._kept(options, best, situation.now))
         threat = -1 if bool(scene.certain.all()) else self._uncertain_threat(scene, options, best)
         if threat >= 0:
             return self._without_hard_braking(situation, scene, options, threat)
         return self._decision(situation, options, best)
+
+    def _with_brake(self, options: Options, best: int) -> int:
+        """Return the best proposal, or emergency braking if it was active and the best one still brakes hard."""
+        steps = np.diff(options.rolled.speed[best]) / np.diff(self._times)
+        brakes_hard = float(steps[: round(URGENT / self._times[1])].min()) < -RELEASE * self._settings.hard_deceleration
+        if self._brakes and brakes_hard:
+            best = options.emergency
+        self._brakes = options.proposals[best].is_emergency
+        return best
 
     def _uncertain_threat(self, scene: Surroundings, options: Options, best: int) -> int:
         """Return the hypothesis of an object of uncertain existence for which the vehicle would brake hard; or -1."""
@@ -270,7 +285,9 @@ class Decider:
         acceleration = self._acceleration(options, best)
         reason, objects = self._reason(situation, options, best)
         braking = proposal.deceleration if proposal.is_emergency else None
-        return Decision(profile, s, speed, acceleration, braking, reason, objects)
+        causes = options.rolled.cause[best]
+        is_free = proposal.share == 1.0 and not proposal.is_emergency and bool((causes == FREE).all())
+        return Decision(profile, s, speed, acceleration, braking, reason, objects, is_free)
 
     def _reason(self, situation: Situation, options: Options, best: int) -> tuple[str, tuple[int, ...]]:
         """Return the reason of a proposal, and the rows of its objects."""

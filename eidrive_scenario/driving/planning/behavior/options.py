@@ -25,6 +25,11 @@ class Options(msgspec.Struct, frozen=True):
         """Index of the gentle stop."""
         return next(row for row, proposal in enumerate(self.proposals) if proposal.is_gentle)
 
+    @property
+    def emergency(self) -> int:
+        """Index of emergency braking on the current course."""
+        return next(row for row, proposal in enumerate(self.proposals) if proposal.is_emergency)
+
     def name_of(self, row: int) -> str:
         """Return the maneuver of a proposal."""
         return self.profiles[self.proposals[row].profile].name

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
+from msgspec.structs import replace
 
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
@@ -80,7 +81,13 @@ class BehaviorPlanner(RoutePlanner):
             self._decided = now
             self._decision = self._decide(ego, objects, line, wanted, now)
         s = self._place_on(line, x, y)[0]
-        return _trajectory(line, self._decision, s, ego.speed)
+        plan = _trajectory(line, self._decision, s)
+        if goal is not None and goal.acceleration and self._decision.is_free:
+            first = line.index_at(s)
+            limits = self._limits[first : first + len(plan.points)]
+            if float(limits[0]) >= wanted:
+                return replace(plan, speeds=np.minimum(limits, wanted), acceleration=goal.acceleration)
+        return plan
 
     def _line_of(self, path: PlannedPath, x: float, y: float) -> ReferenceLine:
         """Return the reference line of the path; the current maneuver continues on an extended path."""
@@ -165,7 +172,7 @@ def _nearest(line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
     return float(s[0]), float(d[0])
 
 
-def _trajectory(line: ReferenceLine, decision: Decision, s: float, speed: float) -> Plan:
+def _trajectory(line: ReferenceLine, decision: Decision, s: float) -> Plan:
     """Return the plan of a decision from the place of the vehicle on."""
     first = line.index_at(s)
     last = min(first + POINTS, len(line.points))
