@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners heat-maps library-pictures weather-sheet clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners driven-files heat-maps library-pictures weather-sheet clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -57,6 +57,11 @@ library-pictures: install  ## draw the scenarios of the library: docs/library/*.
 
 planners: install  ## run the scenes for planners with two planners, 10 seeds each: reports/planner_scenes.md
 	$(BIN)/python -m eidrive_scenario.experiments.planner_scenes --out reports
+
+driven-files: install  ## drive the files of EIDRIVE_CORPORA by the planner: reports/driven_corpora.md
+	@test -n "$$EIDRIVE_CORPORA" || { echo 'EIDRIVE_CORPORA is not set: the folder of the corpora'; exit 2; }
+	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of the maps of ScenarioRunner'; exit 2; }
+	$(BIN)/python -m eidrive_scenario.experiments.driven_corpora --out reports --resume
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet

@@ -4,117 +4,219 @@ python -m eidrive_scenario.experiments.driven_files FILE… --drive Ego --refere
 
 Each file is run with a driving stack for the entity. Of a parameter value distribution, `--samples` runs are taken that
 are spread over all values. With `--reference` each run is repeated without the stack and with that controller
-model, so that collisions which the reference driver avoids are counted separately.
+model, so that collisions which the reference driver avoids are counted separately. The output is the table
+driven_files.md, and driven_files.jsonl with one line per run; `--resume` repeats no run of that file.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 
 from eidrive_scenario.errors import ConstraintError, EidriveError
+from eidrive_scenario.experiments.driven_motion import CONTACT, DrivenMotion
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution
 from eidrive_scenario.openscenario.values.parameters import Assignment
-from eidrive_scenario.simulation import RunSettings, run_file
+from eidrive_scenario.simulation import RunSettings, Simulation
 
-CONTACT = "contact"
-"""Name of the criterion that counts collisions."""
 STACK, REFERENCE = "stack", "reference"
 ORACLE = {"detector": "oracle", "mount": "roof", "range": 150}
 """Perception of the driven vehicle."""
 TIME_LIMIT = 60.0
 """Maximum simulated time of a run [s]."""
+AT_ONCE = 50
+"""Number of runs after which the record is extended."""
+
+
+@dataclass(frozen=True)
+class DrivenJob(Job):
+    """Run of the scenario of `file` in which `drive` is judged; `number` is that of the run in its distribution."""
+
+    file: str
+    number: int
+    drive: str
+    group: str = ""
+
+    @property
+    def case(self) -> tuple[str, str, int, int]:
+        """Identity of the run except for its arm."""
+        return self.group, self.file, self.number, self.seed
 
 
 @dataclass(frozen=True)
 class DrivenRun:
-    """Outcome of one run: contacts, contacts by own fault, and the criteria of the file that failed.
+    """Outcome of one run of an arm: `stack` or `reference`.
 
-    error     message of a run without a result, else ""
-    excluded  whether the values violate the constraints of a parameter, so that the run is not evaluated
+    file, number  file, and number of the run in its distribution
+    at_fault      whether a contact was by own fault
+    failed        criteria of the file that failed;  judged  number of its criteria
+    distance      distance that the entity covered [m];  duration  simulated time [s]
+    stop          longest standstill [s];  braking  maximum deceleration before a contact [m/s²]
+    unstarted     warnings about acts and events that never started
+    error         message of a run without a result, else ""
+    excluded      whether the values violate the constraints of a parameter, so that the run is not evaluated
     """
 
     file: str
+    number: int
     arm: str
+    seed: int
+    parameters: dict[str, str] = field(default_factory=dict)
     collided: bool = False
     at_fault: bool = False
     failed: tuple[str, ...] = ()
     judged: int = 0
+    distance: float = 0.0
+    duration: float = 0.0
+    stop: float = 0.0
+    braking: float = 0.0
+    unstarted: tuple[str, ...] = ()
     error: str = ""
     excluded: bool = False
+    group: str = ""
+
+    @property
+    def case(self) -> tuple[str, str, int, int]:
+        """Identity of the run except for its arm."""
+        return self.group, self.file, self.number, self.seed
 
 
 def jobs_of_file(
-    path: Path, drive: str, planner: str, samples: int, reference: dict[str, str] | None
-) -> Iterator[tuple[Job, ...]]:
-    """Yield the jobs of each run of a file: with the stack, and with the reference driver if there is one."""
-    for scenario, parameters in _runs(path, samples):
+    path: Path, drive: str, planner: str, samples: int, reference: dict[str, str] | None, *, group: str = ""
+) -> Iterator[DrivenJob]:
+    """Yield the jobs of a file: of each run one with the stack, and one with the reference driver if there is one.
+
+    group  name that distinguishes files of the same name in a record
+    """
+    for number, scenario, parameters in _runs(path, samples):
         contact = {"collision": {"of": drive, "name": CONTACT}}
         common = {"criteria": contact, "parameters": parameters, "time_limit": TIME_LIMIT}
-        stack = RunSettings(drive={drive: {**ORACLE, "planner": planner}}, **common)  # type: ignore[arg-type]
-        jobs = [Job(str(scenario), STACK, 1, stack)]
+        arms = {STACK: RunSettings(drive={drive: {**ORACLE, "planner": planner}}, **common)}  # type: ignore[arg-type]
         if reference is not None:
-            jobs.append(Job(str(scenario), REFERENCE, 1, RunSettings(controllers=reference, **common)))  # type: ignore[arg-type]
-        yield tuple(jobs)
+            arms[REFERENCE] = RunSettings(controllers=reference, **common)  # type: ignore[arg-type]
+        for arm, settings in arms.items():
+            yield DrivenJob(str(scenario), arm, 1, settings, path.name, number, drive, group)
 
 
-def _runs(path: Path, samples: int) -> Iterator[tuple[Path, dict[str, str | Assignment]]]:
+def _runs(path: Path, samples: int) -> Iterator[tuple[int, Path, dict[str, str | Assignment]]]:
     if definition(path) != "distribution":
-        yield path, {}
+        yield 0, path, {}
         return
     runs = load_distribution(path)
     for number in runs.spread(samples):
-        yield runs[number].scenario, dict(runs[number].assignments)
+        yield number, runs[number].scenario, dict(runs[number].assignments)
 
 
-def run_of(job: Job) -> DrivenRun:
+def run_of(job: DrivenJob) -> DrivenRun:
     """Run a job and return its outcome."""
-    name = Path(job.scenario).name
+    values = {name: str(value) for name, value in job.settings.parameters.items()}
+    run = DrivenRun(job.file, job.number, job.arm, job.seed, values, group=job.group)
+    motion = DrivenMotion(job.drive)
     try:
-        result = run_file(job.scenario, seed=job.seed, settings=job.settings)
+        with Simulation(job.scenario, seed=job.seed, settings=job.settings) as simulation:
+            end = None
+            while end is None:
+                frame, end = simulation.tick()
+                motion.observe(frame, simulation.criteria)
+            result = simulation.result()
     except ConstraintError:
-        return DrivenRun(name, job.arm, excluded=True)
+        return replace(run, excluded=True)
     except EidriveError as error:
-        return DrivenRun(name, job.arm, error=str(error).splitlines()[0])
+        return replace(run, error=str(error).splitlines()[0].replace(f"{Path(job.scenario).parent}{os.sep}", ""))
+    motion.finish()
     own = [verdict for verdict in result.criteria if verdict.name != CONTACT]
-    return DrivenRun(
-        name,
-        job.arm,
-        collided=result.metrics.get(f"{CONTACT}.count", 0.0) > 0.0,
-        at_fault=result.metrics.get(f"{CONTACT}.at_fault", 0.0) > 0.0,
+    return replace(
+        run,
+        collided=motion.collided,
+        at_fault=motion.at_fault,
         failed=tuple(verdict.name for verdict in own if not verdict.passed),
         judged=len(own),
+        distance=motion.distance,
+        duration=result.simulated_s,
+        stop=motion.longest_stop,
+        braking=motion.hardest_braking,
+        unstarted=tuple(warning for warning in result.warnings if " never started" in warning),
     )
 
 
-def table(pairs: Sequence[tuple[DrivenRun, ...]]) -> str:
-    """Return the runs as a Markdown table, one line per file in order of appearance."""
-    lines = [
-        "| file | runs | collisions | by own fault | by own fault where the reference has none | own criteria failed |",
-        "|---|---|---|---|---|---|",
-    ]
-    for file in dict.fromkeys(pair[0].file for pair in pairs):
-        mine = [pair for pair in pairs if pair[0].file == file]
-        stacks = [pair[0] for pair in mine]
+COLUMNS = (
+    "file",
+    "runs",
+    "collisions",
+    "by own fault",
+    "by own fault where the reference has none",
+    "distance [m]",
+    "hardest braking [m/s²]",
+    "own criteria failed",
+)
+
+
+def table(runs: Iterable[DrivenRun]) -> str:
+    """Return the runs as a Markdown table, one line per file in order of appearance; distances are means."""
+    lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
+    evaluated = [run for run in runs if not run.excluded]
+    for file in dict.fromkeys(run.file for run in evaluated):
+        mine = [run for run in evaluated if run.file == file]
+        stacks = [run for run in mine if run.arm == STACK]
         errors = sorted({run.error for run in stacks if run.error})
         if errors:
-            lines.append(f"| {file} | {len(mine)} | {errors[0]} | | | |")
+            lines.append(f"| {file} | {len(stacks)} | {errors[0]} |{' |' * (len(COLUMNS) - 3)}")
             continue
-        worse = "-"
-        if all(len(pair) > 1 for pair in mine):
-            worse = str(sum(pair[0].at_fault and not pair[1].collided for pair in mine))
+        worse = str(len(worse_runs(mine))) if any(run.arm == REFERENCE for run in mine) else "-"
         failed = sorted({name for run in stacks for name in run.failed})
         criteria = ", ".join(f"`{name}`" for name in failed) or ("none" if any(run.judged for run in stacks) else "-")
-        cells = (sum(run.collided for run in stacks), sum(run.at_fault for run in stacks), worse, criteria)
-        lines.append(f"| {file} | {len(mine)} | {' | '.join(map(str, cells))} |")
+        cells = [
+            file,
+            str(len(stacks)),
+            str(sum(run.collided for run in stacks)),
+            str(sum(run.at_fault for run in stacks)),
+            worse,
+            f"{np.mean([run.distance for run in stacks]):.0f}",
+            f"{max(run.braking for run in stacks):.1f}",
+            criteria,
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
+
+
+def worse_runs(runs: Iterable[DrivenRun]) -> list[DrivenRun]:
+    """Return the runs of the stack with a contact by own fault in which the reference driver has none."""
+    runs = tuple(runs)
+    avoided = {run.case for run in runs if run.arm == REFERENCE and not run.collided and not run.error}
+    return [run for run in runs if run.arm == STACK and run.at_fault and run.case in avoided]
+
+
+def read_record(record: Path) -> list[DrivenRun]:
+    """Return the runs of a record; none if it does not exist."""
+    text = record.read_text(encoding="utf-8") if record.is_file() else ""
+    rows = map(json.loads, text.splitlines())
+    return [DrivenRun(**{**row, **{key: tuple(row[key]) for key in ("failed", "unstarted")}}) for row in rows]
+
+
+def run_recorded(
+    jobs: Sequence[DrivenJob], record: Path, *, workers: int | None, console: Console, title: str
+) -> list[DrivenRun]:
+    """Return the runs of all jobs. Those of the record are not repeated; new ones are added to it."""
+    runs = {(*run.case, run.arm): run for run in read_record(record)}
+    left = [job for job in jobs if (*job.case, job.arm) not in runs]
+    for start in range(0, len(left), AT_ONCE):
+        some = left[start : start + AT_ONCE]
+        done = f"{title}, {start + len(some)} of {len(left)}"
+        added = run_jobs(some, run_of, workers=workers, console=console, title=done)
+        with record.open("a", encoding="utf-8") as lines:
+            lines.writelines(json.dumps(asdict(run), ensure_ascii=False) + "\n" for run in added)
+        runs.update({(*run.case, run.arm): run for run in added})
+    return [runs[(*job.case, job.arm)] for job in jobs]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -125,22 +227,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--samples", type=int, default=200, help="number of runs of a distribution")
     parser.add_argument("--reference", metavar="CONTROLLER=MODEL", help="controller model of the reference driver")
     parser.add_argument("--out", type=Path, default=Path("reports"))
+    parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
     options = parser.parse_args(arguments)
     name, separator, model = (options.reference or "").partition("=")
     if options.reference and not (name and separator and model):
         parser.error("--reference: expected CONTROLLER=MODEL, for example ALKSController=alks")
     reference = {name: model} if options.reference else None
-    groups = [
-        group
+    jobs = [
+        job
         for path in options.files
-        for group in jobs_of_file(path, options.drive, options.planner, options.samples, reference)
+        for job in jobs_of_file(path, options.drive, options.planner, options.samples, reference)
     ]
-    jobs = [job for group in groups for job in group]
-    outcomes = iter(run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="driven"))
-    pairs = [tuple(next(outcomes) for _ in group) for group in groups]
-    result = table([pair for pair in pairs if not pair[0].excluded])
     options.out.mkdir(parents=True, exist_ok=True)
+    record = options.out / "driven_files.jsonl"
+    if not options.resume:
+        record.unlink(missing_ok=True)
+    runs = run_recorded(jobs, record, workers=options.workers, console=Console(stderr=True), title="driven files")
+    result = table(runs)
     (options.out / "driven_files.md").write_text(result, encoding="utf-8")
     sys.stdout.write(result)
 

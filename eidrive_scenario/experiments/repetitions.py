@@ -17,6 +17,7 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.simulation import RunSettings
 
 T = TypeVar("T")
+J = TypeVar("J", bound="Job")
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,8 @@ def cores() -> int:
 
 
 def run_jobs(
-    jobs: Sequence[Job],
-    task: Callable[[Job], T],
+    jobs: Sequence[J],
+    task: Callable[[J], T],
     *,
     workers: int | None = None,
     console: Console | None = None,
@@ -76,7 +77,7 @@ def run_jobs(
 
 
 def _in_processes(
-    jobs: Sequence[Job], task: Callable[[Job], T], workers: int, advance: Callable[[], None]
+    jobs: Sequence[J], task: Callable[[J], T], workers: int, advance: Callable[[], None]
 ) -> tuple[T, ...]:
     # Spawned, not forked: a child process must not inherit a physics client or a running progress thread.
     pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))

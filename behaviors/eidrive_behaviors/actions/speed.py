@@ -106,7 +106,10 @@ class SpeedAction(ActionBehaviour):
         speed = transition.advance(self.context.dt)
         slope = 0.0 if transition.done or self.context.dt == 0.0 else (speed - before) / self.context.dt
         self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=slope))
-        if self.actor.motion.teleported and transition.done:
+        starts = (
+            self.actor.motion.teleported or not self.actor.present
+        )  # Init may command its speed before its position
+        if starts and transition.done:
             self.actor.motion.set_speed(speed)
             return Status.RUNNING if self._continuous else Status.SUCCESS
         reached = transition.done and abs(self.context.speed(self.actor.name) - transition.target) < REACHED
