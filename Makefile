@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners driven-files heat-maps library-pictures weather-sheet clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners driven-files long-drives heat-maps library-pictures weather-sheet clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -62,6 +62,10 @@ driven-files: install  ## drive the files of EIDRIVE_CORPORA by the planner: rep
 	@test -n "$$EIDRIVE_CORPORA" || { echo 'EIDRIVE_CORPORA is not set: the folder of the corpora'; exit 2; }
 	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of the maps of ScenarioRunner'; exit 2; }
 	$(BIN)/python -m eidrive_scenario.experiments.driven_corpora --out reports --resume
+
+long-drives: install  ## drive ten minutes through traffic on Town01 and Town04 of EIDRIVE_MAPS: reports/long_drives.md
+	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of Town01.xodr and Town04.xodr'; exit 2; }
+	$(BIN)/python -m eidrive_scenario.experiments.long_drives "$$EIDRIVE_MAPS"/Town01.xodr "$$EIDRIVE_MAPS"/Town04.xodr --out reports
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet

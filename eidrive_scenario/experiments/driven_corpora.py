@@ -131,8 +131,9 @@ def folders(environment: dict[str, str] | os._Environ[str]) -> Path:
         given = environment.get(name, "")
         if not given:
             raise ValueError(f"{name} is not set; set it to the folder of {content}")
-        if not Path(given).is_dir():
-            raise ValueError(f"{name}: {given} is not a folder; set it to the folder of {content}")
+        missing = [entry for entry in given.split(os.pathsep) if not Path(entry).is_dir()]
+        if missing:
+            raise ValueError(f"{name}: {missing[0]} is not a folder; set it to the folder of {content}")
     return Path(environment[CORPORA])
 
 

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.roads import RoadNetwork, Signal
+from eidrive_scenario.roads import Pose, RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
 from eidrive_scenario.sensing.readings import SignalReading
@@ -20,6 +20,8 @@ Kind = Literal["light", "stop sign"]
 
 ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
+NEAR_SIDE = 10.0
+"""Maximum distance of a light from the entry of its junction, along and across, at which it stands before it [m]."""
 SAME_WAY = math.cos(math.radians(45.0))
 
 
@@ -56,7 +58,8 @@ class SignalAhead(NamedTuple):
 def stop_lines(roads: RoadNetwork) -> tuple[StopLine, ...]:
     """Return all positions where a traffic light or stop sign of the map stops a lane.
 
-    Vehicles wait at the s coordinate of the signal; for a signal on a connecting road they wait before the junction.
+    Vehicles wait at the s coordinate of the signal. For a signal on a connecting road they wait before the junction,
+    and before a light that stands right before it, which they could not see any more beside them.
     """
     return tuple(
         line
@@ -103,12 +106,8 @@ def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[S
     if road is None:
         return
     kind: Kind = "light" if signal.dynamic else "stop sign"
-    for number, lane in road.section_at(place.s).lanes.items():
-        direction = roads.driving_direction(road.id, number) if number else 0
-        against = {"+": 1, "-": -1}.get(place.orientation, 0) == -direction
-        valid = not place.validity or any(min(pair) <= number <= max(pair) for pair in place.validity)
-        if not number or against or not valid or not lane.drivable:
-            continue
+    for number in roads.signal_lanes(place):
+        direction = roads.driving_direction(road.id, number)
         beyond = None
         s = place.s
         if road.junction_id is not None:
@@ -116,7 +115,18 @@ def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[S
             beyond = (middle.x, middle.y)
             s = 0.0 if direction > 0 else road.length
         pose = roads.lane_pose_at(road.id, number, s)
-        yield StopLine(signal.id, kind, pose.x, pose.y, pose.h + (0.0 if direction > 0 else math.pi), beyond)
+        heading = pose.h + (0.0 if direction > 0 else math.pi)
+        back = _distance_before(roads.signal_pose(signal), pose, heading) if beyond is not None else 0.0
+        x, y = pose.x - back * math.cos(heading), pose.y - back * math.sin(heading)
+        yield StopLine(signal.id, kind, x, y, heading, beyond)
+
+
+def _distance_before(light: Pose, entry: Pose, heading: float) -> float:
+    """Return the distance of a light before the entry of a junction [m], 0 if it does not stand right before it."""
+    dx, dy = light.x - entry.x, light.y - entry.y
+    before = -dx * math.cos(heading) - dy * math.sin(heading)
+    aside = abs(dy * math.cos(heading) - dx * math.sin(heading))
+    return before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
 
 
 def _along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float, StopLine]]:

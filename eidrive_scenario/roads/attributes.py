@@ -81,9 +81,43 @@ class RoadAttributes:
         width = self.lane_width(location.road, location.lane, location.s)
         return abs(location.offset) <= 0.5 * width
 
+    def signal_lanes(self, place: SignalPlace) -> tuple[int, ...]:
+        """Return the drivable lanes for which a signal at this place is valid, from left to right.
+
+        They are those of its validity that drive in the direction of its orientation. If there is none, the orientation
+        is ignored: CARLA's maps state validity for lanes of the opposite direction.
+        """
+        road = self.roads.get(place.road)
+        if road is None:
+            return ()
+        numbers = [
+            number
+            for number in self.lane_ids(place.road, place.s, drivable=True)
+            if not place.validity or any(min(pair) <= number <= max(pair) for pair in place.validity)
+        ]
+        facing = {"+": 1, "-": -1}.get(place.orientation, 0)
+        met = [number for number in numbers if facing != -driving_direction(road, number)]
+        return tuple(met or (numbers if place.validity else ()))
+
     def signal_pose(self, signal: Signal, place: SignalPlace | None = None) -> Pose:
-        """Return the pose of a signal. Its face is turned against the traffic for which it is valid."""
+        """Return the pose of a signal. Its face is turned against the traffic for which it is valid.
+
+        Orientation and heading determine it, unless the signal is valid by references only and would face away from all
+        their lanes, as in CARLA's maps.
+        """
         position = place or signal.place
         pose = poses.road_pose_at(self.road(position.road), position.s, position.t)
         turn = 0.0 if position.orientation == "-" else np.pi
-        return pose._replace(z=pose.z + signal.z_offset).turned(turn + signal.h_offset)
+        pose = pose._replace(z=pose.z + signal.z_offset).turned(turn + signal.h_offset)
+        return pose.turned(np.pi) if self._faces_away(signal, pose) else pose
+
+    def _faces_away(self, signal: Signal, pose: Pose) -> bool:
+        if not signal.references or self.signal_lanes(signal.place):
+            return False
+        ways = [
+            poses.lane_pose_at(self.road(place.road), number, place.s).h
+            + (0.0 if self.driving_direction(place.road, number) > 0 else np.pi)
+            for place in signal.references
+            for number in self.signal_lanes(place)
+        ]
+        return bool(ways) and min(np.cos(pose.h - way) for way in ways) > np.cos(np.pi / 4.0)

@@ -50,13 +50,10 @@ class StopLines:
             return []
         section = road.section_at(place.s)
         found = []
-        for number in section.lanes:
+        for number in lanes.roads.signal_lanes(place):
             row = lanes.row[LaneKey(road.id, section.index, number)]
-            against = {"+": 1, "-": -1}.get(place.orientation, 0) == -lanes.direction[row]
-            valid = not place.validity or any(min(pair) <= number <= max(pair) for pair in place.validity)
-            if number and valid and not against and lanes.tables.lane_drivable[row]:
-                progress = float(lanes.progress(np.array([row]), np.array([place.s]))[0])
-                found.append((row, 0.0 if road.junction_id is not None else progress))
+            progress = float(lanes.progress(np.array([row]), np.array([place.s]))[0])
+            found.append((row, 0.0 if road.junction_id is not None else progress))
         return found
 
     def closed(self) -> Occupants:

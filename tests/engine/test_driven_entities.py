@@ -236,3 +236,11 @@ def test_invalid_criterion_of_a_file_is_reported_with_its_line(tmp_path: Path) -
 def test_set_of_entities_has_one_order() -> None:
     """The order of a set of texts differs between processes; warnings and the command keep one order."""
     assert list(RunSettings(drive={"b", "a", "c"}).drive or ()) == ["a", "b", "c"]
+
+
+def test_speed_of_init_before_the_teleport_is_the_first_speed(tmp_path: Path) -> None:
+    """The standard has no order of the actions of Init: the vehicle starts with the commanded speed."""
+    path = write(tmp_path)
+    text = path.read_text().replace('<Private entityRef="Ego">', f'<Private entityRef="Ego">{speed_xml(6)}', 1)
+    path.write_text(text)
+    assert motion(Simulation(path, settings=RunSettings(drive="Ego")))[0, 3] == 6.0
