@@ -119,7 +119,9 @@ def _runs(path: Path, samples: int) -> Iterator[tuple[int, Path, dict[str, str |
 
 def run_of(job: DrivenJob) -> DrivenRun:
     """Run a job and return its outcome."""
-    values = {name: str(value) for name, value in job.settings.parameters.items()}
+    values = {
+        name: value.text if isinstance(value, Assignment) else value for name, value in job.settings.parameters.items()
+    }
     run = DrivenRun(job.file, job.number, job.arm, job.seed, values, group=job.group)
     motion = DrivenMotion(job.drive)
     try:
