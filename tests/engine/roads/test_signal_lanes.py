@@ -71,4 +71,5 @@ def test_stop_line_is_before_a_light_that_stands_right_before_the_junction(place
         )
     )
     (found,) = stop_lines(roads)
-    assert (found.x, found.y) == (pytest.approx(line), pytest.approx(-1.75))
+    assert found.x == pytest.approx(line)
+    assert found.y == pytest.approx(-1.75)
