@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.driving.planning.behavior.bounds import FREE, LIMIT, WALL, Course
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, towards
 from eidrive_scenario.driving.planning.behavior.maneuvers import passing_profiles
 from eidrive_scenario.driving.planning.behavior.oncoming import ONCOMING_SPEED, OncomingTraffic
@@ -21,7 +22,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     inside_way,
     proposals_for,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Course, Roller
+from eidrive_scenario.driving.planning.behavior.rollout import Roller
 from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
-from eidrive_scenario.car_following import Drivers, IntelligentDriver
+from eidrive_scenario.car_following import IntelligentDriver
+from eidrive_scenario.driving.planning.behavior.bounds import FREE, Bounds, Course, Limits
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
-FREE, LIMIT, WALL = -1, -2, -3
-"""Cause of the motion of a proposal in a step: nothing, a speed limit, or a wall (WALL - its index); an index from 0
-on is that of a leading hypothesis."""
 ROLLED = 6
 """Number of first steps whose causes are kept."""
 FAR = 1e6
-"""Place of walls and leaders that do not exist [m]."""
+"""Acceleration without a leader [m/s²]."""
 NEGLIGIBLE = 1e-6
-"""Deceleration due to a leader below which there is none [m/s²]."""
+"""Deceleration due to a leader below which there is none [m/s²], and difference of accelerations that is none."""
+LEAST_GAP, LEAST_SPEED = 1e-3, 1e-3
+"""Minimum of gaps [m] and of desired speeds [m/s], by which the model divides."""
+
+Leader = tuple[float, float, float, int]
+"""Leader at a time: places of the reference point of the vehicle beside its center and in contact with its rear [m],
+its speed [m/s], and the index of the hypothesis."""
 
 
 class Rollout(msgspec.Struct, frozen=True):
@@ -30,32 +37,32 @@ class Rollout(msgspec.Struct, frozen=True):
     cause: Integers
 
 
-class Course(msgspec.Struct, frozen=True):
-    """Limits of the motion along the line: speed limits (M,) [m/s] at distances along it (M,) [m]."""
+class _Motion(NamedTuple):
+    """Motion of one proposal: distances along the line [m], speeds [m/s], and causes."""
 
-    along: Array
-    limits: Array
-    wanted: float
-    """Wanted speed [m/s]."""
+    s: list[float]
+    speed: list[float]
+    cause: list[int]
 
 
 class Roller:
-    """Rollout of all proposals in one batch."""
+    """Rollout of proposals by the Intelligent Driver Model.
+
+    It computes with single numbers: for few proposals with few leaders each, arrays take four times as long.
+    """
 
     def __init__(self, settings: BehaviorSettings, times: Array) -> None:
-        self._settings = settings
-        self._times = times
-        self._driver = Drivers.of(
-            [
-                IntelligentDriver(
-                    time_gap=settings.time_gap,
-                    standstill_gap=settings.standstill_gap,
-                    acceleration=settings.acceleration,
-                    deceleration=settings.comfortable_deceleration,
-                    emergency=settings.hard_deceleration,
-                )
-            ]
+        self._times: list[float] = times.tolist()
+        self._steps: list[float] = np.diff(times).tolist()
+        self._braking = settings.comfortable_deceleration
+        self._driver = IntelligentDriver(
+            time_gap=settings.time_gap,
+            standstill_gap=settings.standstill_gap,
+            acceleration=settings.acceleration,
+            deceleration=settings.comfortable_deceleration,
+            emergency=settings.hard_deceleration,
         )
+        self._twice_root = 2.0 * math.sqrt(self._driver.acceleration * self._driver.deceleration)
 
     def roll(
         self,
@@ -73,76 +80,98 @@ class Roller:
         body   distances of the front and the center of the vehicle from the reference point [m]
         leads  (P, N, K) whether a hypothesis leads a proposal at a time
         """
-        count, steps = len(proposals), len(self._times)
-        s, speed = np.full((count, steps), start[0]), np.full((count, steps), start[1])
-        cause = np.full((count, ROLLED), FREE)
-        wanted = np.array([proposal.share for proposal in proposals]) * course.wanted
-        emergency = np.array([proposal.is_emergency for proposal in proposals], dtype=bool)
-        least = -np.array([proposal.deceleration for proposal in proposals])
-        wall_s, wall_until = _walls(walls)
-        rows = np.flatnonzero(leads.any(axis=(0, 2)))
-        leads, leader_speed = leads[:, rows], scene.speed[rows]
-        rear, centers = (
-            (scene.s - scene.half_length - scene.passing_gap[:, None])[rows] - body[0],
-            scene.s[rows] - body[1],
-        )
-        for step in range(steps - 1):
-            dt = float(self._times[step + 1] - self._times[step])
-            here, now = s[:, step], speed[:, step]
-            desired, reason = self._desired(here, now, dt, course, wanted, wall_s, wall_until, float(self._times[step]))
-            target = (desired - now) / dt
-            target = np.where(emergency, least, np.minimum(target, self._settings.acceleration))
-            if rows.size:
-                is_ahead = leads[:, :, step] & (centers[None, :, step] > here[:, None])
-                gap = np.where(is_ahead, rear[None, :, step] - here[:, None], FAR)
-                own = now[:, None]
-                slowing = self._driver.interaction(own, gap, own - leader_speed[None, :, step])
-                hardest = slowing.max(axis=1)
-                free = self._driver.free(now, np.maximum(desired, now))
-                follow = np.where(hardest > NEGLIGIBLE, free - hardest, FAR)
-                if step < ROLLED:
-                    reason = np.where(follow < target - 1e-6, rows[np.argmax(slowing, axis=1)], reason)
-                target = np.minimum(target, follow)
-            acceleration = np.maximum(target, least)
-            after = np.maximum(now + acceleration * dt, 0.0)
-            s[:, step + 1] = here + 0.5 * (now + after) * dt
-            speed[:, step + 1] = after
+        reach = (max(course.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
+        limits = Limits.ahead(course, start[0], reach)
+        leaders = _Leaders(scene, leads, body)
+        known: dict[object, _Motion] = {}
+        motions = []
+        for row, (proposal, places) in enumerate(zip(proposals, walls, strict=True)):
+            number, ahead = leaders.of(row)
+            stops = tuple((wall.s, wall.until) for wall in places)
+            key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, stops)
+            if key not in known:
+                bounds = Bounds(proposal.share * course.wanted, limits, places, self._times, 2.0 * self._braking)
+                known[key] = self._motion(proposal, bounds, start, ahead)
+            motions.append(known[key])
+        s, speed, cause = zip(*motions, strict=True)
+        return Rollout(np.array(s), np.array(speed), np.array(cause))
+
+    def _motion(
+        self, proposal: Proposal, bounds: Bounds, start: tuple[float, float], leaders: list[list[Leader]]
+    ) -> _Motion:
+        s, speed = start
+        found = _Motion([s], [speed], [])
+        greatest, least = self._driver.acceleration, -proposal.deceleration
+        for step, dt in enumerate(self._steps):
+            desired, cause = bounds.allow(s + speed * dt, step)
+            target = least if proposal.is_emergency else min((desired - speed) / dt, greatest)
+            # A leader has no effect on a vehicle that brakes with its limit or stands.
+            if leaders[step] and (step < ROLLED or (target > least and (speed > 0.0 or target > 0.0))):
+                follow, leader = self._following(s, speed, desired, leaders[step])
+                cause = leader if follow < target - NEGLIGIBLE else cause
+                target = min(target, follow)
+            after = max(speed + max(target, least) * dt, 0.0)
+            s += 0.5 * (speed + after) * dt
+            speed = after
+            found.s.append(s)
+            found.speed.append(speed)
             if step < ROLLED:
-                cause[:, step] = reason
-        return Rollout(s, speed, cause)
+                found.cause.append(cause)
+        return found
 
-    def _desired(
-        self,
-        s: Array,
-        speed: Array,
-        dt: float,
-        course: Course,
-        wanted: Array,
-        wall_s: Array,
-        wall_until: Array,
-        time: float,
-    ) -> tuple[Array, Integers]:
-        """Return the speeds (P,) that limits and walls allow at the next step, and what determines them."""
-        ahead = s + speed * dt
-        limit = np.interp(ahead, course.along, course.limits)
-        desired = np.minimum(wanted, limit)
-        reason = np.where(limit < wanted, LIMIT, FREE)
-        if wall_s.shape[1]:
-            room = np.maximum(wall_s - ahead[:, None], 0.0)
-            allowed = np.sqrt(2.0 * self._settings.comfortable_deceleration * room)
-            allowed = np.where(time < wall_until, allowed, FAR)
-            nearest = np.argmin(allowed, axis=1)
-            least = allowed[np.arange(len(allowed)), nearest]
-            reason = np.where(least < desired, WALL - nearest, reason)
-            desired = np.minimum(desired, least)
-        return desired, reason
+    def _following(self, s: float, speed: float, desired: float, leaders: list[Leader]) -> tuple[float, int]:
+        """Return the acceleration behind leaders [m/s²], FAR if none is ahead, and the leader that determines it.
+
+        The leaders are in the order of their rears: one that is not slower than a nearer one has no effect.
+        """
+        driver = self._driver
+        hardest, slowest, cause = NEGLIGIBLE, math.inf, FREE
+        for center, rear, other, row in leaders:
+            if center > s and other < slowest:
+                slowest = other
+                gap = driver.standstill_gap + max(
+                    speed * driver.time_gap + speed * (speed - other) / self._twice_root, 0.0
+                )
+                share = gap / max(rear - s, LEAST_GAP)
+                slowing = driver.acceleration * (share * share)
+                if slowing > hardest:
+                    hardest, cause = slowing, row
+        if cause == FREE:
+            return FAR, FREE
+        share = speed / max(desired, speed, LEAST_SPEED)
+        free: float = driver.acceleration * (1.0 - share**driver.exponent)
+        return free - hardest, cause
 
 
-def _walls(walls: list[list[Wall]]) -> tuple[Array, Array]:
-    """Return places and times (P, C) of the walls of each proposal; missing ones are far."""
-    most = max((len(row) for row in walls), default=0)
-    places, until = np.full((len(walls), most), FAR), np.zeros((len(walls), most))
-    for row, found in enumerate(walls):
-        for column, wall in enumerate(found):
-            places[row, column], until[row, column] = wall.s, wall.until
-    return places, until
+class _Leaders:
+    """Leaders of proposals over time; proposals with the same ones share them."""
+
+    def __init__(self, scene: Surroundings, leads: Bools, body: tuple[float, float]) -> None:
+        front, center = body
+        self._leads = leads
+        rows = np.flatnonzero(leads.any(axis=(0, 2))).tolist()
+        rear = (scene.s - scene.half_length - scene.passing_gap[:, None])[rows] - front
+        values = zip((scene.s[rows] - center).tolist(), rear.tolist(), scene.speed[rows].tolist(), rows, strict=True)
+        self._at = {
+            row: [(*entry, row) for entry in zip(centers, rears, speeds, strict=True)]
+            for centers, rears, speeds, row in values
+        }
+        self._known: dict[bytes, tuple[int, list[list[Leader]]]] = {}
+
+    def of(self, proposal: int) -> tuple[int, list[list[Leader]]]:
+        """Return a number of the leaders of a proposal, the same for equal ones, and the leaders at each time."""
+        leads = self._leads[proposal]
+        key = leads.tobytes()
+        found = self._known.get(key)
+        if found is None:
+            times: list[list[Leader]] = [[] for _ in range(leads.shape[1])]
+            for row, step in np.argwhere(leads).tolist():
+                times[step].append(self._at[row][step])
+            for leaders in times:
+                leaders.sort(key=_rear)
+            found = self._known[key] = (len(self._known), times)
+        return found
+
+
+def _rear(leader: Leader) -> float:
+    return leader[1]

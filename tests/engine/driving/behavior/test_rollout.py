@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from eidrive_scenario.driving.planning.behavior.bounds import Course
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall, speed_limits
-from eidrive_scenario.driving.planning.behavior.rollout import Course, Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.rollout import Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
