@@ -54,13 +54,15 @@ class Limits:
 class Bounds:
     """Speeds that the wanted speed, speed limits and walls allow to one proposal.
 
-    gain  twice the deceleration before a wall [m/s²]
+    wanted  wanted speed [m/s];  gain  twice the deceleration before a wall [m/s²]
     """
 
     def __init__(
         self, wanted: float, limits: Limits | None, walls: list[Wall], times: list[float], gain: float
     ) -> None:
-        self._wanted = wanted
+        self.wanted = wanted
+        self.are_free = limits is None and not walls
+        """Whether the wanted speed is the only bound."""
         self._limits = limits
         self._gain = gain
         self._walls = [
@@ -70,7 +72,7 @@ class Bounds:
 
     def allow(self, s: float, step: int) -> tuple[float, int]:
         """Return the speed at a distance along the line [m/s], and what determines it."""
-        speed, cause = self._wanted, FREE
+        speed, cause = self.wanted, FREE
         if self._limits is not None:
             limit = self._limits.at(s)
             if limit < speed:

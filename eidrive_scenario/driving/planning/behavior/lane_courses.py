@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -22,20 +21,25 @@ MOST = 4
 """Maximum number of courses from one lane."""
 
 
-class Course(NamedTuple):
+class Course:
     """Center line of a lane and its successors: points (M, 2) [m], distances along it (M,) [m].
 
     half_width  of the lane at its start [m]
     """
 
-    points: Array
-    along: Array
-    half_width: float
+    def __init__(self, points: Array, along: Array, half_width: float) -> None:
+        self.points, self.along, self.half_width = points, along, half_width
+        self._x, self._y = (np.ascontiguousarray(column) for column in points.T)
+        step = np.diff(points, axis=0)
+        self._unit = step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
+        self._heading = np.arctan2(self._unit[:, 1], self._unit[:, 0])
+        self._inside = along[1:-1]
+        """Distances at which the next segment begins."""
 
     def place(self, x: float, y: float) -> tuple[float, float, float]:
         """Return the distance along the course, the offset to the left and the heading at the nearest point."""
-        gap = (self.points[:, 0] - x) ** 2 + (self.points[:, 1] - y) ** 2
-        index = min(int(np.argmin(gap)), len(gap) - 2)
+        gap = (self._x - x) ** 2 + (self._y - y) ** 2
+        index = min(int(gap.argmin()), len(gap) - 2)
         (x0, y0), (x1, y1) = self.points[index].tolist(), self.points[index + 1].tolist()
         length = math.hypot(x1 - x0, y1 - y0) or 1.0
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
@@ -44,13 +48,10 @@ class Course(NamedTuple):
 
     def poses(self, along: Array, left: Array) -> tuple[Array, Array, Array]:
         """Return x, y and heading (K,) at distances along the course and offsets to the left; straight beyond it."""
-        index = np.clip(np.searchsorted(self.along, along, side="right") - 1, 0, len(self.along) - 2)
-        start, step = self.points[index], self.points[index + 1] - self.points[index]
-        unit = step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
+        index = self._inside.searchsorted(along, side="right")
+        ux, uy = self._unit[index].T
         ahead = along - self.along[index]
-        x = start[:, 0] + ahead * unit[:, 0] - left * unit[:, 1]
-        y = start[:, 1] + ahead * unit[:, 1] + left * unit[:, 0]
-        return x, y, np.arctan2(unit[:, 1], unit[:, 0])
+        return self._x[index] + ahead * ux - left * uy, self._y[index] + ahead * uy + left * ux, self._heading[index]
 
 
 class LaneCourses:

@@ -63,13 +63,13 @@ class OncomingTraffic:
             return math.inf
         s, d = ego
         places = s + np.arange(SAMPLE, self._view + SAMPLE, SAMPLE)
+        center, half, ahead = scene.d[:, 0, None], scene.half_width[:, 0, None], places - s
         hidden = np.zeros(len(places), dtype=bool)
-        for row in range(len(scene)):
-            left, right = scene.d[row, 0] + scene.half_width[row, 0], scene.d[row, 0] - scene.half_width[row, 0]
-            for edge in (scene.s[row, 0] - scene.half_length[row, 0], scene.s[row, 0] + scene.half_length[row, 0]):
-                share = (edge - s) / (places - s)
-                at_edge = d + share * (beside.oncoming - d)
-                hidden |= (share > 0.0) & (share < 1.0) & (at_edge > right) & (at_edge < left)
+        for edge in (scene.s[:, 0] - scene.half_length[:, 0], scene.s[:, 0] + scene.half_length[:, 0]):
+            share = (edge[:, None] - s) / ahead
+            at_edge = d + share * (beside.oncoming - d)
+            crosses = (share > 0.0) & (share < 1.0) & (at_edge > center - half) & (at_edge < center + half)
+            hidden |= crosses.any(axis=0)
         first = int(np.argmax(hidden)) if hidden.any() else len(places)
         return float(s + first * SAMPLE)
 

@@ -98,7 +98,7 @@ class BehaviorPlanner(RoutePlanner):
         self._limits = speed_limits(line.curvature, path.limits, line.spacing, self.planner_settings)
         shift = None
         if before is not None:
-            (s, d), (s_before, d_before) = (_nearest(some, x, y) for some in (line, before))
+            (s, d), (s_before, d_before) = (some.place(x, y, 0, len(some.points)) for some in (line, before))
             shift = s - s_before if abs(d - d_before) < SAME_LINE else None
         self._decision = None
         self._decider.line_changed(shift)
@@ -106,8 +106,7 @@ class BehaviorPlanner(RoutePlanner):
 
     def _place_on(self, line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
         low = max(self._progress - 3, 0)
-        s, d, _ = line.project(np.array([x]), np.array([y]), low, min(low + 12, len(line.points)))
-        return float(s[0]), float(d[0])
+        return line.place(x, y, low, low + 12)
 
     def _front_axle(self, ego: EgoState, line: ReferenceLine) -> tuple[float, float, float]:
         """Return the place of the front axle on the line and the slope of its motion."""
@@ -164,12 +163,6 @@ class BehaviorPlanner(RoutePlanner):
         low = line.index_at(s - MARGIN_AHEAD)
         high = line.index_at(s + speed * self.planner_settings.horizon + MARGIN_AHEAD) + 1
         return low, max(high, low + 2)
-
-
-def _nearest(line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
-    """Return distance along a line and offset to its left of a point, nearest among all of its points."""
-    s, d, _ = line.project(np.array([x]), np.array([y]), 0, len(line.points))
-    return float(s[0]), float(d[0])
 
 
 def _trajectory(line: ReferenceLine, decision: Decision, s: float) -> Plan:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +47,7 @@ class ReferenceLine:
         step = np.diff(self.points, axis=0)
         length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
         self.along: Array = np.concatenate([[0.0], np.cumsum(length)])
+        self._places: list[float] = self.along.tolist()
         self.spacing = float(self.along[-1]) / len(length)
         middle = np.vstack([self.points[1] - self.points[0], self.points[2:] - self.points[:-2], step[-1]])
         self.tangent: Array = middle / np.maximum(np.hypot(middle[:, 0], middle[:, 1]), 1e-9)[:, None]
@@ -62,7 +64,7 @@ class ReferenceLine:
 
     def index_at(self, s: float) -> int:
         """Return the index of the last point up to a distance along the line."""
-        return min(max(int(np.searchsorted(self.along, s, side="right")) - 1, 0), len(self.along) - 1)
+        return max(bisect_right(self._places, s) - 1, 0)
 
     def project(self, x: Array, y: Array, low: int, high: int) -> tuple[Array, Array, Array]:
         """Return s, d and heading of the line (…) for points (…), nearest among the points from `low` to `high`."""
@@ -78,6 +80,14 @@ class ReferenceLine:
         s = self.along[index] + dx * tx + dy * ty
         d = dy * tx - dx * ty
         return s.reshape(x.shape), d.reshape(x.shape), self.heading[index].reshape(x.shape)
+
+    def place(self, x: float, y: float, low: int, high: int) -> tuple[float, float]:
+        """Return s and d of one point, nearest among the points from `low` to `high`."""
+        gaps = [(x - px) ** 2 + (y - py) ** 2 for px, py in self.points[low:high].tolist()]
+        index = low + gaps.index(min(gaps))
+        (px, py), (tx, ty) = self.points[index].tolist(), self.tangent[index].tolist()
+        dx, dy = x - px, y - py
+        return self._places[index] + dx * tx + dy * ty, dy * tx - dx * ty
 
     def lanes_beside(self, index: int) -> LanesBeside:
         """Return the lanes at a point of the line."""

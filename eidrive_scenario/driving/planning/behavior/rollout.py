@@ -102,15 +102,22 @@ class Roller:
         s, speed = start
         found = _Motion([s], [speed], [])
         greatest, least = self._driver.acceleration, -proposal.deceleration
+        is_emergency, is_free, wanted = proposal.is_emergency, bounds.are_free, bounds.wanted
         for step, dt in enumerate(self._steps):
-            desired, cause = bounds.allow(s + speed * dt, step)
-            target = least if proposal.is_emergency else min((desired - speed) / dt, greatest)
+            desired, cause = (wanted, FREE) if is_free else bounds.allow(s + speed * dt, step)
+            acceleration = least if is_emergency else (desired - speed) / dt
+            if acceleration > greatest:
+                acceleration = greatest
             # A leader has no effect on a vehicle that brakes with its limit or stands.
-            if leaders[step] and (step < ROLLED or (target > least and (speed > 0.0 or target > 0.0))):
+            if leaders[step] and (step < ROLLED or (acceleration > least and (speed > 0.0 or acceleration > 0.0))):
                 follow, leader = self._following(s, speed, desired, leaders[step])
-                cause = leader if follow < target - NEGLIGIBLE else cause
-                target = min(target, follow)
-            after = max(speed + max(target, least) * dt, 0.0)
+                if follow < acceleration - NEGLIGIBLE:
+                    cause = leader
+                if follow < acceleration:
+                    acceleration = follow
+            after = speed + (acceleration if acceleration > least else least) * dt
+            if after < 0.0:
+                after = 0.0
             s += 0.5 * (speed + after) * dt
             speed = after
             found.s.append(s)
@@ -129,10 +136,10 @@ class Roller:
         for center, rear, other, row in leaders:
             if center > s and other < slowest:
                 slowest = other
-                gap = driver.standstill_gap + max(
-                    speed * driver.time_gap + speed * (speed - other) / self._twice_root, 0.0
-                )
-                share = gap / max(rear - s, LEAST_GAP)
+                wish = speed * driver.time_gap + speed * (speed - other) / self._twice_root
+                gap = driver.standstill_gap + wish if wish > 0.0 else driver.standstill_gap
+                room = rear - s
+                share = gap / (room if room > LEAST_GAP else LEAST_GAP)
                 slowing = driver.acceleration * (share * share)
                 if slowing > hardest:
                     hardest, cause = slowing, row

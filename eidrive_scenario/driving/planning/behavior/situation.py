@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import msgspec
-import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
@@ -64,4 +63,4 @@ class Situation(msgspec.Struct, frozen=True):
 
     def lanes_at(self, s: float) -> int:
         """Return the index of the point of the line at a distance along it."""
-        return int(np.clip(self.line.index_at(s), 0, len(self.line.points) - 1))
+        return self.line.index_at(s)
