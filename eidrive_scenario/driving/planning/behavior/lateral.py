@@ -61,13 +61,13 @@ class LateralProfile(msgspec.Struct, frozen=True):
 
     def offset(self, s: Array) -> Array:
         """Return the offsets (…) at distances (…) along the line."""
+        if len(self.places) == 1:
+            return np.full(np.shape(s), self.values[0])
         places, values = np.array(self.places), np.array(self.values)
-        if len(places) == 1:
-            return np.full(np.shape(s), values[0])
-        index = np.clip(np.searchsorted(places, s, side="right") - 1, 0, len(places) - 2)
-        span = places[index + 1] - places[index]
-        share = np.clip((s - places[index]) / span, 0.0, 1.0)
-        found = values[index] + (values[index + 1] - values[index]) * blend(share)
+        index = places[1:-1].searchsorted(s, side="right")
+        begin, start = places[index], values[index]
+        share = np.minimum(np.maximum((s - begin) / (places[index + 1] - begin), 0.0), 1.0)
+        found = start + (values[index + 1] - start) * blend(share)
         if self.slope:
             first = np.where(index == 0, share, 1.0)
             found = found + self.slope * float(places[1] - places[0]) * _leaving(first)

@@ -74,28 +74,25 @@ class OncomingTraffic:
         return float(s + first * SAMPLE)
 
 
-def meets_oncoming(
-    profile: LateralProfile,
-    s: Array,
-    times: Array,
-    scene: Surroundings,
-    half_width: float,
-    hidden: tuple[float, float],
-) -> bool:
+def first_oncoming(profile: LateralProfile, s: float, scene: Surroundings, half_width: float) -> int:
+    """Return the index of the first time at which oncoming traffic is in the way of a vehicle at s; K if never."""
+    oncoming = (scene.speed < -ONCOMING_SPEED) & (scene.s + scene.half_length > s)
+    meets = (inside_way(scene, profile, half_width) & oncoming).any(axis=0)
+    return int(meets.argmax()) if meets.any() else len(meets)
+
+
+def meets_oncoming(profile: LateralProfile, s: Array, times: Array, oncoming: int, hidden: tuple[float, float]) -> bool:
     """Return whether the vehicle meets oncoming traffic before it is back on its side, or does not return.
 
-    s       distances along the line (K,) of the vehicle at `times`
-    hidden  place from which traffic may come unseen [m], inf without one, and its speed [m/s]
+    s         distances along the line (K,) of the vehicle at `times`
+    oncoming  index of the time from which on oncoming traffic is in its way
+    hidden    place from which traffic may come unseen [m], inf without one, and its speed [m/s]
     """
-    back = np.flatnonzero(s >= profile.places[-2])
-    if not back.size:
-        return True
-    last = int(back[0])
-    oncoming = (scene.speed < -ONCOMING_SPEED) & (scene.s + scene.half_length > s[0])
-    if bool((inside_way(scene, profile, half_width) & oncoming)[:, : last + 1].any()):
+    back = int(s.searchsorted(profile.places[-2]))
+    if back == len(s) or oncoming <= back:
         return True
     place, speed = hidden
-    return bool(place - speed * times[last] < s[last])
+    return bool(place - speed * times[back] < s[back])
 
 
 def _ahead(scene: Surroundings, place: float) -> Bools:

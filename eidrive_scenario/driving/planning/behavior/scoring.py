@@ -7,7 +7,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
-from eidrive_scenario.driving.planning.behavior.oncoming import meets_oncoming
+from eidrive_scenario.driving.planning.behavior.oncoming import first_oncoming, meets_oncoming
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -64,9 +64,12 @@ def evaluate(
     """
     count = len(proposals)
     front, rear = np.empty_like(rolled.s), np.empty_like(rolled.s)
-    for number, profile in enumerate(profiles):
-        rows = [row for row, proposal in enumerate(proposals) if proposal.profile == number]
-        front[rows], rear[rows] = profile.offset(rolled.s[rows] + ego.wheelbase), profile.offset(rolled.s[rows])
+    own: list[list[int]] = [[] for _ in profiles]
+    for row, proposal in enumerate(proposals):
+        own[proposal.profile].append(row)
+    for rows, profile in zip(own, profiles, strict=True):
+        place = rolled.s[rows]
+        front[rows], rear[rows] = profile.offset(place + ego.wheelbase), profile.offset(place)
     collision, risk = np.full(count, np.inf), np.zeros(count)
     impact, cause = np.zeros(count), np.full(count, -1)
     if len(scene):
@@ -76,20 +79,26 @@ def evaluate(
         risk = (lack.max(axis=1) * (1.0 - FARTHER * times / float(times[-1]))).max(axis=1)
     horizon = float(times[-1])
     far = max(wanted * horizon, 1.0)
-    progress = np.clip((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0, 1.0)
-    slowing = np.diff(rolled.speed, axis=1) / np.diff(times)
+    progress = np.minimum(np.maximum((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0), 1.0)
+    slowing = (rolled.speed[:, 1:] - rolled.speed[:, :-1]) / (times[1:] - times[:-1])
     hardest = np.maximum(-slowing.min(axis=1) - COMFORTABLE, 0.0)
     score = PROGRESS * progress - COMFORT * np.minimum(hardest / settings.hard_deceleration, 2.0)
     score -= RISK * risk
     score -= CRASH * np.where(np.isfinite(collision), 1.0 + (1.0 - collision / horizon) + 0.05 * impact, 0.0)
+    oncoming = [
+        first_oncoming(profile, float(rolled.s[0, 0]), scene, ego.half_width) if profile.uses_oncoming else len(times)
+        for profile in profiles
+    ]
+    values: list[float] = score.tolist()
     for row, proposal in enumerate(proposals):
-        score[row] -= SLOWER * (1.0 - proposal.share) + GENTLE * proposal.is_gentle
         profile = profiles[proposal.profile]
-        if profile.uses_oncoming and profile.name != current:
-            score[row] -= RISK * meets_oncoming(profile, rolled.s[row], times, scene, ego.half_width, (hidden, wanted))
-        score[row] -= (
-            ASIDE * (profile.side != 0) + ONCOMING * profile.uses_oncoming + SWITCH * (profile.name != current)
-        )
+        switches = profile.name != current
+        values[row] -= SLOWER * (1.0 - proposal.share) + GENTLE * proposal.is_gentle
+        if profile.uses_oncoming and switches:
+            first = oncoming[proposal.profile]
+            values[row] -= RISK * meets_oncoming(profile, rolled.s[row], times, first, (hidden, wanted))
+        values[row] -= ASIDE * (profile.side != 0) + ONCOMING * profile.uses_oncoming + SWITCH * switches
+    score = np.array(values)
     return Evaluation(score, collision, risk, impact, cause)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
-from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, OncomingTraffic, meets_oncoming
+from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, OncomingTraffic, first_oncoming, meets_oncoming
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -74,14 +74,21 @@ def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
 def test_meeting_before_the_return(start: float, meets: bool) -> None:
     # At 10 m/s the return begins after 5 s at 50 m; at -10 m/s an object from 100 m is there at the same time.
     s = 10.0 * TIMES
-    found = meets_oncoming(PASSING, s, TIMES, scene((start, 3.5, -10.0)), 0.9, (math.inf, 10.0))
-    assert found == meets
+    oncoming = first_oncoming(PASSING, 0.0, scene((start, 3.5, -10.0)), 0.9)
+    assert meets_oncoming(PASSING, s, TIMES, oncoming, (math.inf, 10.0)) == meets
+
+
+def test_oncoming_traffic_is_in_the_way_from_when_it_reaches_the_offset_lane() -> None:
+    # The way is at 3 m to the left up to s = 50 m; the front of the object, 2.5 m ahead of its center, is there at 5 s.
+    assert TIMES[first_oncoming(PASSING, 0.0, scene((102.5, 3.5, -10.0)), 0.9)] == pytest.approx(5.0, abs=1.2)
+    for harmless in (scene(), scene((100.0, 3.5, 10.0)), scene((-10.0, 3.5, -10.0)), scene((100.0, 9.0, -10.0))):
+        assert first_oncoming(PASSING, 0.0, harmless, 0.9) == len(TIMES)
 
 
 @pytest.mark.parametrize(("place", "meets"), [(95.0, True), (105.0, False)])
 def test_unseen_traffic_counts_from_its_place(place: float, meets: bool) -> None:
-    assert meets_oncoming(PASSING, 10.0 * TIMES, TIMES, scene(), 0.9, (place, 10.0)) == meets
+    assert meets_oncoming(PASSING, 10.0 * TIMES, TIMES, len(TIMES), (place, 10.0)) == meets
 
 
 def test_maneuver_that_does_not_return_within_the_horizon_meets_traffic() -> None:
-    assert meets_oncoming(PASSING, 5.0 * TIMES, TIMES, scene(), 0.9, (math.inf, 10.0))
+    assert meets_oncoming(PASSING, 5.0 * TIMES, TIMES, len(TIMES), (math.inf, 10.0))

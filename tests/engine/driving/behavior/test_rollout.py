@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.planning.behavior.bounds import Course
+from eidrive_scenario.car_following import IntelligentDriver
+from eidrive_scenario.driving.planning.behavior.bounds import Course, Limits
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.rollout import Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -55,6 +57,35 @@ def test_standing_leader_is_approached_to_the_standstill_gap() -> None:
     assert rolled.s[0, -1] <= 80.0 - SETTINGS.standstill_gap + 0.05
     assert rolled.s[0, -1] == pytest.approx(80.0 - SETTINGS.standstill_gap, abs=0.6)
     assert (np.diff(rolled.speed[0]) >= -SETTINGS.hard_deceleration * 0.25 - 1e-9).all()
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_first_step_is_the_model_behind_the_leader_that_demands_the_hardest_braking(order: tuple[int, int]) -> None:
+    near, far = leader(40.0, 12.0), leader(60.0, 2.0)
+    parts = [(near, far)[index] for index in order]
+    names = [name for name in Surroundings.__struct_fields__ if name != "owner"]
+    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    scene = Surroundings(owner=(0, 1), **columns)
+    driver = IntelligentDriver(
+        time_gap=SETTINGS.time_gap,
+        standstill_gap=SETTINGS.standstill_gap,
+        acceleration=SETTINGS.acceleration,
+        deceleration=SETTINGS.comfortable_deceleration,
+    )
+    expected = driver.response(np.full(2, 10.0), np.full(2, 15.0), np.array([40.0, 60.0]), np.array([-2.0, 8.0]))
+    rolled = roll(FREE, 10.0, scene)
+    assert expected[1] < expected[0]
+    assert (rolled.speed[0, 1] - 10.0) / 0.25 == pytest.approx(expected[1])
+    assert rolled.cause[0, 0] == order.index(1)
+
+
+def test_limits_are_interpolated_and_only_those_within_reach_count() -> None:
+    along, values = np.array([0.0, 10.0, 30.0, 90.0]), np.array([20.0, 8.0, 12.0, 3.0])
+    limits = Limits.ahead(Course(along, values, 15.0), 5.0, 40.0)
+    places = [-1.0, 0.0, 4.0, 10.0, 25.0, 45.0, 90.0, 95.0]
+    assert limits is not None
+    assert [limits.at(s) for s in places] == pytest.approx(np.interp(places, along, values).tolist())
+    assert Limits.ahead(Course(along, values, 7.0), 5.0, 20.0) is None
 
 
 def test_free_vehicle_accelerates_to_the_wanted_speed() -> None:
