@@ -15,6 +15,7 @@ from eidrive_scenario.driving.planning.behavior.oncoming import ONCOMING_SPEED, 
 from eidrive_scenario.driving.planning.behavior.options import Options
 from eidrive_scenario.driving.planning.behavior.proposals import (
     Conflict,
+    Precedence,
     Proposal,
     Wall,
     conflicts,
@@ -212,16 +213,21 @@ class Decider:
         proposals: list[Proposal] = []
         walls: list[list[Wall]] = []
         leads: list[Bools] = []
+        reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
+        here = (self._front, situation.s, situation.speed)
+        stops = [situation.stop] if situation.stop is not None else []
         for number, profile in enumerate(profiles):
             way = inside_way(scene, profile, self._half_width)
             found = conflicts(scene, way, situation.s)
-            reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
-            here = (self._front, situation.s, situation.speed)
             made = proposals_for(number, found, self._settings, emergency=self._emergency, is_current=number == 0)
+            reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in made:
-                rows = crossing_walls(found, self._times, here, proposal.precedence, reasons)
-                walls.append([*rows, *([situation.stop] if situation.stop is not None else [])])
-                leads.append(_leads(scene, way, found, situation.s + self._center, proposal))
+                kind = proposal.precedence
+                if kind not in reactions:
+                    before = [*crossing_walls(found, self._times, here, kind, reasons), *stops]
+                    reactions[kind] = before, _leads(scene, way, found, situation.s + self._center, proposal)
+                walls.append(reactions[kind][0])
+                leads.append(reactions[kind][1])
             proposals += made
         rolled = self._roller.roll(
             proposals,

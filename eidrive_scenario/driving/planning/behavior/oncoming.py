@@ -77,7 +77,7 @@ class OncomingTraffic:
 def first_oncoming(profile: LateralProfile, s: float, scene: Surroundings, half_width: float) -> int:
     """Return the index of the first time at which oncoming traffic is in the way of a vehicle at s; K if never."""
     oncoming = (scene.speed < -ONCOMING_SPEED) & (scene.s + scene.half_length > s)
-    meets = (inside_way(scene, profile, half_width) & oncoming).any(axis=0)
+    meets: Bools = np.asarray((inside_way(scene, profile, half_width) & oncoming).any(axis=0))
     return int(meets.argmax()) if meets.any() else len(meets)
 
 
