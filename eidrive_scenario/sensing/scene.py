@@ -43,7 +43,7 @@ class Scene(Protocol):
     def raycast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHitsView:
         """Cast rays from (M, 3) to (M, 3) [m] for the sensor of this name, from which some actors may be hidden."""
 
-    def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> Sequence[int]:
+    def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> Sequence[int]:
         """Return the same rows as `raycast`, for a few rays in scalar arithmetic."""
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:

@@ -29,6 +29,9 @@ SAMPLES: Array = INSET * BOX_SAMPLES
 FEW_PAIRS, FEW_RAYS = 64, 80
 """Maximum number of sensor-actor pairs, and of rays, for which scalar arithmetic is faster than arrays."""
 
+MANY_RAYS = 1000
+"""Maximum number of rays of which only the first hits are queried."""
+
 
 class TruthSensor(Sensor):
     """Sensor of objects whose center is within range and field of view, with enough of their points in sight.
@@ -166,8 +169,11 @@ def visibilities(
     origins = np.repeat(mounts[sensor_of][:, None], len(SAMPLES), axis=1)
     starts = ray_starts(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
     begin, end = starts.reshape(-1, 3), points.reshape(-1, 3)
-    hits = scene.raycast(begin, end, sensor=name) if name else scene.raycast(begin, end)
-    met = np.asarray(hits.rows).reshape(len(target_of), len(SAMPLES))
+    if name or len(begin) > MANY_RAYS:
+        rows = (scene.raycast(begin, end, sensor=name) if name else scene.raycast(begin, end)).rows
+    else:
+        rows = np.array(scene.first_hit(begin.tolist(), end.tolist()))
+    met = np.asarray(rows).reshape(len(target_of), len(SAMPLES))
     in_sight = (met == target_of[:, None]) | (met == NOTHING)
     shares: list[float] = in_sight.mean(axis=1).tolist()
     return shares

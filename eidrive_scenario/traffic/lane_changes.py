@@ -55,21 +55,19 @@ class LaneChanges:
         )
         able &= to_junction[indices] > room + cars.front[indices]
         able &= (cars.speed[indices] > SLOWEST) | (ends_in < LAST_CHANCE)
-        for to_left, beside in ((True, lanes.left), (False, lanes.right)):
-            target = beside[row]
-            possible = able & (target >= 0)
-            possible[possible] = lanes.ends_at[target[possible]] - cars.progress[indices[possible]] > room[possible]
-            some, lane = indices[possible], target[possible]
-            if some.size:
-                prospect = self._prospect(cars, some, lane, leaders, desired, occupants)
-                slow_side = to_left == lanes.left_hand[cars.row[some]]
-                gain = np.where(
-                    slow_side,
-                    incentive(self._changer, prospect, True),
-                    incentive(self._changer, prospect, False),
-                )
-                chosen = np.flatnonzero(safe(self._changer, prospect) & (gain > 0.0))
-                found += [(-float(gain[n]), int(some[n]), int(lane[n])) for n in chosen]
+        sides = [(lanes.left[row], lanes.left_hand[row]), (lanes.right[row], ~lanes.left_hand[row])]
+        target, slow_side = (np.concatenate(parts) for parts in zip(*sides, strict=True))
+        some, room, able = np.tile(indices, 2), np.tile(room, 2), np.tile(able, 2)
+        possible = np.flatnonzero(able & (target >= 0))
+        possible = possible[lanes.ends_at[target[possible]] - cars.progress[some[possible]] > room[possible]]
+        if possible.size:
+            some, target, slow_side = some[possible], target[possible], slow_side[possible]
+            prospect = self._prospect(cars, some, target, leaders, desired, occupants)
+            gain = np.where(
+                slow_side, incentive(self._changer, prospect, True), incentive(self._changer, prospect, False)
+            )
+            chosen = np.flatnonzero(safe(self._changer, prospect) & (gain > 0.0))
+            found = [(-float(gain[n]), int(some[n]), int(target[n])) for n in chosen]
         return self._one_at_a_time(cars, found)
 
     def _one_at_a_time(self, cars: Cars, found: list[tuple[float, int, int]]) -> list[tuple[int, int]]:
@@ -99,25 +97,38 @@ class LaneChanges:
         old = find_followers(lanes, cars.row[indices], progress, rear, occupants, indices)
         gap, ahead = leaders.gap[indices], leaders.speed[indices]
 
-        def follower(number: Integers, behind: Array, leader: Array) -> Array:
-            """Return the accelerations of followers at a gap behind a leader of this speed; 0 without a follower."""
-            owner = np.where(number >= 0, occupants.owner[number], FOREIGN)
-            own = owner >= 0
-            table = np.repeat(self._others.table, len(owner), axis=0)
-            table[own] = cars.drivers.table[owner[own]]
-            v = occupants.speed[number]
-            wish = np.where(own, desired[owner], np.maximum(v, 1.0))
-            found = Drivers(table).response(v, wish, behind, v - leader)
-            return np.where(number >= 0, found, 0.0)
-
-        return Prospect(
-            own=drivers.response(speed, wish, gap, speed - ahead),
-            own_after=drivers.response(speed, wish, after.gap, speed - after.speed),
-            new_follower=follower(new.number, new.gap + length + after.gap, after.speed),
-            new_follower_after=follower(new.number, new.gap, speed),
-            old_follower=follower(old.number, old.gap, speed),
-            old_follower_after=follower(old.number, old.gap + length + gap, ahead),
+        own, own_after = (
+            Drivers(np.tile(drivers.table, (2, 1)))
+            .response(
+                np.tile(speed, 2),
+                np.tile(wish, 2),
+                np.concatenate([gap, after.gap]),
+                np.concatenate([speed - ahead, speed - after.speed]),
+            )
+            .reshape(2, -1)
         )
+        new_follower, new_follower_after, old_follower, old_follower_after = self._followers(
+            cars,
+            desired,
+            occupants,
+            np.concatenate([new.number, new.number, old.number, old.number]),
+            np.concatenate([new.gap + length + after.gap, new.gap, old.gap, old.gap + length + gap]),
+            np.concatenate([after.speed, speed, speed, ahead]),
+        ).reshape(4, -1)
+        return Prospect(own, own_after, new_follower, new_follower_after, old_follower, old_follower_after)
+
+    def _followers(
+        self, cars: Cars, desired: Array, occupants: Occupants, number: Integers, behind: Array, leader: Array
+    ) -> Array:
+        """Return the accelerations of followers at a gap behind a leader of this speed; 0 without a follower."""
+        owner = np.where(number >= 0, occupants.owner[number], FOREIGN)
+        own = owner >= 0
+        table = np.repeat(self._others.table, len(owner), axis=0)
+        table[own] = cars.drivers.table[owner[own]]
+        v = occupants.speed[number]
+        wish = np.where(own, desired[owner], np.maximum(v, 1.0))
+        found = Drivers(table).response(v, wish, behind, v - leader)
+        return np.where(number >= 0, found, 0.0)
 
     @staticmethod
     def length(speed: Array) -> Array:

@@ -23,7 +23,7 @@ from eidrive_scenario.world.physics.contacts import ContactTracker
 from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.ground import GroundUnder
-from eidrive_scenario.world.physics.rays import Point, RayHits, cast_rays, first_hits
+from eidrive_scenario.world.physics.rays import RayHits, cast_rays, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
 from eidrive_scenario.world.road_objects import signal_heads
@@ -216,7 +216,7 @@ class World:
         begin, end = (np.ascontiguousarray(points) for points in np.broadcast_arrays(begin, end))
         return cast_rays(self._client, begin, end, self._actors.row_of_handle, passed)
 
-    def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
+    def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> list[int]:
         """Return the rows of the first hits of rays as `raycast` does, but faster for up to a thousand rays."""
         self._refresh()
         if self._unseen:

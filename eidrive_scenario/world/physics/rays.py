@@ -10,8 +10,6 @@ import numpy as np
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.world.physics.bullet import bullet
 
-Point = tuple[float, float, float]
-
 GROUND, NOTHING = -1, -2
 """Rows of rays that ended at the ground or a building, and of rays without a hit."""
 
@@ -66,7 +64,9 @@ def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Intege
     return RayHits(rows, fraction, position, normal)
 
 
-def first_hits(client: int, origins: Sequence[Point], targets: Sequence[Point], row_of_handle: list[int]) -> list[int]:
+def first_hits(
+    client: int, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]], row_of_handle: list[int]
+) -> list[int]:
     """Return the rows of the first hits as `cast_rays` does, without arrays; for at most one batch of rays."""
     hits = bullet.rayTestBatch(origins, targets, numThreads=1, physicsClientId=client)
     return [row_of_handle[hit[0]] for hit in hits]
