@@ -37,6 +37,7 @@ reproduce-trends: install  ## compare measured with expected trends: reports/tre
 
 bench: install  ## measure simulated seconds per wall second, and the time per package
 	$(BIN)/python benchmarks/bench_scenario_1.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/bench_planner.py
 	$(BIN)/python benchmarks/bench_fusion.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/bench_perception.py
 	$(BIN)/python benchmarks/bench_radio.py
