@@ -1,4 +1,4 @@
-"""Time of the planner `behavior` with ten tracks, and speed of coop/scenario_5 with this planner and background traffic.
+"""Time of the planner `behavior` with ten tracks, and speed of coop/scenario_5 with it and with background traffic.
 
 The first figure is the time of `plan` in a tick, averaged over 20 s, in which the planner decides in every second tick:
 behind three vehicles, beside four oncoming ones and three pedestrians. The second one is the simulated time per wall

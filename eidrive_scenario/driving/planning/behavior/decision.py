@@ -235,7 +235,7 @@ class Decider:
             (situation.s, situation.speed),
             (self._front, self._center),
             scene,
-            np.array(leads).reshape(len(proposals), len(scene), len(self._times)),
+            leads,
             walls,
         )
         current = self._current.name if self._current is not None else ROUTE

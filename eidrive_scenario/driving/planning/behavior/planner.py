@@ -120,8 +120,11 @@ class BehaviorPlanner(RoutePlanner):
         x, y, _ = ego.position.tolist()
         s, d = self._place_on(line, x, y)
         known = self._memory.update(objects, now, self._in_view(ego))
-        self._predictor.follow_lanes(known)
-        near = [entry for entry in known if math.hypot(entry.x - x, entry.y - y) < self._reach(ego, wanted)]
+        lanes = self._predictor.lanes(known)
+        self._predictor.follow_lanes(known, lanes)
+        reach = self._reach(ego, wanted)
+        rows = [row for row, entry in enumerate(known) if math.hypot(entry.x - x, entry.y - y) < reach]
+        near = [known[row] for row in rows]
         stop = self._stop(line.path, ego, x, y, now)
         situation = Situation(
             line=line,
@@ -132,7 +135,7 @@ class BehaviorPlanner(RoutePlanner):
             speed=max(ego.speed, 0.0),
             wanted=wanted,
             objects=near,
-            prediction=self._predictor.predict(near),
+            prediction=self._predictor.predict(near, [lanes[row] for row in rows]),
             window=self._window(line, s, max(ego.speed, wanted)),
             stop=None if stop is None else Wall(stop.place, math.inf, stop.reason),
             now=now,

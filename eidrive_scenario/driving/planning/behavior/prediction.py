@@ -58,24 +58,26 @@ class Predictor:
         self._courses = LaneCourses(roads) if roads is not None else None
         self._times = times
 
-    def follow_lanes(self, objects: list[KnownObject]) -> None:
+    def follow_lanes(self, objects: list[KnownObject], lanes: list[list[Course]]) -> None:
         """Let lost vehicles move along their lanes."""
-        lost = [known for known in objects if known.row is None]
-        for known, courses in zip(lost, self._lanes(lost) if lost else [], strict=True):
-            for course in courses:
+        for known, courses in zip(objects, lanes, strict=True):
+            for course in courses if known.row is None else ():
                 _, left, heading = course.place(known.x, known.y)
                 turn = float(wrap_angle(math.atan2(known.vy, known.vx) - heading))
                 if abs(turn) <= ALIGNED and abs(left) <= course.half_width:
                     known.vx, known.vy = known.speed * math.cos(heading), known.speed * math.sin(heading)
                     break
 
-    def predict(self, objects: list[KnownObject]) -> Prediction:
-        """Return the hypotheses of all objects."""
+    def predict(self, objects: list[KnownObject], lanes: list[list[Course]] | None = None) -> Prediction:
+        """Return the hypotheses of all objects.
+
+        lanes  courses of the lanes on which each of them is, if they are known already
+        """
+        lanes = self.lanes(objects) if lanes is None else lanes
         owners: list[int] = []
         rows: list[tuple[Array, Array, Array]] = []
         speeds: list[Array] = []
         rooms: list[float] = []
-        lanes = self._lanes(objects)
         for index, known in enumerate(objects):
             travelled, speed = longitudinal_motion(known.speed, known.acceleration, self._times)
             for row, room in self._hypotheses(known, lanes[index], travelled):
@@ -121,7 +123,7 @@ class Predictor:
             found.append(((x, y, np.full(len(times), direction)), math.inf))
         return found
 
-    def _lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
+    def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
         """Return the courses of the lanes on which each moving vehicle is."""
         found: list[list[Course]] = [[] for _ in objects]
         moving = [index for index, known in enumerate(objects) if known.speed >= STANDING and known.kind not in ON_FOOT]

@@ -71,9 +71,10 @@ class ReferenceLine:
         line = self.points[low:high]
         flat_x, flat_y = x.ravel(), y.ravel()
         shifted = line - line[0]
-        gap = np.einsum("mi,mi->m", shifted, shifted) - 2.0 * (
-            np.column_stack([flat_x - line[0, 0], flat_y - line[0, 1]]) @ shifted.T
-        )
+        # Half of the square of the distance, without the part that is the same for all points of the line.
+        half = 0.5 * np.einsum("mi,mi->m", shifted, shifted)
+        places = np.column_stack([flat_x - line[0, 0], flat_y - line[0, 1], np.ones(len(flat_x))])
+        gap = places @ np.vstack([-shifted.T, half])
         index = low + np.argmin(gap, axis=1)
         dx, dy = flat_x - self.points[index, 0], flat_y - self.points[index, 1]
         tx, ty = self.tangent[index, 0], self.tangent[index, 1]

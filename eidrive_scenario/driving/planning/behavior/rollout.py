@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -71,14 +72,14 @@ class Roller:
         start: tuple[float, float],
         body: tuple[float, float],
         scene: Surroundings,
-        leads: Bools,
+        leads: Sequence[Bools],
         walls: list[list[Wall]],
     ) -> Rollout:
         """Return the motion of the proposals.
 
         start  distance along the line [m] and speed [m/s]
         body   distances of the front and the center of the vehicle from the reference point [m]
-        leads  (P, N, K) whether a hypothesis leads a proposal at a time
+        leads  for each proposal whether a hypothesis leads it at a time (N, K); proposals may share an array
         """
         reach = (max(course.wanted, start[1]) + 1.0) * (self._times[-1] + 1.0)
         limits = Limits.ahead(course, start[0], reach)
@@ -153,30 +154,37 @@ class Roller:
 class _Leaders:
     """Leaders of proposals over time; proposals with the same ones share them."""
 
-    def __init__(self, scene: Surroundings, leads: Bools, body: tuple[float, float]) -> None:
-        front, center = body
-        self._leads = leads
-        rows = np.flatnonzero(leads.any(axis=(0, 2))).tolist()
-        rear = (scene.s - scene.half_length - scene.passing_gap[:, None])[rows] - front
-        values = zip((scene.s[rows] - center).tolist(), rear.tolist(), scene.speed[rows].tolist(), rows, strict=True)
-        self._at = {
-            row: [(*entry, row) for entry in zip(centers, rears, speeds, strict=True)]
-            for centers, rears, speeds, row in values
-        }
-        self._known: dict[bytes, tuple[int, list[list[Leader]]]] = {}
+    def __init__(self, scene: Surroundings, leads: Sequence[Bools], body: tuple[float, float]) -> None:
+        self._front, self._center = body
+        self._scene = scene
+        self._leads = list(leads)
+        self._known: dict[int, list[list[Leader]]] = {}
+        self._entries: dict[int, list[Leader]] = {}
 
     def of(self, proposal: int) -> tuple[int, list[list[Leader]]]:
-        """Return a number of the leaders of a proposal, the same for equal ones, and the leaders at each time."""
+        """Return a number of the leaders of a proposal, the same for shared ones, and the leaders at each time."""
         leads = self._leads[proposal]
-        key = leads.tobytes()
-        found = self._known.get(key)
+        number = id(leads)
+        found = self._known.get(number)
         if found is None:
-            times: list[list[Leader]] = [[] for _ in range(leads.shape[1])]
-            for row, step in np.argwhere(leads).tolist():
-                times[step].append(self._at[row][step])
-            for leaders in times:
-                leaders.sort(key=_rear)
-            found = self._known[key] = (len(self._known), times)
+            found = self._known[number] = [[] for _ in range(leads.shape[1])]
+            rows, steps = leads.nonzero()
+            for row, step in zip(rows.tolist(), steps.tolist(), strict=True):
+                found[step].append(self._entry(row)[step])
+            for leaders in found:
+                if len(leaders) > 1:
+                    leaders.sort(key=_rear)
+        return number, found
+
+    def _entry(self, row: int) -> list[Leader]:
+        """Return a hypothesis at all times as a leader."""
+        found = self._entries.get(row)
+        if found is None:
+            scene = self._scene
+            centers = scene.s[row] - self._center
+            rears = scene.s[row] - scene.half_length[row] - scene.passing_gap[row] - self._front
+            values = zip(centers.tolist(), rears.tolist(), scene.speed[row].tolist(), strict=True)
+            found = self._entries[row] = [(center, rear, speed, row) for center, rear, speed in values]
         return found
 
 

@@ -120,7 +120,7 @@ def test_lost_vehicle_follows_the_curve_of_its_lane() -> None:
     objects.update(detections(0.0, KnownBox(pose.x, pose.y, 8.0, 0.5, yaw=pose.h)), 0.0)
     for tick in range(1, 30):
         (lost,) = objects.update(Detections(0.1 * tick), 0.1 * tick, lambda lost: np.zeros(len(lost), dtype=bool))
-        predictor.follow_lanes([lost])
+        predictor.follow_lanes([lost], predictor.lanes([lost]))
     assert lost.speed == pytest.approx(math.hypot(8.0, 0.5), rel=0.05)
     assert math.hypot(lost.x, lost.y - 50.0) == pytest.approx(51.75, abs=0.4)
 

@@ -36,7 +36,7 @@ def roll(
     proposal: Proposal, speed: float, scene: Surroundings, walls: list[Wall] | None = None, wanted: float = 15.0
 ) -> Rollout:
     course = Course(ALONG, np.full(len(ALONG), 50.0), wanted)
-    leads = np.ones((1, len(scene), len(TIMES)), dtype=bool)
+    leads = [np.ones((len(scene), len(TIMES)), dtype=bool)]
     return Roller(SETTINGS, TIMES).roll([proposal], course, (0.0, speed), (FRONT, CENTER), scene, leads, [walls or []])
 
 
