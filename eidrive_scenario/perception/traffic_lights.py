@@ -14,9 +14,9 @@ from eidrive_scenario.roads import Pose, RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
 from eidrive_scenario.sensing.readings import SignalReading
-from eidrive_scenario.sensing.signals import is_stop_sign
+from eidrive_scenario.sensing.signals import is_give_way_sign, is_stop_sign
 
-Kind = Literal["light", "stop sign"]
+Kind = Literal["light", "stop sign", "give way sign"]
 
 ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
@@ -55,16 +55,17 @@ class SignalAhead(NamedTuple):
     is_yellow: bool = False
 
 
-def stop_lines(roads: RoadNetwork) -> tuple[StopLine, ...]:
+def stop_lines(roads: RoadNetwork, *, with_give_way: bool = False) -> tuple[StopLine, ...]:
     """Return all positions where a traffic light or stop sign of the map stops a lane.
 
-    Vehicles wait at the s coordinate of the signal. For a signal on a connecting road they wait before the junction,
-    and before a light that stands right before it, which they could not see any more beside them.
+    With `with_give_way` the result includes signs to give way, at which traffic need not stop. Vehicles wait at the
+    s coordinate of the signal. For a signal on a connecting road they wait before the junction, and before a light that
+    stands right before it, which they could not see any more beside them.
     """
     return tuple(
         line
         for signal in roads.signals.values()
-        if signal.dynamic or is_stop_sign(signal)
+        if signal.dynamic or is_stop_sign(signal) or (with_give_way and is_give_way_sign(signal))
         for place in (signal.place, *signal.references)
         for line in _lines(roads, signal, place)
     )
@@ -81,7 +82,7 @@ class SignalsAhead:
 
     def follow(self, path: Array) -> None:
         """Set the path (M, 2) along which distances count."""
-        self._on_path = sorted(_along(self._lines, path)) if self._lines else []
+        self._on_path = sorted(places_along(self._lines, path)) if self._lines else []
 
     def update(self, readings: Iterable[SignalReading]) -> None:
         """Update the states of signals in sight."""
@@ -105,7 +106,7 @@ def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[S
     road = roads.roads.get(place.road)
     if road is None:
         return
-    kind: Kind = "light" if signal.dynamic else "stop sign"
+    kind: Kind = "light" if signal.dynamic else "stop sign" if is_stop_sign(signal) else "give way sign"
     for number in roads.signal_lanes(place):
         direction = roads.driving_direction(road.id, number)
         beyond = None
@@ -129,7 +130,7 @@ def _distance_before(light: Pose, entry: Pose, heading: float) -> float:
     return before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
 
 
-def _along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float, StopLine]]:
+def places_along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float, StopLine]]:
     """Yield the lines that a path (M, 2) crosses, with the distance along it [m]."""
     step = np.diff(path, axis=0)
     length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)

@@ -75,3 +75,12 @@ def is_stop_sign(signal: Signal) -> bool:
     """
     kind = signal.type.upper()
     return not signal.dynamic and (kind in ("206", "R1-1") or (kind == "R1" and signal.subtype == "1"))
+
+
+def is_give_way_sign(signal: Signal) -> bool:
+    """Return whether a sign requires to give way.
+
+    These are 205 of the German catalog, which OpenDRIVE files use, and R1-2 of the American one.
+    """
+    kind = signal.type.upper()
+    return not signal.dynamic and (kind in ("205", "R1-2") or (kind == "R1" and signal.subtype == "2"))

@@ -30,6 +30,8 @@ STRIDE = 10
 """Number of lane points that are computed in one step on a continuous lane."""
 TURNS = 50.0
 """Maximum length of a road that may lead into itself within a stride [m]."""
+BEYOND = 100.0
+"""Distance beyond the end of the road within which a vehicle still stops for it [m]; farther away it was teleported."""
 BEHIND = 5
 """Number of points behind the vehicle that are kept when the path is extended."""
 
@@ -87,6 +89,7 @@ class RoutePlanner(Planner):
             self._way[0] is None
             and self._way[1] is None
             and path.distance(x, y, self._progress) > self.max_lateral_offset
+            and not self._is_past_end(path, x, y)
         ):
             self._lane = []
             path = self._path = self._lane_ahead(x, y, yaw)
@@ -97,6 +100,16 @@ class RoutePlanner(Planner):
             path = self._path = self._lane_ahead(x, y, yaw) if lap is None else _with_laps(behind, lap)
             self._progress = path.project(x, y)
         return path
+
+    def _is_past_end(self, path: PlannedPath, x: float, y: float) -> bool:
+        """Return whether a vehicle has left the end of its lane straight ahead, where it has to stop."""
+        if not path.ends or self._progress < len(path) - 2:
+            return False
+        (x0, y0), (x1, y1) = path.points[-2].tolist(), path.points[-1].tolist()
+        length = math.hypot(x1 - x0, y1 - y0) or 1.0
+        ux, uy = (x1 - x0) / length, (y1 - y0) / length
+        ahead, aside = (x - x1) * ux + (y - y1) * uy, (y - y1) * ux - (x - x1) * uy
+        return bool(0.0 <= ahead <= BEYOND and abs(aside) <= self.max_lateral_offset)
 
     def _stop(self, path: PlannedPath, ego: EgoState, x: float, y: float, now: float) -> StopPoint | None:
         """Return the stop point of the next traffic light or stop sign, or None."""

@@ -64,11 +64,13 @@ def behavior(roads: RoadNetwork | None, target_speed: float = 10.0, **settings: 
 
 
 class PlannedDrive:
-    """Car on the right lane from x = 20 m, in the physics world, controlled by PID along the plans."""
+    """Car on the right lane, from x = 20 m by default, in the physics world, controlled by PID along the plans."""
 
-    def __init__(self, planner: BehaviorPlanner, roads: RoadNetwork, *, speed: float = 10.0) -> None:
+    def __init__(
+        self, planner: BehaviorPlanner, roads: RoadNetwork, *, speed: float = 10.0, start: float = 20.0
+    ) -> None:
         self.world = World(roads, dt=0.05)
-        self.world.add(CAR, Placement(20.0, LANE, speed=speed), driven=True)
+        self.world.add(CAR, Placement(start, LANE, speed=speed), driven=True)
         self.planner = planner
         self.controller = PidController(CAR, 0.05)
         self.rig = Rig(CAR, {})

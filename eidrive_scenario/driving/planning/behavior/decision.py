@@ -108,7 +108,15 @@ class Decider:
         """Return the best proposal."""
         settings = self._settings
         body = (situation.s + self._center, situation.d, self._half_length, self._half_width)
-        scene = surroundings(situation.objects, situation.prediction, situation.line, situation.window, settings, body)
+        scene = surroundings(
+            situation.objects,
+            situation.prediction,
+            situation.line,
+            situation.window,
+            settings,
+            body,
+            situation.gives_way,
+        )
         current = self._continued(situation)
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.routing.movement import Branch
@@ -25,10 +26,19 @@ class Course:
     """Center line of a lane and its successors: points (M, 2) [m], distances along it (M,) [m].
 
     half_width  of the lane at its start [m]
+    stops       distances at which stop signs hold the traffic [m];  passages  of junctions
     """
 
-    def __init__(self, points: Array, along: Array, half_width: float) -> None:
+    def __init__(
+        self,
+        points: Array,
+        along: Array,
+        half_width: float,
+        stops: tuple[float, ...] = (),
+        passages: tuple[Passage, ...] = (),
+    ) -> None:
         self.points, self.along, self.half_width = points, along, half_width
+        self.stops, self.passages = stops, passages
         self._x, self._y = (np.ascontiguousarray(column) for column in points.T)
         step = np.diff(points, axis=0)
         self._unit = step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
@@ -57,8 +67,9 @@ class Course:
 class LaneCourses:
     """Courses of all lanes of a road network, computed when they are first needed."""
 
-    def __init__(self, roads: RoadNetwork) -> None:
+    def __init__(self, roads: RoadNetwork, rules: JunctionRules) -> None:
         self._roads = roads
+        self._rules = rules
         self._courses: dict[int, tuple[Course, ...]] = {}
         self._keys = [key for key, _ in roads.tables.lane_keys()]
 
@@ -113,7 +124,8 @@ class LaneCourses:
         first = chain[0]
         section = self._roads.road(first.road).sections[first.section]
         width = section.lanes[first.lane].width
-        return Course(points, along, max(width.value(0.0), width.value(section.length)) / 2.0)
+        half_width = max(width.value(0.0), width.value(section.length)) / 2.0
+        return Course(points, along, half_width, self._rules.stops_along(points), self._rules.passages(points))
 
 
 def _likely(branches: list[Branch]) -> list[Branch]:

@@ -17,6 +17,7 @@ from eidrive_scenario.driving.planning.behavior.memory import KnownObject, Objec
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.path import PlannedPath
@@ -65,7 +66,9 @@ class BehaviorPlanner(RoutePlanner):
         own = self.planner_settings
         self._times: Array = np.arange(0.0, own.horizon + 1e-9, STEP)
         self._memory = ObjectMemory(own)
-        self._predictor = Predictor(roads, self._times)
+        self._rules = JunctionRules(roads) if roads is not None and roads.junctions else None
+        self._predictor = Predictor(roads, self._times, self._rules)
+        self._passages: tuple[Passage, ...] = ()
         self._decider = Decider(own, spec, self._times, settings.range or VIEW)
         self._line: ReferenceLine | None = None
         self._limits: Array = np.empty(0)
@@ -95,6 +98,7 @@ class BehaviorPlanner(RoutePlanner):
         if before is not None and before.path is path:
             return before
         line = self._line = ReferenceLine(path, self.roads)
+        self._passages = self._rules.passages(line.points) if self._rules is not None else ()
         self._limits = speed_limits(line.curvature, path.limits, line.spacing, self.planner_settings)
         shift = None
         if before is not None:
@@ -139,8 +143,17 @@ class BehaviorPlanner(RoutePlanner):
             window=self._window(line, s, max(ego.speed, wanted)),
             stop=None if stop is None else Wall(stop.place, math.inf, stop.reason),
             now=now,
+            gives_way=self._gives_way(s),
         )
         return self._decider.decide(situation)
+
+    def _gives_way(self, s: float) -> Callable[[Passage], bool] | None:
+        """Return a function that determines whether the vehicle at `s` gives way to traffic on another passage."""
+        rules = self._rules
+        ahead = {passage.junction: passage for passage in reversed(self._passages) if passage.end > s}
+        if rules is None or not ahead:
+            return None
+        return lambda other: other.junction in ahead and rules.gives_way(ahead[other.junction], other)
 
     def _in_view(self, ego: EgoState) -> Callable[[Sequence[KnownObject]], Bools] | None:
         """Return a function that determines which objects are in view of the sensors; None: all of them."""
@@ -178,7 +191,7 @@ def _trajectory(line: ReferenceLine, decision: Decision, s: float) -> Plan:
     normal = np.column_stack([-line.tangent[first:last, 1], line.tangent[first:last, 0]])
     points = line.points[first:last] + offset[:, None] * normal
     squares = np.interp(along, decision.s, decision.speed**2)
-    speeds = np.sqrt(squares)
+    speeds = np.sqrt(squares) if s < line.length or not line.path.ends else np.zeros(len(along))
     acceleration = decision.acceleration
     if acceleration > 0.0 and speeds[0] < CREEPING:
         speeds = np.maximum(speeds, CREEPING)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.planning.behavior.lane_courses import Course, LaneCourses
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
+from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
 
@@ -31,6 +33,11 @@ NOTICEABLE, GREATEST = 0.8, 4.0
 """Accelerations below which an object keeps its speed, and maximum acceleration that is considered [m/s²]."""
 PERSISTENCE = 1.5
 """Time constant with which the predicted acceleration decreases [s]."""
+STOPPING, FIRM = 2.0, 3.05
+"""Deceleration with which a vehicle is predicted to stop at a sign, and the one from which on it is predicted to pass
+[m/s²]; 3.05 is that of the ITE for stops."""
+AT_SIGN = 1.0
+"""Distance of the front from a sign within which the vehicle has stopped there or passes it [m]."""
 MOST_HYPOTHESES = 4
 """Maximum number of hypotheses of one object."""
 
@@ -40,6 +47,7 @@ class Prediction(msgspec.Struct, frozen=True):
 
     objects  (N,) index of the object;  x, y, yaw, speed  (N, K) [m, rad, m/s]
     room     (N,) distance of the center from the nearer edge of the lane that it follows, inf for other objects [m]
+    passages  of junctions ahead, for each hypothesis
     """
 
     objects: tuple[int, ...]
@@ -48,14 +56,24 @@ class Prediction(msgspec.Struct, frozen=True):
     yaw: Array
     speed: Array
     room: Array
+    passages: tuple[tuple[Passage, ...], ...] = ()
+
+
+class Hypothesis(NamedTuple):
+    """Predicted motion of one object: poses and speeds (K,), room in its lane [m], and passages of junctions ahead."""
+
+    poses: tuple[Array, Array, Array]
+    speed: Array
+    room: float = math.inf
+    passages: tuple[Passage, ...] = ()
 
 
 class Predictor:
     """Prediction of objects over a road network, or without one."""
 
-    def __init__(self, roads: RoadNetwork | None, times: Array) -> None:
+    def __init__(self, roads: RoadNetwork | None, times: Array, rules: JunctionRules | None = None) -> None:
         self._roads = roads
-        self._courses = LaneCourses(roads) if roads is not None else None
+        self._courses = LaneCourses(roads, rules or JunctionRules(roads)) if roads is not None else None
         self._times = times
 
     def follow_lanes(self, objects: list[KnownObject], lanes: list[list[Course]]) -> None:
@@ -75,34 +93,34 @@ class Predictor:
         """
         lanes = self.lanes(objects) if lanes is None else lanes
         owners: list[int] = []
-        rows: list[tuple[Array, Array, Array]] = []
-        speeds: list[Array] = []
-        rooms: list[float] = []
-        for index, known in enumerate(objects):
-            travelled, speed = longitudinal_motion(known.speed, known.acceleration, self._times)
-            for row, room in self._hypotheses(known, lanes[index], travelled):
-                owners.append(index)
-                rows.append(row)
-                speeds.append(speed)
-                rooms.append(room)
-        if not rows:
+        found: list[Hypothesis] = []
+        for index, (known, courses) in enumerate(zip(objects, lanes, strict=True)):
+            new = self._hypotheses(known, courses)
+            owners += [index] * len(new)
+            found += new
+        if not found:
             nothing = np.empty((0, len(self._times)))
             return Prediction((), nothing, nothing, nothing, nothing, np.empty(0))
-        x, y, yaw = (np.array([row[axis] for row in rows]) for axis in range(3))
-        return Prediction(tuple(owners), x, y, yaw, np.array(speeds), np.array(rooms))
+        x, y, yaw = (np.array([entry.poses[axis] for entry in found]) for axis in range(3))
+        return Prediction(
+            tuple(owners),
+            x,
+            y,
+            yaw,
+            np.array([entry.speed for entry in found]),
+            np.array([entry.room for entry in found]),
+            tuple([entry.passages for entry in found]),
+        )
 
-    def _hypotheses(
-        self, known: KnownObject, courses: list[Course], travelled: Array
-    ) -> list[tuple[tuple[Array, Array, Array], float]]:
-        """Return the poses (K,) of each hypothesis, and its room in the lane [m]."""
+    def _hypotheses(self, known: KnownObject, courses: list[Course]) -> list[Hypothesis]:
         times = self._times
-        speed = known.speed
-        if speed < STANDING:
+        travelled, speed = longitudinal_motion(known.speed, known.acceleration, times)
+        if known.speed < STANDING:
             x, y, yaw = (np.full(len(times), value) for value in (known.x, known.y, known.yaw))
-            return [((x, y, yaw), math.inf)]
-        found: list[tuple[tuple[Array, Array, Array], float]] = []
+            return [Hypothesis((x, y, yaw), speed)]
+        found: list[Hypothesis] = []
         direction = math.atan2(known.vy, known.vx)
-        is_unknown = speed < SPEED_ERROR * known.error
+        is_unknown = known.speed < SPEED_ERROR * known.error
         for course in courses:
             along, left, heading = course.place(known.x, known.y)
             turn = float(wrap_angle(direction - heading))
@@ -110,17 +128,19 @@ class Predictor:
                 travelled, turn = travelled * max(math.cos(turn), 0.0), 0.0
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
-            aside = speed * math.sin(turn)
+            aside = known.speed * math.sin(turn)
             drift = np.zeros(len(times))
             if abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error):
                 drift = np.clip(aside * times, -LANE_WIDTH, LANE_WIDTH)
+            way, speeds = _held_by_sign(known, course, along, times) or (travelled, speed)
             room = max(course.half_width - abs(left), 0.0)
-            found.append((course.poses(along + travelled, left + drift), room))
+            ahead = tuple([passage for passage in course.passages if passage.end > along])
+            found.append(Hypothesis(course.poses(along + way, left + drift), speeds, room, ahead))
             if len(found) == MOST_HYPOTHESES:
                 break
         if not found:
             x, y = known.x + math.cos(direction) * travelled, known.y + math.sin(direction) * travelled
-            found.append(((x, y, np.full(len(times), direction)), math.inf))
+            found.append(Hypothesis((x, y, np.full(len(times), direction)), speed))
         return found
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
@@ -153,3 +173,24 @@ def longitudinal_motion(speed: float, acceleration: float, times: Array) -> tupl
         return np.asarray((speed + acceleration * PERSISTENCE) * times - PERSISTENCE * gained), speed + gained
     braking = np.minimum(times, -speed / acceleration)
     return np.asarray(speed * braking + 0.5 * acceleration * braking**2), np.asarray(speed + acceleration * braking)
+
+
+def stopping_motion(speed: float, left: float, times: Array) -> tuple[Array, Array]:
+    """Return the distances [m] and speeds [m/s] (K,) of a vehicle that stops `left` meters ahead.
+
+    It brakes as late as STOPPING permits, or at once.
+    """
+    deceleration = max(STOPPING, speed * speed / (2.0 * left))
+    begin = (left - speed * speed / (2.0 * deceleration)) / speed
+    braking = np.clip(times - begin, 0.0, speed / deceleration)
+    way = speed * np.minimum(times, begin) + speed * braking - 0.5 * deceleration * braking**2
+    return np.asarray(way), np.asarray(speed - deceleration * braking)
+
+
+def _held_by_sign(known: KnownObject, course: Course, along: float, times: Array) -> tuple[Array, Array] | None:
+    """Return the motion of a vehicle to the next stop sign; None without one, or if it does not stop there any more."""
+    front = along + known.length / 2.0
+    left = next((place - front for place in course.stops if place > front - AT_SIGN), math.inf)
+    if left < AT_SIGN or known.acceleration > NOTICEABLE or known.speed**2 > 2.0 * FIRM * left:
+        return None
+    return stopping_motion(known.speed, left, times) if math.isfinite(left) else None

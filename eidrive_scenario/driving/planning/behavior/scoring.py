@@ -128,10 +128,12 @@ def _overlaps(
     margin = np.maximum(scene.margin, CONTACT)[None, :, None]
     crossing = np.flatnonzero(scene.crosses.any(axis=1))
     shift = round(settings.crossing_time / float(times[1] - times[0]))
+    # Traffic with the right of way keeps its speed: nobody enters a junction shortly before it.
+    favored = np.flatnonzero(scene.crosses.any(axis=1) & scene.yields)
     moved = [
-        [_shifted(part[crossing], later) for part in (scene.s, scene.d, scene.half_length, scene.half_width)]
-        for later in (shift, -shift)
-        if crossing.size and shift
+        (rows, [_shifted(part[rows], later) for part in (scene.s, scene.d, scene.half_length, scene.half_width)])
+        for rows, later in ((crossing, shift), (crossing, -shift), (favored, 2 * shift), (favored, 3 * shift))
+        if rows.size and shift
     ]
     middle = ego.wheelbase / 2.0
     for d, low, high in ((offsets[0], middle, ego.front), (offsets[1], -ego.rear, middle)):
@@ -143,10 +145,10 @@ def _overlaps(
         missing = np.where(along < 0.0, (margin - aside) / margin, 0.0)
         missing = np.maximum(missing, np.where(aside < CONTACT, (CLEAR_AHEAD - along) / CLEAR_AHEAD, 0.0))
         lack = np.maximum(lack, np.where(missing > 0.0, LEAST_LACK + (1.0 - LEAST_LACK) * missing, 0.0))
-        for s, place, length, width in moved:
+        for rows, (s, place, length, width) in moved:
             along = np.abs(s - center) - (length + half_length)
             aside = np.abs(place - beside) - (width + ego.half_width)
-            lack[:, crossing] = np.maximum(lack[:, crossing], (along < CONTACT) & (aside < CONTACT))
+            lack[:, rows] = np.maximum(lack[:, rows], (along < CONTACT) & (aside < CONTACT))
     ignored = scene.behind | touching[:, :, 0].any(axis=0)
     keep = ~ignored[None, :, None]
     at_rest = (rolled.speed < 0.1)[:, None, :]

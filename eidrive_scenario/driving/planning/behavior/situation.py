@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import msgspec
 
@@ -11,6 +12,7 @@ from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import Wall
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
 
 
 class Situation(msgspec.Struct, frozen=True):
@@ -20,6 +22,7 @@ class Situation(msgspec.Struct, frozen=True):
     steered  s and d of the front axle, which the controller keeps on the trajectory [m], and the slope of its motion
     window  range of the points that matter
     stop    place at which a signal requires a stop, or None
+    gives_way  returns whether the vehicle gives way to traffic on a passage of a junction; None: there are no junctions
     """
 
     line: ReferenceLine
@@ -34,6 +37,7 @@ class Situation(msgspec.Struct, frozen=True):
     window: tuple[int, int]
     stop: Wall | None
     now: float
+    gives_way: Callable[[Passage], bool] | None = None
 
     def kind_of(self, owner: int) -> str:
         """Return the class of an object."""

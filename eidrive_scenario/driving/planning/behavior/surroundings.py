@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import msgspec
 import numpy as np
 
@@ -9,6 +11,7 @@ from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 
 VULNERABLE = frozenset({"pedestrian", "bicycle", "motorbike"})
@@ -29,6 +32,7 @@ class Surroundings(msgspec.Struct, frozen=True):
     owner  (N,) index of the object;  certain  (N,) whether its existence is certain enough for hard braking
     passing_gap  (N,) additional gap behind standing vehicles [m]
     crosses  (N, K) whether it moves across the line;  behind  (N,) whether it follows the ego in its lane
+    yields   (N,) whether the ego gives way to it at a junction
     """
 
     s: Array
@@ -42,6 +46,7 @@ class Surroundings(msgspec.Struct, frozen=True):
     passing_gap: Array
     crosses: Bools
     behind: Bools
+    yields: Bools
 
     def __len__(self) -> int:
         return len(self.owner)
@@ -54,9 +59,11 @@ def surroundings(
     window: tuple[int, int],
     settings: BehaviorSettings,
     ego: tuple[float, float, float, float],
+    gives_way: Callable[[Passage], bool] | None = None,
 ) -> Surroundings:
     """Return the predicted objects along the points of the line in `window`.
 
+    gives_way  returns whether the ego gives way to traffic on a passage of a junction; None: there are no junctions
     ego  distance along the line of the center of the ego, its offset, half length and half width [m]
     """
     s, d, heading = line.project(prediction.x, prediction.y, *window)
@@ -88,8 +95,15 @@ def surroundings(
         np.array([settings.passing_gap if _may_be_passed(known) else 0.0 for known in owners]),
         moving & (np.abs(cos) < ACROSS),
         behind,
+        _yields(prediction, gives_way),
     )
 
 
 def _may_be_passed(known: KnownObject) -> bool:
     return known.still_since is not None and known.kind not in VULNERABLE
+
+
+def _yields(prediction: Prediction, gives_way: Callable[[Passage], bool] | None) -> Bools:
+    if gives_way is None or not any(prediction.passages):
+        return np.zeros(len(prediction.objects), dtype=bool)
+    return np.array([any(map(gives_way, passages)) for passages in prediction.passages], dtype=bool)

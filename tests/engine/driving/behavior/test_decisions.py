@@ -197,3 +197,22 @@ def test_decisions_have_the_period_of_the_settings(roads: RoadNetwork) -> None:
             changes.append(now)
         before = reason
     assert changes[0] == pytest.approx(0.4), "decisions at 0, 0.2 and 0.4 s; the object appears at 0.25 s"
+
+
+@pytest.mark.parametrize("start", [50.0, 58.0])
+def test_vehicle_that_cannot_stop_before_the_end_of_the_road_stops_behind_it(start: float) -> None:
+    roads = two_lane_road(60.0)
+    drive = PlannedDrive(behavior(roads, 11.0), roads, speed=11.0, start=start)
+    drive.run(5.0, lambda _: ())
+    # From 11 m/s with 4 m/s² or more: 15 m, and the delay of the controller.
+    assert drive.speeds[-1] == pytest.approx(0.0, abs=0.05)
+    assert drive.path[-1][0] < start + 20.0
+
+
+def test_vehicle_that_is_moved_from_the_end_of_the_road_follows_its_new_lane() -> None:
+    planner = behavior(two_lane_road(400.0), 10.0)
+    at_end, on_lane = (EgoState(0.0, np.array([x, LANE, 0.0]), 0.0, 0.0, 0.0, 10.0, 0.0, 0.0) for x in (398.0, 100.0))
+    planner.plan(at_end, detections(0.0), Goal(), 0.0)
+    plan = planner.plan(on_lane, detections(1.0), Goal(), 1.0)
+    assert float(plan.points[-1, 0]) == pytest.approx(160.0, abs=3.0)
+    assert float(plan.speeds[-1]) == pytest.approx(10.0, abs=0.1)

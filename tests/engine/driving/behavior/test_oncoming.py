@@ -34,6 +34,7 @@ def scene(*objects: tuple[float, float, float]) -> Surroundings:
         np.zeros(count),
         np.zeros((count, steps), dtype=bool),
         np.zeros(count, dtype=bool),
+        np.zeros(count, dtype=bool),
     )
 
 

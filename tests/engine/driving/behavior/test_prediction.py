@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from opendrive_xml import map_xml, road_xml
 from planned_drive import KnownBox, detections
+from signal_street import stop_sign
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
-from eidrive_scenario.driving.planning.behavior.prediction import Predictor, longitudinal_motion
+from eidrive_scenario.driving.planning.behavior.prediction import Predictor, longitudinal_motion, stopping_motion
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
 
@@ -131,3 +132,23 @@ def test_slow_vehicle_with_an_uncertain_position_moves_along_its_lane() -> None:
     slow, fast = KnownBox(200.0, -1.75, -2.0, deviation=2.0), KnownBox(200.0, -1.75, -8.0, deviation=2.0)
     np.testing.assert_allclose(Predictor(roads, TIMES).predict(known(slow)).x[0], 200.0)
     np.testing.assert_allclose(Predictor(roads, TIMES).predict(known(fast)).x[0], 200.0 - 8.0 * TIMES)
+
+
+def test_vehicle_stops_at_its_stop_sign_if_it_can() -> None:
+    # The front is 20 m before the sign: a stop from 8 m/s takes 16 m at 2 m/s², one from 12 m/s needs 3.6 m/s².
+    sign = f"<signals>{stop_sign('stop', 100.0)}</signals>"
+    roads = RoadNetwork.parse(map_xml(road_xml(length=400.0, extra=sign)))
+    center = 100.0 - 20.0 - 4.5 / 2
+    for speed, expected in ((8.0, center + 20.0), (12.0, center + 12.0 * 8.0)):
+        found = Predictor(roads, TIMES).predict(known(KnownBox(center, -1.75, speed)))
+        assert found.x[0, -1] == pytest.approx(expected, abs=0.05)
+    away = Predictor(roads, TIMES).predict(known(KnownBox(center, 1.75, -8.0, yaw=math.pi)))
+    assert away.x[0, -1] == pytest.approx(center - 64.0, abs=0.05)
+
+
+def test_stopping_motion_ends_at_its_place() -> None:
+    way, speed = stopping_motion(8.0, 30.0, TIMES)
+    # 16 m of braking at 2 m/s² begin after 14 m: at 1.75 s.
+    np.testing.assert_allclose(way[TIMES <= 1.75], 8.0 * TIMES[TIMES <= 1.75])
+    assert speed[TIMES == 3.75] == pytest.approx(4.0)
+    assert (way[-1], speed[-1]) == pytest.approx((30.0, 0.0))

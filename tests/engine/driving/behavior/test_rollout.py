@@ -26,9 +26,9 @@ def leader(gap: float, speed: float) -> Surroundings:
     shape = (1, len(TIMES))
     s = (FRONT + gap + 2.5 + speed * TIMES)[None]
     ones = np.ones(shape)
-    still = np.zeros(1)
+    still, no = np.zeros(1), np.zeros(1, bool)
     return Surroundings(
-        s, 0 * ones, 2.5 * ones, ones, speed * ones, still, (0,), np.ones(1, bool), still, ones < 0, np.zeros(1, bool)
+        s, 0 * ones, 2.5 * ones, ones, speed * ones, still, (0,), np.ones(1, bool), still, ones < 0, no, no
     )
 
 

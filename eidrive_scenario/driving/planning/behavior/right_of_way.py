@@ -1,0 +1,122 @@
+"""Right of way at junctions without lights: signs, priority to the right, and oncoming traffic before left turns."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.perception.traffic_lights import StopLine, places_along, stop_lines
+from eidrive_scenario.roads import RoadNetwork
+
+BEFORE_ENTRY = 25.0
+"""Maximum distance of a sign before the junction to which it belongs [m]."""
+BEYOND_ENTRY = 2.0
+"""Maximum distance of a sign behind the entry [m]."""
+NEAR = 3.0
+"""Distance from a way within which a stop line may hold its traffic [m]."""
+ALIKE, OPPOSITE = math.radians(30.0), math.radians(150.0)
+"""Angles between two entries below which they have the same direction, and from which on they are oncoming [rad]."""
+TURNING = math.radians(30.0)
+"""Change of the heading in a junction from which on a vehicle turns [rad]."""
+
+
+class Passage(NamedTuple):
+    """Passage of a way through a junction.
+
+    start, end  distances along the way [m];  heading  at the entry [rad];  turn  change of heading, left positive [rad]
+    gives_way   whether a stop sign or a sign to give way stands before it;  has_light  whether a light controls it
+    """
+
+    junction: str
+    start: float
+    end: float
+    heading: float
+    turn: float
+    gives_way: bool
+    has_light: bool
+
+
+class JunctionRules:
+    """Junctions of a road network with their signs."""
+
+    def __init__(self, roads: RoadNetwork) -> None:
+        self._roads = roads
+        self._lines = stop_lines(roads, with_give_way=True)
+        keys = [key for key, _ in roads.tables.lane_keys()]
+        self._junction = [roads.road(key.road).junction_id for key in keys]
+        self._keeps_right = all(road.rule == "RHT" for road in roads.roads.values())
+
+    def stops_along(self, points: Array) -> tuple[float, ...]:
+        """Return the distances along a way (M, 2) at which stop signs hold its traffic [m]."""
+        lines = self._lines_near(points)
+        return tuple(sorted(place for place, line in places_along(lines, points) if line.kind == "stop sign"))
+
+    def passages(self, points: Array) -> tuple[Passage, ...]:
+        """Return the junctions that a way (M, 2) passes, in their order."""
+        step = np.diff(points, axis=0)
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
+        heading = np.arctan2(step[:, 1], step[:, 0])
+        inside: list[set[str]] = [set() for _ in points]
+        rows, _, owners = self._roads.overlapped_lanes(points[:, 0].copy(), points[:, 1].copy())
+        for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):
+            junction = self._junction[row]
+            if junction is not None:
+                inside[owner].add(junction)
+        signs = list(places_along(self._lines_near(points), points))
+        found = []
+        for junction in dict.fromkeys(name for names in inside for name in sorted(names)):
+            first = next(index for index, names in enumerate(inside) if junction in names)
+            last = first
+            while last + 1 < len(points) and junction in inside[last + 1]:
+                last += 1
+            found.append(self._passage(junction, along, heading, first, last, signs))
+        return tuple(found)
+
+    def _lines_near(self, points: Array) -> list[StopLine]:
+        """Return the stop lines in the extent of a way (M, 2)."""
+        (left, bottom), (right, top) = points.min(axis=0) - NEAR, points.max(axis=0) + NEAR
+        return [line for line in self._lines if left <= line.x <= right and bottom <= line.y <= top]
+
+    def _passage(
+        self,
+        junction: str,
+        along: Array,
+        heading: Array,
+        first: int,
+        last: int,
+        signs: list[tuple[float, StopLine]],
+    ) -> Passage:
+        start, end = float(along[first]), float(along[last])
+        here = [line for place, line in signs if start - BEFORE_ENTRY <= place <= start + BEYOND_ENTRY]
+        before = float(heading[max(first - 1, 0)])
+        turn = float(wrap_angle(float(heading[min(last, len(heading) - 1)]) - before))
+        return Passage(
+            junction,
+            start,
+            end,
+            before,
+            turn,
+            any(line.kind != "light" for line in here),
+            any(line.kind == "light" for line in here),
+        )
+
+    def gives_way(self, own: Passage, other: Passage) -> bool:
+        """Return whether traffic on one passage gives way to traffic on another one of the same junction.
+
+        The order of precedence: lights, signs, priority to the right, oncoming traffic before left turns. In countries
+        with traffic on the left the sides are exchanged.
+        """
+        side = 1.0 if self._keeps_right else -1.0
+        relation = side * float(wrap_angle(other.heading - own.heading))
+        own_turn, other_turn = side * own.turn, side * other.turn
+        if own.gives_way != other.gives_way and not own.has_light:
+            return own.gives_way
+        if abs(relation) >= OPPOSITE:
+            return own_turn > TURNING and other_turn <= TURNING
+        if own.has_light or abs(relation) <= ALIKE:
+            return False
+        return relation > 0.0

@@ -1,0 +1,103 @@
+"""Right of way on roads of the library, by the rules of the road."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
+from eidrive_scenario.roads import RoadNetwork
+
+ROADS = Path(__file__).parents[4] / "xosc" / "roads"
+
+IN = {
+    "four_way_junction": {"west": (-20.0, 0.0), "east": (100.0, 3.5), "south": (43.8, -60.0), "north": (40.3, 60.0)},
+    "t_junction": {"west": (-20.0, 0.5), "east": (100.0, 4.0), "north": (29.8, 60.0)},
+    "roundabout": {"west": (-20.0, 0.0), "circle": (39.9, 15.9)},
+}
+"""Places on lanes into the junctions."""
+OUT = {
+    "four_way_junction": {"west": (-20.0, 3.5), "east": (100.0, 0.0), "south": (40.3, -60.0), "north": (43.8, 60.0)},
+    "t_junction": {"west": (-20.0, 4.0), "east": (100.0, 0.5), "north": (33.3, 60.0)},
+    "roundabout": {"south": (52.3, -72.3)},
+}
+"""Places on lanes out of the junctions."""
+
+
+@cache
+def rules(name: str) -> JunctionRules:
+    return JunctionRules(RoadNetwork.load(ROADS / f"{name}.xodr"))
+
+
+def way(name: str, start: str, end: str) -> Array:
+    roads = RoadNetwork.load(ROADS / f"{name}.xodr")
+    first, last = roads.locate_at(*IN[name][start]), roads.locate_at(*OUT[name][end])
+    assert first is not None
+    assert last is not None
+    return np.asarray(roads.route(first, last).polyline(1.0))[:, :2]
+
+
+def passage(name: str, start: str, end: str) -> Passage:
+    """Return the first passage of a way."""
+    return rules(name).passages(way(name, start, end))[0]
+
+
+def gives_way(name: str, own: str, other: str) -> bool:
+    """Return whether `own` gives way to `other`, both as "from to"."""
+    first, second = (passage(name, *text.split()) for text in (own, other))
+    return rules(name).gives_way(first, second)
+
+
+def test_passage_has_entry_and_turn() -> None:
+    found = passage("four_way_junction", "west", "north")
+    # The way is at x = -20 m first, the junction begins at 29 m.
+    assert found.start == pytest.approx(49.0, abs=1.5)
+    assert found.heading == pytest.approx(0.0, abs=0.02)
+    assert found.turn == pytest.approx(math.pi / 2, abs=0.1)
+    assert passage("four_way_junction", "south", "east").turn == pytest.approx(-math.pi / 2, abs=0.1)
+    assert passage("four_way_junction", "east", "west").turn == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "expected"),
+    [
+        ("west east", "south north", True),  # from the right
+        ("south north", "west east", False),
+        ("west east", "north south", False),  # from the left
+        ("west east", "east west", False),
+        ("west north", "east west", True),  # left turn before oncoming traffic
+        ("east west", "west north", False),
+        ("west north", "east south", False),  # two left turns
+        ("west south", "east west", False),  # right turn
+        ("north west", "west east", True),
+    ],
+)
+def test_priority_to_the_right_and_left_turns(own: str, other: str, expected: bool) -> None:
+    assert gives_way("four_way_junction", own, other) == expected
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "expected"),
+    [("north east", "west east", True), ("west east", "north east", False), ("east north", "north west", False)],
+)
+def test_stop_sign_has_precedence_over_the_right(own: str, other: str, expected: bool) -> None:
+    assert passage("t_junction", "north", "east").gives_way
+    assert gives_way("t_junction", own, other) == expected
+
+
+def test_entry_of_a_roundabout_gives_way_to_the_circle() -> None:
+    assert passage("roundabout", "west", "south").gives_way
+    assert gives_way("roundabout", "west south", "circle south")
+    assert not gives_way("roundabout", "circle south", "west south")
+
+
+def test_stop_sign_is_on_the_ways_that_it_controls() -> None:
+    (place,) = rules("t_junction").stops_along(way("t_junction", "north", "west"))
+    # From y = 60 m to the sign at s = 0.5 m of a road that begins at y = 12.8 m.
+    assert place == pytest.approx(60.0 - 13.3, abs=1.0)
+    assert rules("t_junction").stops_along(way("t_junction", "west", "east")) == ()

@@ -1,0 +1,66 @@
+"""Evaluation of proposals: time gaps to crossing traffic, by the right of way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
+from eidrive_scenario.driving.planning.behavior.proposals import Proposal
+from eidrive_scenario.driving.planning.behavior.rollout import Rollout
+from eidrive_scenario.driving.planning.behavior.scoring import evaluate
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+
+TIMES = np.arange(0.0, 8.01, 0.25)
+SETTINGS = BehaviorSettings()
+SPEED = 10.0
+
+
+def crossing_car(place: float, arrival: float, *, yields: bool) -> Surroundings:
+    """Return a car of 4 m by 2 m that crosses the line from the right with 10 m/s; its center is there at `arrival`."""
+    ones, no = np.ones((1, len(TIMES))), np.zeros(1, bool)
+    return Surroundings(
+        place * ones,
+        (SPEED * (TIMES - arrival))[None],
+        ones,
+        2.0 * ones,
+        0.0 * ones,
+        np.full(1, SETTINGS.lateral_margin),
+        (0,),
+        np.ones(1, bool),
+        np.zeros(1),
+        ones > 0,
+        no,
+        np.array([yields]),
+    )
+
+
+def risk(arrival: float, *, yields: bool) -> float:
+    """Return the risk of a car with 10 m/s that passes the place of crossing after 3 s."""
+    rolled = Rollout((SPEED * TIMES)[None], np.full((1, len(TIMES)), SPEED), np.full((1, 4), -1))
+    found = evaluate(
+        [Proposal(0, 1.0, "all", 4.0)],
+        [LateralProfile("route", (0.0,), (0.0,))],
+        rolled,
+        crossing_car(3.0 * SPEED, arrival, yields=yields),
+        TIMES,
+        Body(3.8, 1.0, 2.85, 0.9),
+        SETTINGS,
+        SPEED,
+        "route",
+        np.inf,
+    )
+    return float(found.risk[0])
+
+
+@pytest.mark.parametrize(
+    ("arrival", "without", "with_right_of_way"),
+    # The rear passes the car's way at 3.2 s; its front is there 0.3 s before its center.
+    [(4.0, True, True), (4.5, False, True), (5.5, False, True), (6.0, False, False), (1.5, False, False)],
+)
+def test_traffic_with_the_right_of_way_needs_a_larger_gap(
+    arrival: float, without: bool, with_right_of_way: bool
+) -> None:
+    assert (risk(arrival, yields=False) > 0.0) == without
+    assert (risk(arrival, yields=True) > 0.0) == with_right_of_way
