@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ DISPLACED = 5.0
 
 @dataclass(frozen=True)
 class Stop:
-    """Standstill from `time` for `duration` [s] at x, y [m]; `reason` is that of the plan at its end."""
+    """Standstill from `time` for `duration` [s] at x, y [m]; `reason` is the most frequent one of the plans."""
 
     time: float
     duration: float
@@ -49,7 +50,7 @@ class DrivenMotion:
         self._speeds: list[float] = []
         self._place: tuple[float, float] | None = None
         self._stopped_at: float | None = None
-        self._reason = ""
+        self._reasons: Counter[str] = Counter()
 
     def observe(self, frame: Frame, criteria: Iterable[Criterion]) -> None:
         """Add a frame, which the criteria have observed."""
@@ -71,7 +72,8 @@ class DrivenMotion:
             if self._stopped_at is None:
                 self._stopped_at = view.time
             step = frame.steps.get(self._name)
-            self._reason = step.plan.reason if step is not None and step.plan is not None else ""
+            if step is not None and step.plan is not None:
+                self._reasons[step.plan.reason] += 1
         if any(self._name in (contact.first, contact.second) for contact in view.contacts):
             self._add_contacts(view.time, criteria)
 
@@ -82,8 +84,10 @@ class DrivenMotion:
 
     def _end_stop(self, time: float) -> None:
         if self._stopped_at is not None and self._place is not None:
-            self.stops.append(Stop(self._stopped_at, time - self._stopped_at, *self._place, self._reason))
+            reason = max(self._reasons, key=lambda one: self._reasons[one], default="")
+            self.stops.append(Stop(self._stopped_at, time - self._stopped_at, *self._place, reason))
         self._stopped_at = None
+        self._reasons.clear()
 
     def _add_contacts(self, time: float, criteria: Iterable[Criterion]) -> None:
         metrics = next(one.metrics() for one in criteria if one.name == CONTACT)

@@ -20,6 +20,12 @@ GREEN, YELLOW, ALL_RED = 10.0, 3.0, 2.0
 """Durations of the phases of a traffic light [s]."""
 DEFAULT_SPEED = 50.0 / 3.6
 """Speed on roads without a stated limit [m/s]."""
+FASTEST = 130.0 / 3.6
+"""Maximum speed for the estimate of the time [m/s]."""
+SHARE = 0.7
+"""Mean speed between lights over the speed limit, for the estimate of the time."""
+WAIT = 15.0
+"""Mean delay at a junction with traffic lights, for the estimate of the time [s]."""
 SHORTEST = 10.0
 """Minimum length of a lane with a waypoint [m]."""
 START_LENGTH = 40.0
@@ -33,8 +39,7 @@ MIX = (("seat_leon", 4), ("tesla_model3", 4), ("van", 2), ("truck", 1), ("motorb
 
 TEMPLATE = """<?xml version="1.0" encoding="UTF-8"?>
 <!--
-{vehicles} vehicles of background traffic on {name}. The ego drives a random route (seed {seed}), at the speed limits in
-{seconds:.0f} s.
+{vehicles} vehicles of background traffic on {name}; random route of the ego of about {seconds:.0f} s (seed {seed}).
 -->
 <OpenSCENARIO>
    <FileHeader revMajor="1" revMinor="3" date="2026-11-21T00:00:00" author="eidrive-scenario" description="{name}"/>
@@ -128,10 +133,9 @@ def write_town_drive(
 ) -> None:
     """Write a scenario in which the ego drives about `minutes` on a random route. Raise SettingError if none exists.
 
-    Half of the time is for the route at the speed limits, the other half for lights and traffic. The run ends at the
-    end of the route, or after twice the time.
+    The run ends at the end of the route, or after twice the time.
     """
-    seconds = 30.0 * minutes
+    seconds = 60.0 * minutes
     way = draw_way(roads, seed, seconds)
     places = waypoints(roads, way)
     length = roads.route(places[0], places[-1], places[1:-1]).length
@@ -166,7 +170,7 @@ def write_town_drive(
 
 
 def draw_way(roads: RoadNetwork, seed: int, seconds: float) -> list[LaneKey]:
-    """Return lanes of a random way that takes at least this time at the speed limits [s].
+    """Return lanes of a random way that takes about this time in traffic, at least [s].
 
     It starts and ends on lanes outside of junctions, and changes lanes only where its lane has no successor. Lanes from
     which it could not return, such as dead ends, are left out. Raise SettingError if no lane is left.
@@ -190,7 +194,10 @@ def draw_way(roads: RoadNetwork, seed: int, seconds: float) -> list[LaneKey]:
         if onward:
             section = roads.roads[way[-1].road].sections[way[-1].section]
             limit = roads.speed_limit(way[-1].road, section.s + 0.5 * section.length, way[-1].lane)
-            time += graph.nodes[way[-1]]["length"] / (limit or DEFAULT_SPEED)
+            time += graph.nodes[way[-1]]["length"] / (SHARE * min(limit or DEFAULT_SPEED, FASTEST))
+            junction = roads.junctions.get(roads.roads[way[-1].road].junction_id or "")
+            entered = junction is not None and roads.roads[way[-2].road].junction_id != junction.id
+            time += WAIT if junction is not None and entered and junction.controllers else 0.0
     return way
 
 

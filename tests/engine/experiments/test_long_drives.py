@@ -28,7 +28,7 @@ def ring(folder: Path, radius: float = 80.0) -> Path:
 
 
 def test_way_is_random_and_as_long_as_requested(tmp_path: Path) -> None:
-    """At 50 km/h a way of 100 s is longer than 1388 m."""
+    """At 70 % of 50 km/h a way of 100 s is 972 m long; it ends with the half circle in which it reaches that length."""
     roads = RoadNetwork.load(ring(tmp_path))
     ways = [draw_way(roads, seed, 100.0) for seed in range(6)]
     assert ways[0] == draw_way(roads, 0, 100.0)
@@ -36,7 +36,7 @@ def test_way_is_random_and_as_long_as_requested(tmp_path: Path) -> None:
     for way in ways:
         places = waypoints(roads, way)
         length = roads.route(places[0], places[-1], places[1:-1]).length
-        assert 1388.0 - 2.0 * 3.15 * 80.0 < length < 1388.0 + 2.0 * 3.15 * 80.0
+        assert 972.0 - 2.0 * 3.15 * 80.0 < length < 972.0 + 2.0 * 3.15 * 80.0
         assert all(roads.graph.edges[one, two]["kind"] == "successor" for one, two in pairwise(way))
 
 
@@ -87,7 +87,7 @@ def test_table_lists_long_stops_with_their_reason() -> None:
 
 
 def test_main_drives_a_ring_with_traffic_to_the_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Half a minute is a route of 15 s at 50 km/h, about 210 m, plus the rest of the last half circle."""
+    """Half a minute at 70 % of 50 km/h are 292 m, plus the rest of the last half circle."""
     arguments = [str(ring(tmp_path)), "--minutes", "0.5", "--vehicles", "4", "--out", str(tmp_path), "--workers", "1"]
     long_drives.main(arguments)
     (row,) = capsys.readouterr().out.splitlines()[2:3]
