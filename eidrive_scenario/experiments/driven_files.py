@@ -34,7 +34,7 @@ ORACLE = {"detector": "oracle", "mount": "roof", "range": 150}
 """Perception of the driven vehicle."""
 TIME_LIMIT = 60.0
 """Maximum simulated time of a run [s]."""
-AT_ONCE = 50
+AT_ONCE = 20
 """Number of runs after which the record is extended."""
 
 
