@@ -17,12 +17,15 @@ from pathlib import Path
 
 from rich.console import Console
 
+from eidrive_scenario.errors import EidriveError
 from eidrive_scenario.experiments.driven_motion import CONTACT, DrivenMotion, Stop
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.experiments.town_drives import EGO, write_town_drive
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation
 
+LONGEST = 600.0
+"""Maximum duration of a drive [min]."""
 LONG = 20.0
 """Minimum duration of a stop that the table lists [s]."""
 
@@ -103,11 +106,32 @@ def table(drives: Sequence[LongDrive]) -> str:
     return text + ("\n" + "\n".join([f"Stops of at least {LONG:g} s:", "", *listed]) + "\n" if listed else "")
 
 
+def minutes(text: str) -> float:
+    """Return a duration of a drive from a text [min]. Raise ValueError if it is not positive, or too long."""
+    value = float(text)
+    if not 0.0 < value <= LONGEST:
+        raise ValueError(text)
+    return value
+
+
+def _jobs(options: argparse.Namespace, folder: Path, settings: RunSettings) -> list[Job]:
+    """Write the scenario of each map and seed and return its run."""
+    jobs = []
+    for road_map in options.maps:
+        roads = RoadNetwork.load(road_map)
+        for seed in range(1, options.seeds + 1):
+            path = folder / f"{road_map.stem}_{seed}.xosc"
+            size = {"vehicles": options.vehicles, "minutes": options.minutes}
+            write_town_drive(roads, path, road_map=road_map, seed=seed, **size)
+            jobs.append(Job(str(path), options.planner, seed, settings))
+    return jobs
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("maps", type=Path, nargs="+", help="OpenDRIVE files with closed ways")
     parser.add_argument("--vehicles", type=int, default=30, help="number of vehicles of background traffic")
-    parser.add_argument("--minutes", type=float, default=10.0, help="approximate duration of a drive")
+    parser.add_argument("--minutes", type=minutes, default=10.0, help="approximate duration of a drive")
     parser.add_argument("--seeds", type=int, default=1, help="number of seeds, from 1")
     parser.add_argument("--planner", default="behavior")
     parser.add_argument("--out", type=Path, default=Path("reports"))
@@ -120,16 +144,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         criteria={"collision": {"of": EGO, "name": CONTACT}},
         time_limit=max(180.0 * options.minutes, 60.0),
     )
-    jobs = []
-    for road_map in options.maps:
-        roads = RoadNetwork.load(road_map)
-        for seed in range(1, options.seeds + 1):
-            path = folder / f"{road_map.stem}_{seed}.xosc"
-            write_town_drive(
-                roads, path, road_map=road_map, vehicles=options.vehicles, seed=seed, minutes=options.minutes
-            )
-            jobs.append(Job(str(path), options.planner, seed, settings))
-    drives = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="long drives")
+    try:
+        jobs = _jobs(options, folder, settings)
+        drives = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="long drives")
+    except EidriveError as error:
+        parser.error(str(error))
     result = table(drives)
     (options.out / "long_drives.md").write_text(result, encoding="utf-8")
     sys.stdout.write(result)

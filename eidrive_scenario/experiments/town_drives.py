@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -24,8 +23,10 @@ FASTEST = 130.0 / 3.6
 """Maximum speed for the estimate of the time [m/s]."""
 SHARE = 0.7
 """Mean speed between lights over the speed limit, for the estimate of the time."""
-WAIT = 15.0
+WAIT = 20.0
 """Mean delay at a junction with traffic lights, for the estimate of the time [s]."""
+LONG = 100.0
+"""Minimum length of a lane with two waypoints [m]."""
 SHORTEST = 10.0
 """Minimum length of a lane with a waypoint [m]."""
 START_LENGTH = 40.0
@@ -186,7 +187,7 @@ def draw_way(roads: RoadNetwork, seed: int, seconds: float) -> list[LaneKey]:
     rng = generator(seed, "town drive")
     way = [starts[int(rng.integers(len(starts)))]]
     time = 0.0
-    while time < seconds or not _is_open(roads, way[-1]):
+    while time < seconds or len(way) < 2 or not _is_open(roads, way[-1]):
         edges = [(key, edge["kind"]) for key, edge in sorted(graph[way[-1]].items()) if key in lanes]
         onward = [key for key, kind in edges if kind == "successor"]
         choices = onward or [key for key, kind in edges if key not in way[-2:]] or [key for key, _ in edges]
@@ -207,11 +208,20 @@ def _is_open(roads: RoadNetwork, key: LaneKey) -> bool:
 
 
 def waypoints(roads: RoadNetwork, way: Sequence[LaneKey]) -> list[LaneLocation]:
-    """Return the middle of each lane of a way that is outside of junctions and not left by a lane change."""
-    left = {number for number, (one, two) in enumerate(pairwise(way)) if one[:2] == two[:2]}
-    kept = [key for number, key in enumerate(way) if number not in left and _is_open(roads, key)]
-    sections = [(key, roads.roads[key.road].sections[key.section]) for key in kept]
-    return [roads.location(key.road, key.lane, section.s + 0.5 * section.length) for key, section in sections]
+    """Return places on each lane of a way that is outside of junctions and not left by a lane change.
+
+    A long lane has two, so that a route can lead around a ring of one lane.
+    """
+    found = []
+    for number, key in enumerate(way):
+        following = way[number + 1] if number + 1 < len(way) else key
+        if _is_open(roads, key) and (following == key or following[:2] != key[:2]):
+            section = roads.roads[key.road].sections[key.section]
+            shares = (1.0 / 3.0, 2.0 / 3.0) if section.length >= LONG else (0.5,)
+            forward = roads.driving_direction(key.road, key.lane) > 0
+            along = [section.length * (share if forward else 1.0 - share) for share in shares]
+            found += [roads.location(key.road, key.lane, section.s + s) for s in along]
+    return found
 
 
 def _position(place: LaneLocation) -> str:
