@@ -25,6 +25,8 @@ SHARE = 0.7
 """Mean speed between lights over the speed limit, for the estimate of the time."""
 WAIT = 20.0
 """Mean delay at a junction with traffic lights, for the estimate of the time [s]."""
+TURN = 8.0
+"""Mean delay at a junction without traffic lights, for the estimate of the time [s]."""
 LONG = 100.0
 """Minimum length of a lane with two waypoints [m]."""
 SHORTEST = 10.0
@@ -198,7 +200,8 @@ def draw_way(roads: RoadNetwork, seed: int, seconds: float) -> list[LaneKey]:
             time += graph.nodes[way[-1]]["length"] / (SHARE * min(limit or DEFAULT_SPEED, FASTEST))
             junction = roads.junctions.get(roads.roads[way[-1].road].junction_id or "")
             entered = junction is not None and roads.roads[way[-2].road].junction_id != junction.id
-            time += WAIT if junction is not None and entered and junction.controllers else 0.0
+            if junction is not None and entered:
+                time += WAIT if junction.controllers else TURN
     return way
 
 

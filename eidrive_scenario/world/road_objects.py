@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import LaneLocation, PlacedObject, Pose, RoadNetwork, Signal, outlines, placed_objects
 from eidrive_scenario.world.actor import Vector3
 
@@ -58,6 +59,12 @@ TRUNK = 0.05
 """Radius of a trunk as a share of the height of the tree."""
 POST = 0.05
 """Radius of the post of a signal [m]."""
+WALL = 0.3
+"""Thickness of the walls of an object with an outline that is far from its box [m]."""
+FILLED = 0.8
+"""Minimum share of its box that an outline covers to be modeled as that box."""
+CONVEX = 4
+"""Maximum number of corners of outlines that are always modeled as boxes."""
 CLEARANCE = 2.1
 """Default height of the lower edge of a signal that the map has on the ground [m]."""
 
@@ -107,26 +114,23 @@ def buildings(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Bui
     """Yield the buildings of a road network as boxes, except objects with some ids."""
     for placed in placed_objects(roads):
         if placed.object.type == "building" and placed.object.id not in without:
-            yield _building(roads, placed)
+            yield from _building(roads, placed)
 
 
-def _building(roads: RoadNetwork, placed: PlacedObject) -> Building:
-    """Return the box around an object of the road network."""
-    entry, pose = placed.object, placed.pose
-    length, width, height = placed.length or 1.0, placed.width or 1.0, placed.height or STOREY
-    if entry.outlines and not entry.repeats:
-        pose, length, width = bounding_box(roads, placed)
-        height = max([height, *(corner.height for outline in entry.outlines for corner in outline)])
-    center = (pose.x, pose.y, pose.z + height / 2)
-    return Building(entry.name or f"building {entry.id}", center, (length, width, height), pose.h)
+def _building(roads: RoadNetwork, placed: PlacedObject) -> Iterator[Building]:
+    """Yield the boxes of a building of the road network."""
+    entry = placed.object
+    height = max([placed.height or STOREY, *(corner.height for outline in entry.outlines for corner in outline)])
+    for pose, length, width in footprint(roads, placed):
+        center = (pose.x, pose.y, pose.z + height / 2)
+        yield Building(entry.name or f"building {entry.id}", center, (length or 1.0, width or 1.0, height), pose.h)
 
 
 def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[RoadObjectBody]:
     """Yield the bodies of all objects and signal posts of a road network, except objects with some ids."""
     for placed in placed_objects(roads):
-        found = _object_body(roads, placed) if placed.object.id not in without else None
-        if found is not None:
-            yield found
+        if placed.object.id not in without:
+            yield from _object_bodies(roads, placed)
     for head in signal_heads(roads):
         if head.carried:
             foot = roads.road_pose_at(head.signal.place.road, head.signal.place.s, head.signal.place.t)
@@ -178,29 +182,54 @@ def _drivable(roads: RoadNetwork, here: LaneLocation) -> bool:
     return found is not None and found.drivable
 
 
-def _object_body(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | None:
+def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObjectBody]:
     entry = placed.object
     kind = _KINDS.get(entry.type)
     if kind is None and entry.type in _WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
         kind = "obstacle"
     if kind is None:
-        return None
-    pose, length, width = placed.pose, placed.length, placed.width
-    height = max([placed.height, *(corner.height for outline in entry.outlines for corner in outline)])
-    if entry.outlines and not entry.repeats:
-        pose, length, width = bounding_box(roads, placed)
+        return
     usual = SIZES[kind]
-    length, width, height = length or usual[0], width or usual[1], height or usual[2]
+    height = max([placed.height, *(corner.height for outline in entry.outlines for corner in outline)]) or usual[2]
     if height < LEAST:
-        return None
+        return
     name = entry.name or f"{kind} {entry.id}"
-    if kind == "tree":
-        return RoadObjectBody(name, kind, pose, length, width, height, TRUNK * height)
-    if kind == "vegetation":
-        return RoadObjectBody(name, kind, pose, length, width, height, solid=False)
-    if kind in ("pole", "lamp", "guide post") or entry.radius:
-        return RoadObjectBody(name, kind, pose, length, width, height, max(length, width) / 2)
-    return RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
+    for pose, given_length, given_width in footprint(roads, placed):
+        length, width = given_length or usual[0], given_width or usual[1]
+        if kind == "tree":
+            yield RoadObjectBody(name, kind, pose, length, width, height, TRUNK * height)
+        elif kind == "vegetation":
+            yield RoadObjectBody(name, kind, pose, length, width, height, solid=False)
+        elif kind in ("pole", "lamp", "guide post") or entry.radius:
+            yield RoadObjectBody(name, kind, pose, length, width, height, max(length, width) / 2)
+        else:
+            yield RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
+
+
+def footprint(roads: RoadNetwork, placed: PlacedObject) -> list[tuple[Pose, float, float]]:
+    """Return the boxes on the ground of an object: pose of the center of the base, length and width [m].
+
+    It is the box around its outlines, or a wall along each edge of an outline that covers too little of that box.
+    """
+    entry = placed.object
+    if not entry.outlines or entry.repeats:
+        return [(placed.pose, placed.length, placed.width)]
+    box = bounding_box(roads, placed)
+    polygons = outlines(roads, entry)
+    if len(polygons) == 1 and len(polygons[0]) > CONVEX and _area(polygons[0]) < FILLED * box[1] * box[2]:
+        corners = polygons[0]
+        return [_wall(one, two) for one, two in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    return [box]
+
+
+def _area(polygon: Array) -> float:
+    x, y = polygon[:, 0], polygon[:, 1]
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0)
+
+
+def _wall(one: Array, two: Array) -> tuple[Pose, float, float]:
+    (x, y, z), (dx, dy, dz) = ((one + two) / 2.0).tolist(), (two - one).tolist()
+    return Pose(x, y, z - abs(dz) / 2.0, math.atan2(dy, dx), 0.0, 0.0), math.hypot(dx, dy), WALL
 
 
 def bounding_box(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:

@@ -180,3 +180,16 @@ def test_ray_hits_one_of_ten_thousand_posts() -> None:
     with World(roads) as world:
         hit = world.raycast((50.0, -2.0, 0.5), [(50.0, -20.0, 0.5)])
     assert hit.position[0, 1] == pytest.approx(-8.91, abs=0.05)
+
+
+@pytest.mark.parametrize("kind", ["obstacle", "building"])
+def test_body_with_a_concave_outline_leaves_its_notch_free(kind: str) -> None:
+    """An outline in the form of a U opens to the road: a ray enters up to the inner wall 6 m behind the opening."""
+    corners = ((0, 0), (2, 0), (2, 6), (8, 6), (8, 0), (10, 0), (10, 8), (0, 8))
+    outline = "".join(f'<cornerLocal u="{u}" v="{-v}" z="0" height="3"/>' for u, v in corners)
+    size = 'length="10" width="8" height="3"'
+    roads = network(f'type="{kind}" s="50" t="-9" zOffset="0" {size}><outline>{outline}</outline>')
+    with World(roads) as world:
+        hits = world.raycast([[55.0, -2.0, 1.0], [51.0, -2.0, 1.0]], [[55.0, -30.0, 1.0], [51.0, -30.0, 1.0]])
+    assert hits.position[0] == pytest.approx([55.0, -15.0, 1.0], abs=0.2)
+    assert hits.position[1] == pytest.approx([51.0, -9.0, 1.0], abs=0.2)
