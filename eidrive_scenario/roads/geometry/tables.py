@@ -215,15 +215,15 @@ class RoadTables:
         reach = np.abs(offset)
         row = np.where(count > 0, first, self.first_lane[section] + np.where(left + right > 0, 1, 0))
         outside = np.where(count > 0, 0.0, reach)
-        open_ = np.flatnonzero(count > 0)
-        for k in range(int(count.max(initial=0))):
-            row[open_] = first[open_] + k
-            over = reach[open_] - self.outer.value(row[open_], ds[open_])
-            last = k + 1 >= count[open_]
-            outside[open_[last]] = np.maximum(over[last], 0.0)
+        open_ = (count > 0).nonzero()[0]
+        while open_.size:
+            lane = row[open_]
+            over = reach[open_] - self.outer.value(lane, ds[open_])
+            last = lane + 1 >= first[open_] + count[open_]
+            ends = open_[last]
+            outside[ends] = np.maximum(over[last], 0.0)
             open_ = open_[(over >= 0.0) & ~last]
-            if not open_.size:
-                break
+            row[open_] += 1
         return row, outside
 
 

@@ -56,7 +56,7 @@ class Course:
         ahead = (x - x0) * ux + (y - y0) * uy
         return float(self.along[index]) + ahead, (y - y0) * ux - (x - x0) * uy, math.atan2(uy, ux)
 
-    def poses(self, along: Array, left: Array) -> tuple[Array, Array, Array]:
+    def poses(self, along: Array, left: Array | float) -> tuple[Array, Array, Array]:
         """Return x, y and heading (K,) at distances along the course and offsets to the left; straight beyond it."""
         index = self._inside.searchsorted(along, side="right")
         ux, uy = self._unit[index].T

@@ -129,13 +129,13 @@ class Predictor:
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
             aside = known.speed * math.sin(turn)
-            drift = np.zeros(len(times))
+            offset: float | Array = left
             if abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error):
-                drift = np.clip(aside * times, -LANE_WIDTH, LANE_WIDTH)
+                offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
             way, speeds = _held_by_sign(known, course, along, times) or (travelled, speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
-            found.append(Hypothesis(course.poses(along + way, left + drift), speeds, room, ahead))
+            found.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead))
             if len(found) == MOST_HYPOTHESES:
                 break
         if not found:

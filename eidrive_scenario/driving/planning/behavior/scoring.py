@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
 from eidrive_scenario.driving.planning.behavior.oncoming import first_oncoming, meets_oncoming
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal
@@ -17,6 +17,8 @@ CONTACT = 0.1
 """Distance below which bodies are taken to touch [m]."""
 CLEAR_AHEAD = 1.0
 """Clearance along the line below which a proposal is risky on a collision course [m]."""
+ROUNDING = 1e-6
+"""More than the error of sums of distances [m]."""
 PROGRESS, RISK, COMFORT, ASIDE, ONCOMING, SWITCH = 5.0, 6.0, 1.5, 0.15, 0.4, 0.3
 """Weights of the score: progress as in PDM-Closed; the others are relative to it. ASIDE and ONCOMING per use of another
 lane, SWITCH for another maneuver than the current one."""
@@ -72,9 +74,11 @@ def evaluate(
         front[rows], rear[rows] = profile.offset(place + ego.wheelbase), profile.offset(place)
     collision, risk = np.full(count, np.inf), np.zeros(count)
     impact, cause = np.zeros(count), np.full(count, -1)
-    if len(scene):
-        touching, lack = _overlaps(rolled, (front, rear), scene, times, ego, settings)
+    near = _near(rolled, (front, rear), scene, ego)
+    if near.size:
+        touching, lack = _overlaps(rolled, (front, rear), scene.rows(near), times, ego, settings)
         collision, step, cause = _first(touching, times)
+        cause = np.where(cause >= 0, near[cause], -1)
         impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
         risk = (lack.max(axis=1) * (1.0 - FARTHER * times / float(times[-1]))).max(axis=1)
     horizon = float(times[-1])
@@ -111,6 +115,17 @@ def _first(found: Bools, times: Array) -> tuple[Array, Array, Array]:
     return np.where(happens, times[step], np.inf), step, np.where(happens, cause, -1)
 
 
+def _near(rolled: Rollout, offsets: tuple[Array, Array], scene: Surroundings, ego: Body) -> Integers:
+    """Return the hypotheses (rows) that any proposal may touch or pass too closely."""
+    aside = max(float(np.abs(part).max(initial=0.0)) for part in offsets) + ego.half_width
+    low, high = float(rolled.s.min(initial=np.inf)) - ego.rear, float(rolled.s.max(initial=-np.inf)) + ego.front
+    margin = np.maximum(scene.margin, CONTACT)[:, None] + ROUNDING
+    beside = np.abs(scene.d) - scene.half_width < aside + margin
+    beside &= scene.s - scene.half_length < high + CLEAR_AHEAD + ROUNDING
+    beside &= scene.s + scene.half_length > low - CLEAR_AHEAD - ROUNDING
+    return np.flatnonzero(beside.any(axis=1) & ~scene.behind)
+
+
 def _overlaps(
     rolled: Rollout,
     offsets: tuple[Array, Array],
@@ -141,9 +156,10 @@ def _overlaps(
         beside = d[:, None, :]
         along = np.abs(scene.s - center) - (scene.half_length + half_length)
         aside = np.abs(scene.d - beside) - (scene.half_width + ego.half_width)
-        touching |= (along < CONTACT) & (aside < CONTACT)
+        meets = aside < CONTACT
+        touching |= (along < CONTACT) & meets
         missing = np.where(along < 0.0, (margin - aside) / margin, 0.0)
-        missing = np.maximum(missing, np.where(aside < CONTACT, (CLEAR_AHEAD - along) / CLEAR_AHEAD, 0.0))
+        missing = np.maximum(missing, np.where(meets, (CLEAR_AHEAD - along) / CLEAR_AHEAD, 0.0))
         lack = np.maximum(lack, np.where(missing > 0.0, LEAST_LACK + (1.0 - LEAST_LACK) * missing, 0.0))
         for rows, (s, place, length, width) in moved:
             along = np.abs(s - center) - (length + half_length)

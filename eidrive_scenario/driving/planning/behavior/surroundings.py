@@ -7,7 +7,7 @@ from collections.abc import Callable
 import msgspec
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
@@ -50,6 +50,22 @@ class Surroundings(msgspec.Struct, frozen=True):
 
     def __len__(self) -> int:
         return len(self.owner)
+
+    def rows(self, rows: Integers) -> Surroundings:
+        """Return some of the hypotheses."""
+        return Surroundings(
+            self.s[rows],
+            self.d[rows],
+            self.half_length[rows],
+            self.half_width[rows],
+            self.speed[rows],
+            self.margin[rows],
+            tuple([self.owner[row] for row in rows.tolist()]),
+            self.certain[rows],
+            self.passing_gap[rows],
+            self.crosses[rows],
+            self.behind[rows],
+        )
 
 
 def surroundings(
