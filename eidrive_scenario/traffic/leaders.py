@@ -113,9 +113,9 @@ def find_leaders(
         if not open_.size:
             break
         if d == 0:
-            at = np.searchsorted(place, row * BIG + progress[open_], side="right")
+            at = place.searchsorted(row * BIG + progress[open_], side="right")
         else:
-            at = np.searchsorted(place, row * BIG - 1.0, side="left")
+            at = place.searchsorted(row * BIG - 1.0, side="left")
         found = order[np.minimum(at, len(order) - 1)]
         hit = (at < len(order)) & (occupants.row[found] == row) & (occupants.owner[found] != me[open_])
         which = found[hit]
@@ -143,7 +143,7 @@ def find_followers(
     open_, offset, at_row = np.arange(count), progress.copy(), row
     for d in range(LOOK_BACK + 1):
         limit = at_row * BIG + (progress[open_] if d == 0 else lanes.length[at_row] + 1.0)
-        at = np.searchsorted(place, limit, side="left" if d == 0 else "right") - 1
+        at = place.searchsorted(limit, side="left" if d == 0 else "right") - 1
         found = order[np.maximum(at, 0)]
         hit = (at >= 0) & (occupants.row[found] == at_row) & (occupants.owner[found] != own[open_])
         which = found[hit]

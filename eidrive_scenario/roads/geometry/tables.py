@@ -72,7 +72,7 @@ class RoadTables:
     def section_of(self, road: Integers, s: Array) -> Integers:
         """Return the running number of the lane section at s (N,) of roads (N,)."""
         keys = self.curves.base[road] + s
-        found: Integers = np.searchsorted(self._section_keys, keys, side="right") - 1
+        found: Integers = self._section_keys.searchsorted(keys, side="right") - 1
         first: Integers = self.first_section[road]
         return np.maximum(found, first)
 

@@ -62,7 +62,7 @@ class CurveTable:
 
     def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
         """Return the curvature and path length per meter of s at s (N,) of lines (N,), as `at` does."""
-        curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
+        curve = np.maximum(self._keys.searchsorted(self.base[line] + s, side="right") - 1, 0)
         ds = s - self._starts[curve]
         curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)
         mask = self._kind[curve] == 2

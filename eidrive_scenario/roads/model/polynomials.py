@@ -126,7 +126,7 @@ class PolynomialTable:
     def _piece(self, function: Integers, s: Array) -> Integers:
         if self._single:
             return function
-        found: Integers = np.searchsorted(self._keys, self.base[function] + s, side="right") - 1
+        found: Integers = self._keys.searchsorted(self.base[function] + s, side="right") - 1
         return found
 
     def value(self, function: Integers, s: Array) -> Array:

@@ -85,7 +85,7 @@ def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
     x, y, radius, moved = np.array([(b.center_x, b.center_y, b.radius, b.moved) for b in bodies]).T
     order = np.argsort(x, kind="stable")
     sorted_x = x[order]
-    last = np.searchsorted(sorted_x, sorted_x + radius[order] + radius.max() + PARTED, side="right")
+    last = sorted_x.searchsorted(sorted_x + radius[order] + radius.max() + PARTED, side="right")
     counts = last - np.arange(len(bodies)) - 1
     left = np.repeat(np.arange(len(bodies)), counts)
     within = np.arange(len(left)) - np.repeat(np.cumsum(counts) - counts, counts)
