@@ -11,7 +11,14 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.car_following import IntelligentDriver
-from eidrive_scenario.driving.planning.behavior.bounds import FREE, Bounds, Course, Limits
+from eidrive_scenario.driving.planning.behavior.bounds import (
+    FREE,
+    Bounds,
+    Course,
+    Limits,
+    WallsOverTime,
+    walls_over_time,
+)
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
@@ -85,13 +92,16 @@ class Roller:
         limits = Limits.ahead(course, start[0], reach)
         leaders = _Leaders(scene, leads, body)
         known: dict[object, _Motion] = {}
+        stops: dict[object, WallsOverTime] = {}
         motions = []
         for row, (proposal, places) in enumerate(zip(proposals, walls, strict=True)):
             number, ahead = leaders.of(row)
-            stops = tuple((wall.s, wall.until) for wall in places)
-            key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, stops)
+            ends = tuple([(wall.s, wall.until) for wall in places])
+            key = (proposal.share, proposal.deceleration, proposal.is_emergency, number, ends)
             if key not in known:
-                bounds = Bounds(proposal.share * course.wanted, limits, places, self._times, 2.0 * self._braking)
+                if ends not in stops:
+                    stops[ends] = walls_over_time(places, self._times)
+                bounds = Bounds(proposal.share * course.wanted, limits, stops[ends], 2.0 * self._braking)
                 known[key] = self._motion(proposal, bounds, start, ahead)
             motions.append(known[key])
         s, speed, cause = zip(*motions, strict=True)

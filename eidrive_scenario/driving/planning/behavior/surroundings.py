@@ -65,6 +65,7 @@ class Surroundings(msgspec.Struct, frozen=True):
             self.passing_gap[rows],
             self.crosses[rows],
             self.behind[rows],
+            self.yields[rows],
         )
 
 
