@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners driven-files long-drives heat-maps library-pictures weather-sheet clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -67,6 +67,9 @@ driven-files: install  ## drive the files of EIDRIVE_CORPORA by the planner: rep
 long-drives: install  ## drive ten minutes through traffic on Town01 and Town04 of EIDRIVE_MAPS: reports/long_drives.md
 	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of Town01.xodr and Town04.xodr'; exit 2; }
 	$(BIN)/python -m eidrive_scenario.experiments.long_drives "$$EIDRIVE_MAPS"/Town01.xodr "$$EIDRIVE_MAPS"/Town04.xodr --out reports
+
+corner-cases: install  ## run the corner cases with and without messages, 10 seeds each: reports/corner_cases.md
+	$(BIN)/python -m eidrive_scenario.experiments.corner_cases --out reports
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet

@@ -152,7 +152,7 @@ class Agent:
                 self.points.own if self.points is not None else None,
                 interval=message_interval,
             ),
-            estimate=ego if self.settings.localization != "oracle" else None,
+            estimate=None if self.perception.has_exact_pose else ego,
         )
 
     def _record_ego_pose(self, ego: EgoState) -> None:

@@ -126,6 +126,8 @@ def build_agent(
             tracker=_tracker(settings, detector),
             localizer=_localizer(spec.name, seed, sensors) if settings.localization == "ekf" else None,
             latency=settings.detector_latency,
+            pose_error=settings.pose_error,
+            false_objects=settings.false_objects,
         ),
         fusion=fusion,
         planner=None

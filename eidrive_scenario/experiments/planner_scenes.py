@@ -37,7 +37,8 @@ class SceneRun:
     collided  whether the ego had a contact;  at_fault  whether one was by its own fault
     arrived   whether it reached its goal
     lost      time in addition to the same distance at the target speed [s]
-    braking   maximum deceleration [m/s²], without the contact of a collision
+    braking   maximum deceleration [m/s²]; that of a collision is included
+    detected  time of the criterion `first_detection` [s]; None without one, and if the actor is never known
     """
 
     scenario: str
@@ -48,6 +49,7 @@ class SceneRun:
     arrived: bool
     lost: float
     braking: float
+    detected: float | None = None
 
 
 def run_of(job: Job) -> SceneRun:
@@ -74,6 +76,7 @@ def run_of(job: Job) -> SceneRun:
         arrived=_passed(result, "reach_position"),
         lost=times[-1] - times[0] - sum(speeds) * dt / max(target, 1.0),
         braking=_hardest_braking(np.array(speeds), dt),
+        detected=next((verdict.value for verdict in result.criteria if verdict.name == "first_detection"), None),
     )
 
 

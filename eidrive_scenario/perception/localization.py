@@ -180,7 +180,7 @@ class Localizer:
             yaw_rate=float(self._imu.angular_rate[2]) - turn_bias if self._imu is not None else 0.0,
             acceleration=float(self._imu.acceleration[0]) - acceleration_bias if self._imu is not None else 0.0,
         )
-        return _at_pose(readings, self._ego)
+        return at_pose(readings, self._ego)
 
     def _first(self, truth: EgoState) -> Estimate:
         seed, *key = self._key
@@ -194,8 +194,8 @@ class Localizer:
         return Estimate(state, np.diag(deviations**2))
 
 
-def _at_pose(readings: Readings, ego: EgoState) -> Readings:
-    """Return the readings as if the station were at its estimated pose."""
+def at_pose(readings: Readings, ego: EgoState) -> Readings:
+    """Return the readings as if the station were at this pose."""
     truth = readings.ego
     turn = ego.yaw - truth.yaw
     cos, sin = math.cos(turn), math.sin(turn)

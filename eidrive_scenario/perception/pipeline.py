@@ -9,6 +9,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
 from eidrive_scenario.perception.localization import PLANE, Localizer
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
@@ -24,6 +25,8 @@ class Perception:
                arrive meanwhile are processed concurrently, each with the same latency
     tracker    None if detections are passed on unchanged
     localizer  None if the station has its true pose
+    pose_error     error of the pose, in addition to that of the localizer
+    false_objects  objects that the detector reports, and that do not exist
     """
 
     def __init__(
@@ -33,6 +36,8 @@ class Perception:
         tracker: TrackingMethod | None = None,
         localizer: Localizer | None = None,
         latency: float = 0.0,
+        pose_error: PoseError | None = None,
+        false_objects: Sequence[FalseObject] = (),
     ) -> None:
         self.detector = detector
         self._checked = is_checked(detector)
@@ -40,6 +45,8 @@ class Perception:
         self._tracker_checked = tracker is not None and not is_built_in(type(tracker))
         self._localizer = localizer
         self._latency = latency
+        self._pose_error = pose_error
+        self._false_objects = false_objects
         self._computing: deque[tuple[float, Detections, Readings]] = deque()
 
     @property
@@ -51,8 +58,15 @@ class Perception:
         return None if self._localizer is None else self._localizer.estimate.covariance[PLANE]
 
     def locate(self, readings: Readings) -> Readings:
-        """Return the readings with the estimated pose of the station if it has a localizer."""
-        return readings if self._localizer is None else self._localizer.with_estimated_pose(readings)
+        """Return the readings with the pose that the station assumes: estimated by its localizer, with its error."""
+        if self._localizer is not None:
+            readings = self._localizer.with_estimated_pose(readings)
+        return readings if self._pose_error is None else with_pose_error(readings, self._pose_error)
+
+    @property
+    def has_exact_pose(self) -> bool:
+        """Whether the assumed pose is the true one."""
+        return self._localizer is None and self._pose_error is None
 
     def signals(self, readings: Readings) -> Sequence[SignalReading]:
         """Return the signals in sight: those that the detector reads, and those of the signal sensor."""
@@ -72,6 +86,8 @@ class Perception:
             found = self.detector.detect(readings)
             if self._checked:
                 check_detections(self.detector, "detect", found)
+            if self._false_objects:
+                found = with_false_objects(found, self._false_objects, with_velocity=self.detector.provides_velocity)
             if self._latency <= 0.0 and not self._computing:
                 return self._track(found, readings)
             self._computing.append((now + self._latency, found, readings))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+from collections.abc import Iterator
+
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.traffic.spawning.generators import MaintainedTraffic, TrafficGenerator
 from eidrive_scenario.traffic.spawning.population import Changes, Population
 from eidrive_scenario.world.view import WorldView
 
@@ -14,6 +17,8 @@ class BackgroundTraffic:
         self.population = population
         self.fleet = population.fleet
         self.instances: list[TrafficGenerator] = []
+        self._maintained: list[MaintainedTraffic] = []
+        """All generators of a number of road users, also those that have stopped."""
         self._started: dict[str, int] = {}
         self._begun = False
 
@@ -30,6 +35,8 @@ class BackgroundTraffic:
     def start(self, instance: TrafficGenerator) -> None:
         """Start a generator. It takes effect from the next step on."""
         self.instances.append(instance)
+        if isinstance(instance, MaintainedTraffic):
+            self._maintained.append(instance)
         self._begun = True
 
     def stop(self, name: str | None) -> None:
@@ -37,6 +44,12 @@ class BackgroundTraffic:
         for instance in self.instances:
             if name is None or instance.name == name:
                 instance.active = False
+
+    def shortages(self) -> Iterator[Diagnostic]:
+        """Yield a warning for each generator whose road users were never complete so far."""
+        for instance in self._maintained:
+            if (shortage := instance.shortage) is not None:
+                yield shortage
 
     def step(self, view: WorldView, dt: float) -> Changes:
         """Run the generators in each decision step, and move all cars by dt."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -45,6 +46,22 @@ def test_swarm_in_init_is_present_after_the_first_step(run: Run) -> None:
     assert not [contact for frame in played.frames for contact in frame.view.contacts]
     moved = {name: played.frames[40].view.row(name) for name in crowd(played, 2.0)}
     assert min(played.frames[40].view.speed[row] for row in moved.values()) > 5.0
+
+
+@pytest.mark.parametrize("continuous", ["true", "false"])
+def test_area_without_room_is_a_warning_with_its_line(run: Run, continuous: str) -> None:
+    """In 20 m of one lane at most two cars of 4.5 m and 2 m standstill gap fit, as they start at speed."""
+    where = road_range(300.0, 320.0, '<Lane id="-1"/>')
+    played = run(1.0, driven=False, ego=(1, 900.0, 0.0), globally=traffic(area(6, continuous, where)))
+    (warning,) = [text for text in played.result.warnings if "traffic 'crowd'" in text]
+    found = re.search(r":(\d+): traffic 'crowd': at most (\d) of 6 road users found a free place", warning)
+    assert found is not None
+    assert 1 <= int(found[2]) <= 2
+
+
+def test_swarm_with_room_is_no_warning(run: Run) -> None:
+    played = run(1.0, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm()))
+    assert not [text for text in played.result.warnings if "road users" in text]
 
 
 def test_swarm_velocity_is_the_initial_speed(run: Run) -> None:

@@ -66,6 +66,7 @@ class TrafficInstanceAction(ActionBehaviour):
         """Run until the generator is stopped."""
         if self._generator is None:
             self._generator = self.build_generator()
+            self._generator.element = self.action
             self.context.start_traffic(self._generator)
         return Status.RUNNING if self._generator.active else Status.SUCCESS
 

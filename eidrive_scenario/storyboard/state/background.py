@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from msgspec.structs import replace
 
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.traffic.background import BackgroundTraffic
 from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
@@ -44,6 +45,11 @@ class BackgroundTrafficPort:
         """Stop all instances of this name; all instances without a name."""
         if self._traffic is not None:
             self._traffic.stop(name)
+
+    def shortages(self) -> Iterator[Diagnostic]:
+        """Yield a warning for each instance whose road users were never complete so far."""
+        if self._traffic is not None:
+            yield from self._traffic.shortages()
 
     def step(self, view: WorldView, dt: float, commands: Commands) -> None:
         """Add spawns, removals and placements of the step that begins with this view to the commands."""

@@ -11,6 +11,8 @@ from functools import partial
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.errors import Diagnostic, quoted
+from eidrive_scenario.openscenario.model import Element
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
@@ -29,10 +31,12 @@ RIM = 0.8
 class TrafficGenerator(CarGroup, ABC):
     """Traffic of one name, from the start of its action until it is stopped.
 
-    key  distinguishes generators of the same name
+    key      distinguishes generators of the same name
+    element  action of the scenario, for messages
     """
 
     key: int
+    element: Element | None = field(default=None, init=False)
     active: bool = field(default=True, init=False)
     _draws: int = field(default=0, init=False)
 
@@ -60,6 +64,8 @@ class MaintainedTraffic(TrafficGenerator):
     count: int
     mixture: TrafficMix
     _again: float = field(default=0.0, init=False)
+    _most: int | None = field(default=None, init=False)
+    """Maximum number of participants at one time; None before the first attempt."""
 
     def is_due(self, population: Population) -> bool:
         """Return whether participants are missing."""
@@ -72,6 +78,20 @@ class MaintainedTraffic(TrafficGenerator):
             failures += not spawn_one()
         if failures:
             self._again = population.time + RETRY
+        self._most = max(self._most or 0, len(self.members))
+
+    @property
+    def shortage(self) -> Diagnostic | None:
+        """Warning that the participants were never complete; None if they were, and before the first attempt."""
+        if self._most is None or self._most >= self.count:
+            return None
+        element = self.element
+        return Diagnostic(
+            f"traffic {quoted(self.name)}: at most {self._most} of {self.count} road users found a free place",
+            "enlarge the area, or reduce the number",
+            element.source if element is not None else "",
+            element.line if element is not None else None,
+        )
 
 
 @dataclass

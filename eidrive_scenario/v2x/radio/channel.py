@@ -27,6 +27,7 @@ from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.csma import Csma
 from eidrive_scenario.v2x.radio.events import DroppedBlock, ReceptionBlock
+from eidrive_scenario.v2x.radio.jamming import Jamming
 from eidrive_scenario.v2x.radio.link_counter_table import LinkCounterTable
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
@@ -84,6 +85,9 @@ class RadioChannel(QueuedChannel):
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
         self._jitter_keys: list[int] = []
         self._budget: Budget | None = None
+        self._jamming = Jamming(
+            profile.jammers, path_loss, frequency_ghz=profile.frequency_ghz, gain_dbi=profile.antenna_gain_dbi
+        )
         self._open: list[Transmission] = []
         self._outcomes: list[OutcomeBlock] = []
         self._dropped: list[LinkEvent] = []
@@ -102,22 +106,24 @@ class RadioChannel(QueuedChannel):
     def update_environment(self, surroundings: RadioEnvironment) -> None:
         super().update_environment(surroundings)
         self._budget = None
+        self._jamming.update(surroundings)
 
     def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
         return self.transmit([(message, receivers)], now)
 
     def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
         self._advance(now)
-        offered = []
+        offered: list[Transmission] = []
         for message, receivers in outbox:
             row = self._row(message.sender)
             ready = now + self.profile.jitter * uniform(self._jitter_keys[row], message.number)
-            offered.append(Transmission(message, receivers, now, ready, self.profile.airtime(message.size)))
+            entry = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
             rows = self._rows_of(message.sender, receivers)
             if len(rows) < len(receivers):
                 missing = next(name for name in receivers if name not in self._rows)
                 raise ValueError(_no_position(missing))
             self._counters.send(row, rows, message.size)
+            (self._drop if self._jamming.blocks(message.sender) else offered.append)(entry)
         self._access.enqueue(offered)
         return self.drain_events()
 
@@ -134,6 +140,8 @@ class RadioChannel(QueuedChannel):
         return super().statistics(now)
 
     def channel_busy_ratio(self, station: str) -> float | None:
+        if self._jamming.blocks(station):
+            return 1.0
         row = self._rows.get(station)
         if row is None or self._until is None or self._until <= self._entry_times[station]:
             return self._background_ratio
@@ -225,7 +233,7 @@ class RadioChannel(QueuedChannel):
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
         """Determine the receptions of ended transmissions and enqueue their deliveries."""
-        receptions = self._receiver.receive(ended, self._access.active, power, budget, self._keys)
+        receptions = self._receiver.receive(ended, self._access.active, power, budget, self._keys, self._jamming.power)
         plain = isinstance(self.profile.loss, NoLoss)
         receivers = []
         for place, entry in enumerate(ended):

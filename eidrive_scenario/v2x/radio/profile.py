@@ -18,6 +18,7 @@ from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss, T
 from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
+from eidrive_scenario.v2x.radio.jamming import Jammer
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import LOS
@@ -32,7 +33,7 @@ _CURVES = {
     "80211p": ("80211p_highway_los", "80211p_highway_nlos", "80211p_crossing_nlos"),
     "cv2x_mode4": ("cv2x_r0.7",) * 3,
 }
-_IDLE = {"80211p": {"sidelink"}, "cv2x_mode4": {"data_rate_mbps", "mtu"}}
+_IDLE = {"80211p": {"sidelink"}, "cv2x_mode4": {"data_rate_mbps", "mtu", "jammers"}}
 """Settings without effect, by technology."""
 
 
@@ -72,6 +73,7 @@ class RadioProfile(ComposedProfile):
     sidelink       resource pool and selection of C-V2X Mode 4
     queue          transmit queue;  congestion  congestion control
     background     background traffic that is not simulated, by one of the analytic models
+    jammers        transmitters of noise, with 802.11p
     """
 
     model: Literal["radio"] = "radio"  # type: ignore[assignment]
@@ -94,6 +96,7 @@ class RadioProfile(ComposedProfile):
     queue: QueueSettings = QueueSettings()
     congestion: CongestionControl = NoDcc()
     background: Background | None = None
+    jammers: Annotated[tuple[Jammer, ...], Field(max_length=100)] = ()
 
     @model_validator(mode="before")
     @classmethod

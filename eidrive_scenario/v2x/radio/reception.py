@@ -19,9 +19,9 @@ from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolate
 
 Codes = NDArray[np.int8]
-CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision", "queue")
+CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "jamming", "collision", "queue")
 """Causes of loss in order of precedence; codes in arrays are indices. `queue`: dropped before transmission."""
-DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, COLLISION, QUEUE = range(len(CAUSES))
+DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, JAMMING, COLLISION, QUEUE = range(len(CAUSES))
 MAX_SCALAR = 12
 """Maximum number of receptions for scalar evaluation, which is then faster than arrays."""
 BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
@@ -55,19 +55,32 @@ class Receiver:
     background: tuple[ErrorTable, Array] | None = None
 
     def receive(
-        self, ended: Sequence[Transmission], active: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+        self,
+        ended: Sequence[Transmission],
+        active: Sequence[Transmission],
+        power: Array,
+        budget: Budget,
+        keys: Keys,
+        jamming: Array | None = None,
     ) -> Receptions:
         """Return the receptions of the transmissions in `ended`.
 
-        active  all transmissions that may overlap with them, including themselves
-        power   (N, N) received power by sender (row) and receiver (column) [dBm]
-        keys    (N, N) keys of the links, by sender and receiver
+        active   all transmissions that may overlap with them, including themselves
+        power    (N, N) received power by sender (row) and receiver (column) [dBm]
+        keys     (N, N) keys of the links, by sender and receiver
+        jamming  (N,) power of jammers at the receivers [mW]; None without a jammer
         """
         few = len(ended) * len(power) <= MAX_SCALAR
-        return (self._receive_scalar if few else self._receive_array)(ended, active, power, budget, keys)
+        return (self._receive_scalar if few else self._receive_array)(ended, active, power, budget, keys, jamming)
 
     def _receive_array(
-        self, ended: Sequence[Transmission], active: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+        self,
+        ended: Sequence[Transmission],
+        active: Sequence[Transmission],
+        power: Array,
+        budget: Budget,
+        keys: Keys,
+        jamming: Array | None,
     ) -> Receptions:
         rows = np.array([budget.rows[entry.message.sender] for entry in active], dtype=np.int64)
         place = {id(entry): index for index, entry in enumerate(active)}
@@ -101,6 +114,8 @@ class Receiver:
             common = np.minimum(last[None, :], last[own, None]) - np.maximum(first[None, :], first[own, None])
             shares = common / (last - first)
         interference, busy, half_duplex = self._interference(overlapping, same_band, shares, start, own, rows, received)
+        if jamming is not None:
+            interference = interference + jamming
         if same_band.any():
             disturbed = signal - 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + interference)
             causes[draws < self._errors(disturbed, states, sizes)] = COLLISION
@@ -109,6 +124,9 @@ class Receiver:
             control = np.stack(controls)
             causes[control == COLLISION] = COLLISION
             causes[control == PROPAGATION] = PROPAGATION
+        if jamming is not None:
+            jammed = signal - 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + jamming)
+            causes[draws < self._errors(jammed, states, sizes)] = JAMMING
         causes[draws < lost_alone] = PROPAGATION
         causes[busy] = BUSY
         causes[signal < self.sensing_dbm] = SENSING
@@ -118,7 +136,13 @@ class Receiver:
         return Receptions(causes, snr, senders)
 
     def _receive_scalar(
-        self, ended: Sequence[Transmission], active: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+        self,
+        ended: Sequence[Transmission],
+        active: Sequence[Transmission],
+        power: Array,
+        budget: Budget,
+        keys: Keys,
+        jamming: Array | None,
     ) -> Receptions:
         """Return the receptions, evaluated one by one."""
         powers, links = power.tolist(), keys.tolist()
@@ -128,6 +152,7 @@ class Receiver:
             else (power[budget.rows[entry.message.sender]] + entry.gain).tolist()
             for entry in active
         }
+        jam = [0.0] * len(powers) if jamming is None else jamming.tolist()
         states, mean_loss = budget.states.tolist(), budget.mean_loss.tolist()
         senders = [budget.rows[entry.message.sender] for entry in ended]
         causes, ratios = [], []
@@ -155,11 +180,14 @@ class Receiver:
                     cause = BUSY
                 elif draw < curve.of(signal - noise_dbm, size):
                     cause = PROPAGATION
+                elif jam[station] and draw < curve.of(signal - _floor(noise_dbm, jam[station]), size):
+                    cause = JAMMING
                 elif controls is not None and controls[station] != DELIVERED:
                     cause = controls[station]
                 elif disturbing:
                     others = sum(10.0 ** (received[station] / 10.0) * share for received, share in shares)
-                    floor = 10.0 * math.log10(10.0 ** (noise_dbm / 10.0) + others)
+                    others += jam[station]
+                    floor = _floor(noise_dbm, others)
                     cause = COLLISION if draw < curve.of(signal - floor, size) else DELIVERED
                 if self.background is not None:
                     cause = self._in_background(cause, mean_loss[sender][station], links[sender][station], number)
@@ -243,6 +271,11 @@ class Receiver:
 def _salted_causes(table: ErrorTable) -> list[tuple[int, str]]:
     """Return the causes of background traffic, each with the salt of its random numbers."""
     return [(salt, cause) for salt, cause in enumerate(BACKGROUND, start=1) if cause in table.given]
+
+
+def _floor(noise_dbm: float, others: float) -> float:
+    """Return the sum of noise and other powers [mW] in dBm."""
+    return 10.0 * math.log10(10.0 ** (noise_dbm / 10.0) + others)
 
 
 def _overlap(first: Transmission, second: Transmission) -> bool:

@@ -94,6 +94,7 @@ def test_bodies_have_dimensions_of_the_catalog() -> None:
     [
         (VehicleCategory.TRUCK, Role.FIRE, {"fire_engine", "firetruck"}),
         (VehicleCategory.VAN, Role.AMBULANCE, {"ambulance"}),
+        (VehicleCategory.CAR, Role.POLICE, {"police_charger"}),
         (VehicleCategory.TRUCK, Role.CIVIL, {"truck"}),
         (VehicleCategory.TRUCK, Role.POLICE, {"truck"}),
         (VehicleCategory.TRAM, Role.NONE, {"bus"}),
@@ -102,6 +103,13 @@ def test_bodies_have_dimensions_of_the_catalog() -> None:
 )
 def test_roles_select_vehicles_of_a_category(category: VehicleCategory, role: Role, names: set[str]) -> None:
     assert set(drawn(definition({category: 1.0}, {role: 2.0}), 20)) == names
+
+
+def test_everyday_traffic_has_no_emergency_vehicles() -> None:
+    """Every everyday car of the catalog is drawn at least once in 300 draws; the police car never is."""
+    names = set(drawn(definition({VehicleCategory.CAR: 1.0}), 300))
+    assert {"dodge_charger", "ford_mustang", "lincoln_mkz"} <= names
+    assert "police_charger" not in names
 
 
 def test_categories_of_mix_are_those_it_draws() -> None:

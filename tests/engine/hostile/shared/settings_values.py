@@ -36,6 +36,22 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
         "conflict_deceleration": 5.0,
         "conflict_hold_time": 1.0,
         "min_existence": 0.4,
+        "pose_error": {"x": 0.5, "y": -0.5, "yaw": 1.0},
+        "false_objects": [
+            {
+                "x": 40.0,
+                "y": 2.0,
+                "z": 0.0,
+                "speed": 3.0,
+                "heading": 90.0,
+                "kind": "car",
+                "size": [4.5, 1.8, 1.5],
+                "score": 0.9,
+                "deviation": 0.3,
+                "since": 0.1,
+                "until": 5.0,
+            }
+        ],
     },
     "planner": {
         "range": 50.0,
@@ -189,6 +205,7 @@ CHANNELS: Mapping[str, Mapping[str, Any]] = {
         },
         "fading": {"kind": "nakagami", "m": [3.0, 1.0], "distances": [80.0]},
         "congestion": {"kind": "reactive", "limits": [0.2, 1.0], "intervals": [0.1, 0.5]},
+        "jammers": [{"x": 10.0, "y": -20.0, "z": 1.5, "power_dbm": 30.0}],
     },
     "80211p limeric": {
         "model": "radio",

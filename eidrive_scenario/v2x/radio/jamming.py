@@ -1,0 +1,88 @@
+"""Jammers: transmitters of noise in the whole channel, which disturb reception and block carrier sensing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss
+from eidrive_scenario.v2x.radio_environment import LOS, RadioEnvironment
+
+ENERGY_DETECTION_DBM = -65.0
+"""Power of any signal from which a station senses a busy channel of 10 MHz [dBm] (IEEE 802.11-2012, 18.3.10.6)."""
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class Jammer(Settings):
+    """Continuous noise in the 10 MHz of the channel, from a fixed place.
+
+    x, y, z    place of its antenna in the world frame [m]
+    power_dbm  radiated power with the gain of its antenna (EIRP) [dBm]
+    """
+
+    x: Coordinate
+    y: Coordinate
+    z: Annotated[float, Field(ge=0.0, le=1000.0)] = 1.5
+    power_dbm: Annotated[float, Field(ge=-30.0, le=80.0)] = 30.0
+
+
+def jamming_power(
+    jammers: Sequence[Jammer], path_loss: PathLoss, positions: Array, *, frequency_ghz: float, gain_dbi: float
+) -> Array:
+    """Return the power (N,) [mW] that antennas at `positions` (N, 3) receive from all jammers, in line of sight."""
+    total = np.zeros(len(positions))
+    for jammer in jammers:
+        place = np.array([jammer.x, jammer.y, jammer.z])
+        count = len(positions)
+        heights = positions[:, 2]
+        between = LinkGeometry(
+            np.linalg.norm(positions - place, axis=1),
+            np.full(count, LOS),
+            np.minimum(heights, jammer.z),
+            np.maximum(heights, jammer.z),
+            np.full(count, -np.inf),
+            np.zeros(count, dtype=np.int64),
+        )
+        loss = path_loss.loss(between, frequency_ghz, np.full(count, 0.5))
+        total += 10.0 ** ((jammer.power_dbm + gain_dbi - loss) / 10.0)
+    return total
+
+
+class Jamming:
+    """Power of all jammers at the stations. `power` is (N,) [mW] in the order of their names, None without a jammer."""
+
+    def __init__(
+        self, jammers: Sequence[Jammer], path_loss: PathLoss, *, frequency_ghz: float, gain_dbi: float
+    ) -> None:
+        self._jammers = jammers
+        self._path_loss = path_loss
+        self._frequency_ghz = frequency_ghz
+        self._gain_dbi = gain_dbi
+        self.power: Array | None = None
+        self._blocked: frozenset[str] = frozenset()
+
+    def update(self, surroundings: RadioEnvironment) -> None:
+        """Set the positions of the antennas."""
+        if not self._jammers:
+            return
+        self.power = jamming_power(
+            self._jammers,
+            self._path_loss,
+            surroundings.positions,
+            frequency_ghz=self._frequency_ghz,
+            gain_dbi=self._gain_dbi,
+        )
+        least = 10.0 ** (ENERGY_DETECTION_DBM / 10.0)
+        self._blocked = frozenset(
+            name for name, power in zip(surroundings.names, self.power.tolist(), strict=True) if power >= least
+        )
+
+    def blocks(self, station: str) -> bool:
+        """Return whether a station senses a channel that jammers occupy, and so does not transmit."""
+        return station in self._blocked
