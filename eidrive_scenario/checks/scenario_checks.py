@@ -49,7 +49,8 @@ def scenario_diagnostics(
     try:
         simulation = Simulation(scenario, settings=settings, load_weights=False)
         simulation.close()
-        yield from ((Level.WARNING, diagnostic) for diagnostic in simulation.progress_warnings)
+        for diagnostic in (*simulation.progress_warnings, *simulation.spawn_warnings):
+            yield Level.WARNING, diagnostic
         yield from ((Level.WARNING, diagnostic) for diagnostic in torchscript_warnings(scenario))
     except InputError as error:
         yield from (found for found in _errors(error) if found[1] not in errors)

@@ -33,6 +33,7 @@ from eidrive_scenario.simulation.run_outcome import RunEnd, build_result, end_re
 from eidrive_scenario.simulation.run_setup import set_up_run
 from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.simulation.spawn_checks import check_spawns
+from eidrive_scenario.simulation.spawn_warnings import spawn_warnings
 from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.wall_limit import limit_wall_time
@@ -84,7 +85,10 @@ class Simulation:
             commands = self.storyboard.initial()
             self._environment: Environment | None = commands.environment
             execute(commands, self._state)
-            check_spawns(self.scenario, self.roads, self.world, commands.driven & {*self.stack.possible_drivers})
+            drivers = commands.driven & {*self.stack.possible_drivers}
+            check_spawns(self.scenario, self.roads, self.world, drivers)
+            self.spawn_warnings = tuple(spawn_warnings(self.scenario, self.roads, self.world, drivers))
+            self._state.warnings += map(str, self.spawn_warnings)
             add_criteria(setup.added_criteria, self._state)
             resolved = resolve_settings(setup, seed, self.settings)
         except BaseException:

@@ -38,12 +38,14 @@ def check_spawns(scenario: Scenario, roads: RoadNetwork | None, world: World, dr
         raise SettingError(found)
 
 
-def overlapping_spawns(scenario: Scenario, view: WorldView, names: Collection[str]) -> Iterator[Diagnostic]:
+def overlapping_spawns(
+    scenario: Scenario, view: WorldView, names: Collection[str], among: Collection[str] | None = None
+) -> Iterator[Diagnostic]:
     """Yield those of these actors that overlap another one; a pair of them is one diagnostic.
 
-    Vehicle and trailers of a train do not count.
+    Vehicle and trailers of a train do not count. `among` limits the other actors; None: all that are present.
     """
-    present = [name for name in scenario.entities if name in view.rows]
+    present = [name for name in scenario.entities if name in view.rows and (among is None or name in among)]
     boxes = {name: _core(view.plain_boxes[view.rows[name]]) for name in present}
     trains = _trains(scenario)
     done: set[str] = set()
@@ -56,7 +58,7 @@ def overlapping_spawns(scenario: Scenario, view: WorldView, names: Collection[st
             x, y, *_ = boxes[others[0]]
             more = f", and of {len(others) - 1} more" if len(others) > 1 else ""
             message = f"{quoted(name)} starts inside of {quoted(others[0])}, whose center is at ({x:.1f}, {y:.1f}) m"
-            yield _at(scenario, name, message + more, "move one of them")
+            yield start_diagnostic(scenario, name, message + more, "move one of them")
 
 
 def _core(box: Sequence[float]) -> list[float]:
@@ -91,10 +93,10 @@ def _off_road(
     for name, gap, place in zip(names, outside, zip(x.tolist(), y.tolist(), strict=True), strict=True):
         if gap > MARGIN:
             message = f"{quoted(name)} starts at ({place[0]:.1f}, {place[1]:.1f}) m, {gap:.0f} m off the nearest road"
-            yield _at(scenario, name, message, "give a LanePosition, or a world position on a lane")
+            yield start_diagnostic(scenario, name, message, "give a LanePosition, or a world position on a lane")
 
 
-def _at(scenario: Scenario, name: str, message: str, hint: str) -> Diagnostic:
+def start_diagnostic(scenario: Scenario, name: str, message: str, hint: str) -> Diagnostic:
     """Return a diagnostic at the last TeleportAction of an actor in Init, or at the actor without one."""
     element: Element = scenario.entities[name]
     selections = EntitySelections(scenario)

@@ -17,6 +17,8 @@ TRAILER = """<Trailer><TrailerRef entityRef="Cart"/></Trailer></Vehicle>"""
 FLAT = """<MiscObject mass="1" name="plate" miscObjectCategory="obstacle"><BoundingBox><Center x="0" y="0" z="0.05"/>
 <Dimensions length="1" width="1" height="{height}"/></BoundingBox></MiscObject>"""
 BRIDGE = '<WorldPosition x="20" y="-1.75" z="6"/>'
+STEP = """<SpeedAction><SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="{}"/></SpeedActionTarget></SpeedAction>"""
 INSIDE = "'Ego' starts inside of 'Other', whose center is at "
 
 
@@ -168,3 +170,42 @@ def test_route_criterion_of_a_scenario_with_a_destination(tmp_path: Path) -> Non
     path.write_text(text)
     (verdict,) = run_file(path, settings=RunSettings(criteria=criterion)).criteria
     assert verdict.value == pytest.approx(1.4 / 70.0), "the center is 1.4 m ahead of the reference point"
+
+
+def start_warnings(path: Path) -> list[str]:
+    found = [text for text in run_file(path).warnings if " starts " in text]
+    assert found == [str(one) for one in check_scenario(path).warnings if " starts " in str(one)]
+    return found
+
+
+def world(x: float, y: float, z: float = 0.0) -> str:
+    return f'<WorldPosition x="{x}" y="{y}" z="{z}"/>'
+
+
+def test_scripted_vehicle_inside_of_another_one_is_a_warning_with_its_line(tmp_path: Path) -> None:
+    path = write(tmp_path, lane_position_xml(-1, 20), lane_position_xml(-1, 22), driven=False)
+    (warning,) = start_warnings(path)
+    assert warning.startswith(f"{path}:{line_of(path, 'Ego')}: {INSIDE}")
+
+
+@pytest.mark.parametrize(
+    "place", [world(20, 40.0), world(20, -1.75, -5.0), world(20, -1.75, 6.0)], ids=["beside", "below", "above"]
+)
+def test_vehicles_stacked_out_of_the_way_are_no_warning(tmp_path: Path, place: str) -> None:
+    assert not start_warnings(write(tmp_path, place, place, driven=False))
+
+
+@pytest.mark.parametrize(("y", "speed", "warned"), [(15.5, 10.0, True), (15.5, 0.0, False), (60.0, 10.0, False)])
+def test_scripted_vehicle_that_moves_beside_the_road_is_a_warning(
+    tmp_path: Path, y: float, speed: float, warned: bool
+) -> None:
+    """The road has lanes of 3.5 m from y = -7 m to 3.5 m."""
+    path = write(tmp_path, world(20, y), lane_position_xml(-1, 200), driven=False)
+    text = path.read_text()
+    action = f"<PrivateAction><LongitudinalAction>{STEP.format(speed)}</LongitudinalAction></PrivateAction>"
+    path.write_text(text.replace("</PrivateAction>", "</PrivateAction>" + action, 1))
+    found = start_warnings(path)
+    assert len(found) == int(warned)
+    if warned:
+        assert "'Ego' starts at" in found[0]
+        assert "12 m off the nearest road" in found[0]
