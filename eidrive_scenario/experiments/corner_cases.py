@@ -87,12 +87,13 @@ def table(runs: Sequence[SceneRun]) -> str:
 
 
 def _mean(values: Sequence[float]) -> str:
-    return f"{sum(values) / len(values):.1f}" if values else "-"
+    return f"{sum(values) / len(values):.1f}".replace("-0.0", "0.0") if values else "-"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", choices=[*ARMS, []], help="scenarios (default: all)")
+    choices = [*ARMS, []]  # argparse compares an empty list of names with the choices, too
+    parser.add_argument("names", nargs="*", choices=choices, help="scenarios (default: all)")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 1")
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
