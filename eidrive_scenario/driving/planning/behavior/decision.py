@@ -246,7 +246,6 @@ class Decider:
             leads,
             walls,
         )
-        current = self._current.name if self._current is not None else ROUTE
         evaluation = evaluate(
             proposals,
             profiles,
@@ -256,10 +255,18 @@ class Decider:
             self._body,
             self._settings,
             situation.wanted,
-            current,
+            self._kept_names(situation),
             hidden,
         )
         return Options(profiles, proposals, walls, rolled, evaluation)
+
+    def _kept_names(self, situation: Situation) -> frozenset[str]:
+        """Return the current maneuver, and the route if its lateral motion is complete: then the vehicle returns."""
+        current = self._current
+        if current is None:
+            return frozenset({ROUTE})
+        is_complete = situation.s >= current.places[-1]
+        return frozenset({current.name, ROUTE}) if is_complete else frozenset({current.name})
 
     def _is_held_up(self, situation: Situation, options: Options, best: int) -> bool:
         """Return whether the best proposal makes too little progress because of objects."""

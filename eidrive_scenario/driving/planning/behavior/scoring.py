@@ -56,12 +56,12 @@ def evaluate(
     ego: Body,
     settings: BehaviorSettings,
     wanted: float,
-    current: str,
+    kept: frozenset[str],
     hidden: float,
 ) -> Evaluation:
     """Return the evaluation of all proposals.
 
-    current  name of the maneuver that is being carried out
+    kept     names of the maneuvers that are no change: the current one, and the route after a complete one
     hidden   place from which oncoming traffic may come unseen [m], inf without one
     """
     count = len(proposals)
@@ -96,7 +96,7 @@ def evaluate(
     values: list[float] = score.tolist()
     for row, proposal in enumerate(proposals):
         profile = profiles[proposal.profile]
-        switches = profile.name != current
+        switches = profile.name not in kept
         values[row] -= SLOWER * (1.0 - proposal.share) + GENTLE * proposal.is_gentle
         if profile.uses_oncoming and switches:
             first = oncoming[proposal.profile]

@@ -48,7 +48,7 @@ def risk(arrival: float, *, yields: bool) -> float:
         Body(3.8, 1.0, 2.85, 0.9),
         SETTINGS,
         SPEED,
-        "route",
+        frozenset({"route"}),
         np.inf,
     )
     return float(found.risk[0])
