@@ -174,6 +174,16 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
     return found
 
 
+def nearest_rows(detections: Detections, places: Array) -> tuple[int, ...]:
+    """Return the rows of the objects that were at places (N, 2) shortly before; none for an object that is lost."""
+    if not len(places) or not len(detections):
+        return ()
+    gap = np.hypot(*(detections.boxes[None, :, :2] - places[:, None]).transpose(2, 0, 1))
+    nearest = np.argmin(gap, axis=1)
+    near = gap[np.arange(len(places)), nearest] < GATE
+    return tuple(dict.fromkeys(nearest[near].tolist()))
+
+
 def _is_among(lost: KnownObject, found: list[KnownObject]) -> bool:
     """Return whether a lost object is at the place of one in view, of which it was another track."""
     return any(math.hypot(other.x - lost.x, other.y - lost.y) < GATE for other in found)

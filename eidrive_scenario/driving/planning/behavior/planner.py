@@ -13,7 +13,7 @@ from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
-from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory, nearest_rows
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
@@ -74,6 +74,8 @@ class BehaviorPlanner(RoutePlanner):
         self._limits: Array = np.empty(0)
         self._decision: Decision | None = None
         self._decided = -math.inf
+        self._reasons: Array = np.empty((0, 2))
+        """Places of the objects that are the reason of the decision [m]."""
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
@@ -83,11 +85,14 @@ class BehaviorPlanner(RoutePlanner):
         if self._decision is None or now - self._decided >= self.planner_settings.period - TIME_TOLERANCE:
             self._decided = now
             self._decision = self._decide(ego, objects, line, wanted, now)
+            rows = self._decision.objects
+            self._reasons = objects.boxes[list(rows), :2]
+        else:
+            rows = nearest_rows(objects, self._reasons)
         s = self._place_on(line, x, y)[0]
-        plan = _trajectory(line, self._decision, s)
+        plan = _trajectory(line, self._decision, s, rows)
         if goal is not None and goal.acceleration and self._decision.is_free:
-            first = line.index_at(s)
-            limits = self._limits[first : first + len(plan.points)]
+            limits = self._limits[_planned_part(line, s)]
             if float(limits[0]) >= wanted:
                 return replace(plan, speeds=np.minimum(limits, wanted), acceleration=goal.acceleration)
         return plan
@@ -181,15 +186,16 @@ class BehaviorPlanner(RoutePlanner):
         return low, max(high, low + 2)
 
 
-def _trajectory(line: ReferenceLine, decision: Decision, s: float) -> Plan:
-    """Return the plan of a decision from the place of the vehicle on."""
-    first = line.index_at(s)
-    last = min(first + POINTS, len(line.points))
-    first = min(first, last - 2)
-    along = line.along[first:last]
+def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[int, ...]) -> Plan:
+    """Return the plan of a decision from the place of the vehicle on.
+
+    rows  fused objects that are the reason
+    """
+    part = _planned_part(line, s)
+    along = line.along[part]
     offset = decision.profile.offset(along)
-    normal = np.column_stack([-line.tangent[first:last, 1], line.tangent[first:last, 0]])
-    points = line.points[first:last] + offset[:, None] * normal
+    normal = np.column_stack([-line.tangent[part, 1], line.tangent[part, 0]])
+    points = line.points[part] + offset[:, None] * normal
     squares = np.interp(along, decision.s, decision.speed**2)
     speeds = np.sqrt(squares) if s < line.length or not line.path.ends else np.zeros(len(along))
     acceleration = decision.acceleration
@@ -201,5 +207,12 @@ def _trajectory(line: ReferenceLine, decision: Decision, s: float) -> Plan:
         decision.reason,
         acceleration=max(acceleration, 0.0),
         braking=decision.braking,
-        objects=decision.objects,
+        objects=rows,
     )
+
+
+def _planned_part(line: ReferenceLine, s: float) -> slice:
+    """Return the points of the line that a plan covers from the place of the vehicle on, at least two."""
+    first = line.index_at(s)
+    last = min(first + POINTS, len(line.points))
+    return slice(min(first, last - 2), last)

@@ -60,7 +60,7 @@ class Situation(msgspec.Struct, frozen=True):
         speed, s, step = self.speed, self.s, 0.5
         end = math.inf if self.stop is None else self.stop.s
         for _ in range(round(horizon / step)):
-            limit = float(self.limits[min(int(s / self.line.spacing), len(self.limits) - 1)])
+            limit = float(self.limits[min(max(int(s / self.line.spacing), 0), len(self.limits) - 1)])
             speed = min(speed + acceleration * step, self.wanted, limit)
             s = min(s + speed * step, end)
         return s - self.s
