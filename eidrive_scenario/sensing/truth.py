@@ -124,7 +124,7 @@ def candidates(
             ahead = math.cos(heading) * offset[index, :, 0] + math.sin(heading) * offset[index, :, 1]
             aside = math.cos(heading) * offset[index, :, 1] - math.sin(heading) * offset[index, :, 0]
             near[index] &= np.abs(np.arctan2(aside, ahead)) <= sensor.half_field
-    return [np.flatnonzero(row).tolist() for row in near]
+    return [row.nonzero()[0].tolist() for row in near]
 
 
 def few_candidates(
@@ -162,11 +162,11 @@ def visibilities(
     With a name, actors that the scenario hides from the sensor of that name are transparent.
     """
     boxes = view.boxes
-    sensor_of = np.repeat(np.arange(len(sensors)), [len(rows) for rows in targets])
+    sensor_of = np.arange(len(sensors)).repeat([len(rows) for rows in targets])
     target_of = np.concatenate([np.asarray(rows, dtype=np.intp) for rows in targets])
     mounts = np.array([sensor.mounting.position(view, row) for sensor, row in zip(sensors, own, strict=True)])
     points = points_of_boxes(boxes[target_of], SAMPLES)
-    origins = np.repeat(mounts[sensor_of][:, None], len(SAMPLES), axis=1)
+    origins = mounts[sensor_of][:, None].repeat(len(SAMPLES), axis=1)
     starts = ray_starts(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
     begin, end = starts.reshape(-1, 3), points.reshape(-1, 3)
     if name or len(begin) > MANY_RAYS:

@@ -75,8 +75,8 @@ def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Oc
     cos, sin = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
     x = (boxes[:, 0, None] + cos * corners[..., 0] - sin * corners[..., 1]).ravel()
     y = (boxes[:, 1, None] + sin * corners[..., 0] + cos * corners[..., 1]).ravel()
-    z = np.repeat(view.position[rows, 2], len(OUTLINE))
-    velocity = np.repeat(view.velocity[rows, :2], len(OUTLINE), axis=0)
+    z = view.position[rows, 2].repeat(len(OUTLINE))
+    velocity = view.velocity[rows, :2].repeat(len(OUTLINE), axis=0)
     row, s, point = lanes.roads.overlapped_lanes(x, y, z)
     progress = lanes.progress(row, s)
     heading = lanes.tables.curves.at(lanes.road[row], s)[2]

@@ -100,7 +100,7 @@ class Locator:
         s, t, beyond = self._refine(road, s, x, y)
         row, outside = self._tables.lane_beside(road, s, t)
         outside = np.hypot(outside, beyond)
-        uncertain = np.flatnonzero(outside > 0.0)
+        uncertain = (outside > 0.0).nonzero()[0]
         if uncertain.size and len(self._s) > 1:
             height = None if z is None else z[uncertain]
             limit = np.minimum(outside[uncertain], reach) + self._from_samples
@@ -112,16 +112,16 @@ class Locator:
     def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
         """Return all lanes that overlap points (N,): lane rows, s on their roads, and indices of the points."""
         tree, places, distance, nearest = self._nearest_samples(x, y, z, reach=0.0)
-        near = np.flatnonzero(distance < np.inf)
+        near = (distance < np.inf).nonzero()[0]
         road, s, _, _, outside = self._best_roads(tree, places[near], nearest[near], reach=0.0)
-        inside = np.flatnonzero(outside <= 0.0)
+        inside = (outside <= 0.0).nonzero()[0]
         on, road, s = near[inside], road[inside], s[inside]
         pair, other, guess = self._overlaps.beneath(road, x[on], y[on])
         roads = np.concatenate([road, other])
         guesses, points = np.concatenate([s, guess]), np.concatenate([on, on[pair]])
         refined, t, beyond = self._refine(roads, guesses, x[points], y[points])
         row, outside = self._tables.lane_beside(roads, refined, t)
-        hit = np.flatnonzero((beyond <= 0.0) & (outside <= 0.0))
+        hit = ((beyond <= 0.0) & (outside <= 0.0)).nonzero()[0]
         return row[hit], refined[hit], points[hit]
 
     @cached_property
@@ -158,9 +158,10 @@ class Locator:
     def _refine(self, road: Integers, s: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """Return s, t and the distance beyond an end of the road by Newton's method from an initial s."""
         tables, length = self._tables, self._tables.length[road]
+        end = length
         open_: Integers | None = None
         """Points whose s is not found yet; None for all."""
-        found_s, found_t, found_beyond = s, s, s
+        found_s, found_t, found_along = s, s, s
         for _ in range(10):
             px, py, h, curvature, speed = tables.curves.at(road, s)
             cos, sin = np.cos(h), np.sin(h)
@@ -177,18 +178,18 @@ class Locator:
             step = along / np.maximum(np.maximum(stretch, 0.2 * speed), 2e-4)
             moved = np.minimum(np.maximum(s + step, 0.0), length)
             change = np.abs(moved - s)
-            off = np.abs(along)
-            beyond = np.where(((moved <= 0.0) | (moved >= length)) & (off > 1e-6), off, 0.0)
             if open_ is None:
-                found_s, found_t, found_beyond = moved, t, beyond
+                found_s, found_t, found_along = moved, t, along
             else:
-                found_s[open_], found_t[open_], found_beyond[open_] = moved, t, beyond
+                found_s[open_], found_t[open_], found_along[open_] = moved, t, along
             going = (change > 1e-6).nonzero()[0]
             if not going.size:
                 break
             open_ = going if open_ is None else open_[going]
             road, s, x, y, length = road[going], moved[going], x[going], y[going], length[going]
-        return found_s, found_t, found_beyond
+        off = np.abs(found_along)
+        is_beyond = ((found_s <= 0.0) | (found_s >= end)) & (off > 1e-6)
+        return found_s, found_t, np.where(is_beyond, off, 0.0)
 
 
 def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:

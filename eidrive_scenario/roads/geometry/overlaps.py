@@ -37,11 +37,11 @@ class Overlaps:
     def beneath(self, road: Integers, x: Array, y: Array) -> tuple[Integers, Integers, Array]:
         """Return pairs of point index and nearby other road for points (N,), and s of its nearest sample."""
         counts = self._counts[road]
-        point = np.repeat(np.arange(len(road)), counts)
+        point = np.arange(len(road)).repeat(counts)
         if not point.size:
             return point, point, np.empty(0)
-        step = np.arange(len(point)) - np.repeat(np.cumsum(counts) - counts, counts)
-        other = self._others[np.repeat(self._starts[road], counts) + step]
+        step = np.arange(len(point)) - (counts.cumsum() - counts).repeat(counts)
+        other = self._others[self._starts[road].repeat(counts) + step]
         px, py = x[point], y[point]
         low, high, reach = self._low[other], self._high[other], self._reach
         near = (px >= low[:, 0] - reach) & (px <= high[:, 0] + reach)
@@ -50,13 +50,13 @@ class Overlaps:
         if not point.size:
             return point, other, np.empty(0)
         first, sizes = self._first[other], self._last[other] - self._first[other]
-        owner = np.repeat(np.arange(len(point)), sizes)
-        begins = np.cumsum(sizes) - sizes
-        sample = np.arange(len(owner)) - np.repeat(begins, sizes) + np.repeat(first, sizes)
+        owner = np.arange(len(point)).repeat(sizes)
+        begins = sizes.cumsum() - sizes
+        sample = np.arange(len(owner)) + (first - begins).repeat(sizes)
         gap = (self._points[sample, 0] - px[owner]) ** 2 + (self._points[sample, 1] - py[owner]) ** 2
         least = np.minimum.reduceat(gap, begins)
         # Ties select the first sample, as argmin does.
-        at = np.flatnonzero(gap == least[owner])
+        at = (gap == least[owner]).nonzero()[0]
         at = at[np.unique(owner[at], return_index=True)[1]]
         close = least <= reach * reach
         return point[close], other[close], self._s[sample[at[close]]]

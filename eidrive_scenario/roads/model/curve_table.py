@@ -31,8 +31,10 @@ class CurveTable:
         self._kind = np.array([_kind(curve) for curve in curves], dtype=np.int8)
         self._curvature = np.array([getattr(curve, "curvature", 0.0) for curve in curves])
         self._rate = np.array([getattr(curve, "rate", 0.0) for curve in curves])
-        self._placing = np.column_stack([self._starts, self._curvature, x, y, h, np.cos(h), np.sin(h)])
-        """Columns of the curves that each evaluation needs: start, curvature, x, y, heading, its cosine and sine."""
+        arcs = np.where(self._kind == 0, self._curvature, 0.0)
+        self._placing = np.column_stack([self._starts, arcs, x, y, h, np.cos(h), np.sin(h)])
+        """Columns of the curves that each evaluation needs: start, curvature of arcs, x, y, heading, its cosine and
+        sine."""
         self._spiral = _spiral_columns(self._curvature, self._rate)
         self._is_curved = bool(self._kind.any())
         """Whether any curve is neither a line nor an arc."""
@@ -43,15 +45,19 @@ class CurveTable:
     def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return x, y, heading, curvature and path length per meter of s at s (N,) of lines (N,)."""
         curve = np.maximum(self._keys.searchsorted(self.base[line] + s, side="right") - 1, 0)
-        start, curvature, x, y, h, cos, sin = self._placing[curve].T
+        start, curvature, x, y, h, cos, sin = self._placing.take(curve, axis=0).T
         ds = s - start
-        turn = curvature * ds
-        half = 0.5 * turn
-        # As numpy.sinc(half / pi), bit for bit, at half of the time.
-        angle = np.pi * (half / np.pi)
-        angle = np.where(angle, angle, EPSILON)
-        chord = ds * (np.sin(angle) / angle)
-        u, v, speed = chord * np.cos(half), chord * np.sin(half), np.ones(len(ds))
+        if curvature.any():
+            turn = curvature * ds
+            half = 0.5 * turn
+            # As numpy.sinc(half / pi), bit for bit, at half of the time.
+            angle = np.pi * (half / np.pi)
+            angle = np.where(angle, angle, EPSILON)
+            chord = ds * (np.sin(angle) / angle)
+            u, v = chord * np.cos(half), chord * np.sin(half)
+        else:
+            u, v, turn = ds.copy(), np.zeros(len(ds)), np.zeros(len(ds))
+        speed = np.ones(len(ds))
         if self._is_curved:
             kind = self._kind[curve]
             for number, evaluate in ((1, self._spirals), (2, self._cubics)):
@@ -71,7 +77,7 @@ class CurveTable:
         return curvature, speed
 
     def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
-        k, rate, shift, scale, cosine0, sine0, sign, cos, sin = self._spiral[curve].T
+        k, rate, shift, scale, cosine0, sine0, sign, cos, sin = self._spiral.take(curve, axis=0).T
         sine, cosine = fresnel((ds + shift) * scale)
         along, across = (cosine - cosine0) / scale, sign * (sine - sine0) / scale
         turn = ds * (k + 0.5 * rate * ds)

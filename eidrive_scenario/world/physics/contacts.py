@@ -87,8 +87,8 @@ def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
     sorted_x = x[order]
     last = sorted_x.searchsorted(sorted_x + radius[order] + radius.max() + PARTED, side="right")
     counts = last - np.arange(len(bodies)) - 1
-    left = np.repeat(np.arange(len(bodies)), counts)
-    within = np.arange(len(left)) - np.repeat(np.cumsum(counts) - counts, counts)
+    left = np.arange(len(bodies)).repeat(counts)
+    within = np.arange(len(left)) - (counts.cumsum() - counts).repeat(counts)
     first, second = order[left], order[left + within + 1]
     near = np.hypot(x[first] - x[second], y[first] - y[second]) <= radius[first] + radius[second] + PARTED
     near &= (moved[first] + moved[second]) > 0

@@ -178,9 +178,10 @@ class _Leaders:
         found = self._known.get(number)
         if found is None:
             found = self._known[number] = [[] for _ in range(leads.shape[1])]
-            rows, steps = leads.nonzero()
-            for row, step in zip(rows.tolist(), steps.tolist(), strict=True):
-                found[step].append(self._entry(row)[step])
+            for row in np.flatnonzero(leads.any(axis=1)).tolist():
+                entry = self._entry(row)
+                for step in leads[row].nonzero()[0].tolist():
+                    found[step].append(entry[step])
             for leaders in found:
                 if len(leaders) > 1:
                     leaders.sort(key=_rear)
