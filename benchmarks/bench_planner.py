@@ -1,10 +1,11 @@
 """Time of the planner `behavior` with ten tracks, and speed of coop/scenario_5 with it and with background traffic.
 
 The first figure is the time of `plan` in a tick, averaged over 20 s, in which the planner decides in every second tick:
-behind three vehicles, beside four oncoming ones and three pedestrians. The second one is the simulated time per wall
-time of whole runs with the oracle on one core, for comparison with the planner `conflict_area`, too.
+behind three vehicles, beside four oncoming ones and three pedestrians. The second one is the simulated time per time of
+whole runs with the oracle on one core, for comparison with the planner `conflict_area`, too.
 
-Other load of the machine only adds to the time of a tick. So the minimum time of each tick over all runs counts.
+All times are processor times of the thread, of which a run has one. Other load of the machine only adds to the time of
+a tick, so the minimum of each tick over all runs counts.
 
     python benchmarks/bench_planner.py [--runs 9] [--seed 1]
 """
@@ -17,7 +18,7 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-from bench_scenario_1 import sum_of_minima, timed_run
+from bench_scenario_1 import sum_of_minima
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.behavior.planner import BehaviorPlanner
@@ -70,9 +71,21 @@ def timed_plans(roads: RoadNetwork, inputs: list[tuple[EgoState, Detections]]) -
     planner = BehaviorPlanner(settings, CAR, roads, dt=DT, seed=0)
     times = []
     for ego, objects in inputs:
-        begin = time.perf_counter()
+        begin = time.thread_time()
         planner.plan(ego, objects, Goal(), ego.time)
-        times.append(time.perf_counter() - begin)
+        times.append(time.thread_time() - begin)
+    return times
+
+
+def timed_ticks(simulation: Simulation) -> list[float]:
+    """Return the time of each tick of a run [s]."""
+    times: list[float] = []
+    end = None
+    with simulation:
+        while end is None:
+            begin = time.thread_time()
+            _, end = simulation.tick()
+            times.append(time.thread_time() - begin)
     return times
 
 
@@ -93,14 +106,14 @@ def main() -> None:
         for planner in planners:
             settings = RunSettings(planner=planner, detector="oracle")
             scenario = load_for_seed(path, arguments.seed, settings.parameters)
-            ticks[planner].append(timed_run(Simulation(scenario, seed=arguments.seed, settings=settings)))
+            ticks[planner].append(timed_ticks(Simulation(scenario, seed=arguments.seed, settings=settings)))
     print(f"planner behavior with ten tracks, {TICKS} ticks, {arguments.runs} runs")
     print(f"  time per tick              {1e3 * sum_of_minima(plans) / TICKS:8.3f} ms   (aim: at most 1)")
     print(f"{SCENARIO} with 30 cars of background traffic, oracle, seed {arguments.seed}, {arguments.runs} runs")
     for planner in planners:
-        simulated, wall = DT * len(ticks[planner][0]), sum_of_minima(ticks[planner])
+        simulated, spent = DT * len(ticks[planner][0]), sum_of_minima(ticks[planner])
         aim = "   (aim: at least 10)" if planner == "behavior" else ""
-        print(f"  simulated s per wall s     {simulated / wall:8.1f}   {planner}{aim}")
+        print(f"  simulated s per s          {simulated / spent:8.1f}   {planner}{aim}")
 
 
 if __name__ == "__main__":
