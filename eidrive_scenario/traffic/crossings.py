@@ -20,6 +20,10 @@ CLEARANCE = 3.2
 
 It is less than that of adjacent lanes, and more than two cars need whose ends swing out in bends.
 """
+TIGHT = 6.0
+"""Radius of bends below which long ends need more than `CLEARANCE` [m]."""
+FRONT, HALF_WIDTH = 4.7, 1.0
+"""Distance of the front of a van from its rear axle, which follows the lane, and half its width [m]."""
 FORK = 9.0
 """Distance from the start at which diverging lanes are separate [m]."""
 SAMPLE = 0.75
@@ -54,16 +58,24 @@ class Crossings:
         mine = lines[row]
         tree = cKDTree(mine)
         for other in self.junction_lanes(row):
-            near_by = np.all(low[other] <= high[row] + CLEARANCE) and np.all(low[row] <= high[other] + CLEARANCE)
+            reach = CLEARANCE + max(self._swings[row], self._swings[other])
+            near_by = np.all(low[other] <= high[row] + reach) and np.all(low[row] <= high[other] + reach)
             if self._lanes.road[other] == self._lanes.road[row] or not near_by:
                 continue
             line = lines[other]
-            near = np.flatnonzero(tree.query(line)[0] < CLEARANCE)
+            together = np.hypot(*(line[0] - mine[0])) < 1.0
+            near = np.flatnonzero(tree.query(line)[0] < (CLEARANCE if together else reach))
             if near.size:
-                together = np.hypot(*(line[0] - mine[0])) < 1.0
                 found[other] = bool(together and near.max() * SAMPLE < 2.0 * FORK)
         self._meeting[row] = found
         return found
+
+    @cached_property
+    def _swings(self) -> Array:
+        """Width (N,) by which the front of a van swings out farther in the bends of lanes than `CLEARANCE` permits."""
+        rows = np.arange(len(self._lanes.keys))
+        radius = 1.0 / np.maximum(self._lanes.tightest(rows), 1e-6)
+        return np.maximum(_swing(radius) - _swing(np.array(TIGHT)), 0.0)
 
     @cached_property
     def _lines(self) -> tuple[dict[int, Array], Array, Array]:
@@ -108,3 +120,9 @@ class Crossings:
         """Release all lanes that `name` holds."""
         for held in self.holders.values():
             held.pop(name, None)
+
+
+def _swing(radius: Array) -> Array:
+    """Return the width by which the outer front corner of a van is outside of the path of its rear end [m]."""
+    outer = radius + HALF_WIDTH
+    return np.asarray(np.hypot(outer, FRONT) - outer)
