@@ -64,9 +64,9 @@ driven-files: install  ## drive the files of EIDRIVE_CORPORA by the planner: rep
 	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of the maps of ScenarioRunner'; exit 2; }
 	$(BIN)/python -m eidrive_scenario.experiments.driven_corpora --out reports --resume
 
-long-drives: install  ## drive ten minutes through traffic on Town01 and Town04 of EIDRIVE_MAPS: reports/long_drives.md
+long-drives: install  ## drive at least ten minutes through traffic on Town01 and Town04 of EIDRIVE_MAPS: reports/long_drives.md
 	@test -n "$$EIDRIVE_MAPS" || { echo 'EIDRIVE_MAPS is not set: the folder of Town01.xodr and Town04.xodr'; exit 2; }
-	$(BIN)/python -m eidrive_scenario.experiments.long_drives "$$EIDRIVE_MAPS"/Town01.xodr "$$EIDRIVE_MAPS"/Town04.xodr --out reports
+	$(BIN)/python -m eidrive_scenario.experiments.long_drives "$$EIDRIVE_MAPS"/Town01.xodr "$$EIDRIVE_MAPS"/Town04.xodr --minutes 15 --out reports
 
 corner-cases: install  ## run the corner cases with and without messages, 10 seeds each: reports/corner_cases.md
 	$(BIN)/python -m eidrive_scenario.experiments.corner_cases --out reports
