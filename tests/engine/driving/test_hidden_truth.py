@@ -26,6 +26,8 @@ CASES = [
     if entry.name not in WITHOUT_DRIVER
     for channel in (("none", "ideal") if entry.family in WITH_STATIONS else ("none",))
 ]
+PARAMETERS = {"corner_cases/wrong_clock": {"ClockOffset": "0"}}
+"""Parameters by scenario: a wrong clock moves reported actors by more than `NEAR`, so that they count as unknown."""
 LONGEST = 8.0
 """Maximum simulated time [s]."""
 SHIFT = 0.6
@@ -45,7 +47,8 @@ class Decision(NamedTuple):
 
 
 def decisions(path: Path, channel: str) -> Iterator[Decision]:
-    settings = RunSettings(channel=channel, planner="behavior")
+    parameters = PARAMETERS.get(f"{path.parent.name}/{path.stem}")
+    settings = RunSettings(channel=channel, planner="behavior", parameters=parameters)
     with Simulation(path, seed=1, settings=settings) as simulation:
         known: frozenset[str] = frozenset()
         end = None
