@@ -47,7 +47,7 @@ class Decision(NamedTuple):
 
 
 def decisions(path: Path, channel: str) -> Iterator[Decision]:
-    parameters = PARAMETERS.get(f"{path.parent.name}/{path.stem}")
+    parameters = PARAMETERS.get(f"{path.parent.name}/{path.stem}", {})
     settings = RunSettings(channel=channel, planner="behavior", parameters=parameters)
     with Simulation(path, seed=1, settings=settings) as simulation:
         known: frozenset[str] = frozenset()
