@@ -99,7 +99,7 @@ def table(runs: Sequence[SceneRun]) -> str:
         "|---|---|---|---|---|---|---|",
     ]
     for scenario in dict.fromkeys(run.scenario for run in runs):
-        cells = [f"`{scenario}`"]
+        cells = [scenario]
         for planner in PLANNERS:
             mine = [run for run in runs if (run.scenario, run.planner) == (scenario, planner)]
             cells.append(f"{sum(run.collided for run in mine)}, {sum(run.at_fault for run in mine)} of {len(mine)}")
