@@ -16,8 +16,9 @@ from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.requests import Goal
-from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads import LaneLocation, RoadNetwork, RouteError
 from eidrive_scenario.roads.routing.costs import assumed_speed
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
@@ -30,6 +31,8 @@ STRIDE = 10
 """Number of lane points that are computed in one step on a continuous lane."""
 TURNS = 50.0
 """Maximum length of a road that may lead into itself within a stride [m]."""
+LONGEST = 200_000.0
+"""Maximum length of a way to a destination [m]; a path has a point for each meter."""
 BEYOND = 100.0
 """Distance beyond the end of the road within which a vehicle still stops for it [m]; farther away it was teleported."""
 BEHIND = 5
@@ -41,7 +44,8 @@ class RoutePlanner(Planner):
 
     A lap after the path is repeated. Without path and waypoints the planner follows its lane, at most to the end of the
     road. Outside roads, waypoints are connected by a smooth curve. Objects are ignored. With `obey_signals` the vehicle
-    stops at red lights and stop signs in sight. Raise RouteError if no road leads to a waypoint.
+    stops at red lights and stop signs in sight. Raise RouteError if no road leads to a waypoint, or if the way is too
+    long.
     """
 
     max_lateral_offset: ClassVar[float] = 2.5
@@ -154,10 +158,12 @@ class RoutePlanner(Planner):
     ) -> PlannedPath:
         line: Array | None = None
         if path is not None and len(path) > 1:
+            _check_length(path)
             if lap is not None:
                 return _with_laps(path, lap)
             line = path[:, :2]
         elif waypoints is not None and len(waypoints):
+            _check_length(np.vstack([[x, y, 0.0], waypoints]))
             line = self._by_road(x, y, waypoints)
             line = _curve(x, y, yaw, waypoints) if line is None else line
         if line is None:
@@ -223,6 +229,15 @@ def _with_laps(line: Array, lap: Array) -> PlannedPath:
     length = float(np.hypot(*np.diff(lap[:, :2], axis=0).T).sum())
     laps = [lap[1:, :2]] * math.ceil(LOOK_AHEAD * SPACING / length)
     return PlannedPath(np.concatenate([line[:, :2], *laps]), ends=False)
+
+
+def _check_length(line: Array) -> None:
+    """Raise RouteError if a polyline (K, 3) is longer than LONGEST."""
+    length = float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+    if not length <= LONGEST:
+        x, y = line[-1, :2].tolist()
+        message = f"the way to the destination at ({x:g}, {y:g}) m has a length of {length / 1000.0:,.0f} km"
+        raise RouteError(Diagnostic(message, f"a way has at most {LONGEST / 1000.0:.0f} km: check the position"))
 
 
 def _same(first: Array | None, second: Array | None) -> bool:

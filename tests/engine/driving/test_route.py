@@ -15,7 +15,7 @@ from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.requests import Goal
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import RoadNetwork, RouteError
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -206,3 +206,10 @@ def test_straight_path_without_roads_does_not_end(car: ActorSpec) -> None:
         assert plan.points[0][0] <= x <= plan.points[1][0] + 1e-9
         assert len(plan.points) == 60
         assert plan.speeds[0] == 10.0
+
+
+@pytest.mark.parametrize("axis", ["path", "waypoints"])
+def test_way_of_thousands_of_kilometers_is_an_error(car: ActorSpec, axis: str) -> None:
+    far = np.array([[0.0, 0.0, 0.0], [1.38e8, 0.0, 0.0]])
+    with pytest.raises(RouteError, match=r"the way to the destination .* has a length of 138,000 km"):
+        planner(car, None).plan(ego(0.0, 0.0), NOTHING, Goal(path=far) if axis == "path" else Goal(waypoints=far), 0.0)
