@@ -160,7 +160,7 @@ def test_car_that_is_delayed_at_yellow_stops_at_red() -> None:
     assert stops.next(front_at(8.0), 3.0, 2.6) is not None
 
 
-def test_car_that_passes_at_yellow_does_not_stop_on_the_line_at_red() -> None:
+def test_car_that_passes_at_yellow_continues_at_red() -> None:
     stops, _ = seen_at_yellow(15.0)
     stops.signals.update([SignalReading("east", "red")])
     assert stops.next(front_at(3.0), 10.0, 1.2) is None

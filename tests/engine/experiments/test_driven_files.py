@@ -77,9 +77,9 @@ def test_main_drives_a_file_and_resumes_from_its_record(tmp_path: Path, capsys: 
 
 def test_error_of_a_file_is_in_its_row_without_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path, 70.0)
-    driven_files.main([str(path), "--drive", "Nobody", "--out", str(tmp_path), "--workers", "1"])
+    driven_files.main([str(path), "--drive", "Unknown", "--out", str(tmp_path), "--workers", "1"])
     output = capsys.readouterr().out
-    assert "the scenario has no entity 'Nobody'" in output
+    assert "the scenario has no entity 'Unknown'" in output
     assert str(tmp_path) not in output
 
 

@@ -55,7 +55,7 @@ def test_obstacles_are_where_the_actors_are_in_every_view() -> None:
         assert bool(obstacles.moving) == (4.0 in speeds)
 
 
-def test_resting_actor_beyond_the_range_of_sight_is_ignored_until_a_car_is_near() -> None:
+def test_resting_actor_out_of_sight_is_ignored_until_a_car_is_near() -> None:
     obstacles = Obstacles(TrafficLanes(street(1, 1)))
     view = view_of({"a": parked(100.0), "far": parked(600.0)})
     for near, places in (([100.0], [100.0]), ([100.0, 500.0], [100.0, 600.0]), ([500.0], [600.0]), ([], [])):

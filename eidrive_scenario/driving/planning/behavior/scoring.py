@@ -143,7 +143,7 @@ def _overlaps(
     margin = np.maximum(scene.margin, CONTACT)[None, :, None]
     crossing = np.flatnonzero(scene.crosses.any(axis=1))
     shift = round(settings.crossing_time / float(times[1] - times[0]))
-    # Traffic with the right of way keeps its speed: nobody enters a junction shortly before it.
+    # Traffic with the right of way keeps its speed: no vehicle enters a junction shortly before it.
     favored = np.flatnonzero(scene.crosses.any(axis=1) & scene.yields)
     moved = [
         (rows, [_shifted(part[rows], later) for part in (scene.s, scene.d, scene.half_length, scene.half_width)])

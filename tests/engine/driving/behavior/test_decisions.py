@@ -200,7 +200,7 @@ def test_decisions_have_the_period_of_the_settings(roads: RoadNetwork) -> None:
 
 
 @pytest.mark.parametrize("start", [50.0, 58.0])
-def test_vehicle_that_cannot_stop_before_the_end_of_the_road_stops_behind_it(start: float) -> None:
+def test_vehicle_that_passes_the_end_of_the_road_stops_there(start: float) -> None:
     roads = two_lane_road(60.0)
     drive = PlannedDrive(behavior(roads, 11.0), roads, speed=11.0, start=start)
     drive.run(5.0, lambda _: ())
@@ -209,7 +209,7 @@ def test_vehicle_that_cannot_stop_before_the_end_of_the_road_stops_behind_it(sta
     assert drive.path[-1][0] < start + 20.0
 
 
-def test_vehicle_that_is_moved_from_the_end_of_the_road_follows_its_new_lane() -> None:
+def test_vehicle_moved_from_the_end_of_the_road_follows_its_lane() -> None:
     planner = behavior(two_lane_road(400.0), 10.0)
     at_end, on_lane = (EgoState(0.0, np.array([x, LANE, 0.0]), 0.0, 0.0, 0.0, 10.0, 0.0, 0.0) for x in (398.0, 100.0))
     planner.plan(at_end, detections(0.0), Goal(), 0.0)

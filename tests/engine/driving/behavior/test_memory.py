@@ -63,7 +63,7 @@ def test_lost_object_moves_on_grows_and_is_dropped() -> None:
     assert not objects.update(nothing, 1.1)
 
 
-def test_lost_object_out_of_view_is_kept_until_its_place_is_in_view() -> None:
+def test_lost_object_is_kept_while_its_place_is_out_of_view() -> None:
     objects = memory(memory=1.0)
     objects.update(detections(0.0, KnownBox(0.0, vx=10.0)), 0.0)
     for tick in range(1, 60):

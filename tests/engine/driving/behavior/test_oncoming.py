@@ -79,7 +79,7 @@ def test_meeting_before_the_return(start: float, meets: bool) -> None:
     assert meets_oncoming(PASSING, s, TIMES, oncoming, (math.inf, 10.0)) == meets
 
 
-def test_oncoming_traffic_is_in_the_way_from_when_it_reaches_the_offset_lane() -> None:
+def test_oncoming_traffic_is_in_the_way_once_on_the_lane() -> None:
     # The way is at 3 m to the left up to s = 50 m; the front of the object, 2.5 m ahead of its center, is there at 5 s.
     assert TIMES[first_oncoming(PASSING, 0.0, scene((102.5, 3.5, -10.0)), 0.9)] == pytest.approx(5.0, abs=1.2)
     for harmless in (scene(), scene((100.0, 3.5, 10.0)), scene((-10.0, 3.5, -10.0)), scene((100.0, 9.0, -10.0))):

@@ -60,7 +60,7 @@ def test_standing_leader_is_approached_to_the_standstill_gap() -> None:
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_first_step_is_the_model_behind_the_leader_that_demands_the_hardest_braking(order: tuple[int, int]) -> None:
+def test_first_step_follows_the_leader_that_demands_the_hardest_braking(order: tuple[int, int]) -> None:
     near, far = leader(40.0, 12.0), leader(60.0, 2.0)
     parts = [(near, far)[index] for index in order]
     names = [name for name in Surroundings.__struct_fields__ if name != "owner"]
