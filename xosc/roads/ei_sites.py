@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 
 from xosc.roads.crossings import OPPOSITE_PAIRS, all_movements
-from xosc.roads.layout import Arm, Junction, Layout, Piece, Road, Section, Way, movement, side_road
+from xosc.roads.layout import Arm, Junction, Layout, Piece, Road, Section, Way, movement
+from xosc.roads.movements import side_road
 from xosc.roads.streets import (
     AVENUE,
     BOULEVARD,

@@ -8,31 +8,30 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.driving.planning.behavior.bounds import FREE, LIMIT, WALL, Course
-from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, towards
+from eidrive_scenario.driving.planning.behavior.bounds import FREE, WALL, Course
+from eidrive_scenario.driving.planning.behavior.lateral import ROUTE, Body, LateralProfile, towards
 from eidrive_scenario.driving.planning.behavior.maneuvers import passing_profiles
-from eidrive_scenario.driving.planning.behavior.oncoming import ONCOMING_SPEED, OncomingTraffic
+from eidrive_scenario.driving.planning.behavior.oncoming import OncomingTraffic
 from eidrive_scenario.driving.planning.behavior.options import Options
 from eidrive_scenario.driving.planning.behavior.proposals import (
-    Conflict,
     Precedence,
     Proposal,
     Wall,
     conflicts,
     crossing_walls,
     inside_way,
+    leading,
     proposals_for,
 )
+from eidrive_scenario.driving.planning.behavior.reasons import reason_of
 from eidrive_scenario.driving.planning.behavior.rollout import Roller
 from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
-from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, surroundings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
-ROUTE = "route"
-"""Name of the maneuver without a lateral deviation."""
 OFF_PROFILE = 0.8
 """Distance from the current profile above which the vehicle starts a new one from its position [m]."""
 SATISFIED = 0.85
@@ -166,7 +165,7 @@ class Decider:
         self, situation: Situation, scene: Surroundings, options: Options, threat: int
     ) -> Decision:
         """Return the decision if a hypothesis of uncertain existence is no reason for more than a gentle stop."""
-        certain = self._options(situation, _only_certain(scene), options.profiles[:1], (situation.s, situation.d))
+        certain = self._options(situation, only_certain(scene), options.profiles[:1], (situation.s, situation.d))
         choice, stop = int(np.argmax(certain.evaluation.score)), certain.gentle
         if self._acceleration(certain, choice) < self._acceleration(certain, stop):
             return self._decision(situation, certain, choice)
@@ -233,7 +232,7 @@ class Decider:
                 kind = proposal.precedence
                 if kind not in reactions:
                     before = [*crossing_walls(found, self._times, here, kind, reasons), *stops]
-                    reactions[kind] = before, _leads(scene, way, found, situation.s + self._center, proposal)
+                    reactions[kind] = before, leading(scene, way, found, situation.s + self._center, proposal)
                 walls.append(reactions[kind][0])
                 leads.append(reactions[kind][1])
             proposals += made
@@ -305,55 +304,8 @@ class Decider:
         self._current = profile
         speed, s = options.rolled.speed[best], options.rolled.s[best]
         acceleration = self._acceleration(options, best)
-        reason, objects = self._reason(situation, options, best)
+        reason, objects = reason_of(situation, options, best)
         braking = proposal.deceleration if proposal.is_emergency else None
         causes = options.rolled.cause[best]
         is_free = proposal.share == 1.0 and not proposal.is_emergency and bool((causes == FREE).all())
         return Decision(profile, s, speed, acceleration, braking, reason, objects, is_free)
-
-    def _reason(self, situation: Situation, options: Options, best: int) -> tuple[str, tuple[int, ...]]:
-        """Return the reason of a proposal, and the rows of its objects."""
-        proposal = options.proposals[best]
-        profile = options.profiles[proposal.profile]
-        threat = int(options.evaluation.cause[best])
-        owners = situation.prediction.objects
-        if proposal.is_emergency:
-            others = [row for row, other in enumerate(options.proposals) if not other.is_emergency]
-            threat = int(options.evaluation.cause[others[0]]) if others else threat
-            what = "" if threat < 0 else f": collision course with {situation.kind_of(owners[threat])}"
-            return f"emergency braking{what}", situation.rows_of(owners[threat] if threat >= 0 else None)
-        maneuver = "" if profile.name == ROUTE else f"{profile.name}; "
-        for cause in options.rolled.cause[best].tolist():
-            if cause >= 0:
-                return f"{maneuver}follow {situation.describe(owners[cause])}", situation.rows_of(owners[cause])
-            if cause <= WALL:
-                wall = options.walls[best][WALL - cause]
-                owner = None if wall.owner is None else owners[wall.owner]
-                return f"{maneuver}{wall.reason}", situation.rows_of(owner)
-        causes = options.rolled.cause[best].tolist()
-        if proposal.share < 1.0:
-            return f"{maneuver}slow down for traffic ahead", ()
-        if LIMIT in causes and causes[0] != FREE:
-            return f"{maneuver}curve or end of route ahead", ()
-        return f"{maneuver}keep speed", ()
-
-
-def _leads(scene: Surroundings, way: Bools, found: list[Conflict], center: float, proposal: Proposal) -> Bools:
-    """Return where hypotheses lead the vehicle (N, K): in its way and not crossing.
-
-    An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way.
-    """
-    leads = way & ~scene.crosses & ~scene.behind[:, None]
-    if proposal.precedence == "all":
-        for conflict in found:
-            row = conflict.hypothesis
-            is_oncoming = float(scene.speed[row, conflict.first]) < -ONCOMING_SPEED
-            if not conflict.crosses and not is_oncoming and float(scene.s[row, 0]) > center:
-                leads[row, : conflict.first] = True
-    return np.asarray(leads)
-
-
-def _only_certain(scene: Surroundings) -> Surroundings:
-    """Return the scene without objects of low existence probability, which neither lead nor collide."""
-    aside = np.where(scene.certain[:, None], scene.d, 1e3)
-    return msgspec.structs.replace(scene, d=aside)

@@ -10,6 +10,8 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 
+ROUTE = "route"
+"""Name of the maneuver without a lateral deviation."""
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 """Peak of the second derivative of the quintic blend from 0 to 1 in unit time: 5.774."""
 SHORTEST = 11.0

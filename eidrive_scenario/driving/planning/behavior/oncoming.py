@@ -8,12 +8,10 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
-from eidrive_scenario.driving.planning.behavior.proposals import inside_way
+from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, inside_way
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
-ONCOMING_SPEED = 0.5
-"""Speed against the direction of the vehicle above which an object is oncoming [m/s]."""
 LANES = 6.0
 """Offset from the line within which oncoming traffic counts [m]: two lanes."""
 PAUSE = 6.0

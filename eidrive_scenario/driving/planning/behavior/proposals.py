@@ -18,6 +18,8 @@ Precedence = Literal["all", "earlier", "none"]
 
 SPEED_SHARES = (1.0, 0.7, 0.4)
 """Target speeds of proposals, as shares of the wanted speed."""
+ONCOMING_SPEED = 0.5
+"""Speed against the direction of the vehicle above which an object is oncoming [m/s]."""
 BEFORE_ZONE = 1.5
 """Distance between the front of a waiting vehicle and the zone that others cross [m]."""
 RELEASE = 0.3
@@ -135,3 +137,18 @@ def speed_limits(curvature: Array, path_limits: Array, spacing: float, settings:
     for index in range(len(values) - 2, -1, -1):
         values[index] = min(values[index], math.sqrt(values[index + 1] ** 2 + gain))
     return np.array(values)
+
+
+def leading(scene: Surroundings, way: Bools, found: list[Conflict], center: float, proposal: Proposal) -> Bools:
+    """Return where hypotheses lead the vehicle (N, K): in its way and not crossing.
+
+    An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way.
+    """
+    leads = way & ~scene.crosses & ~scene.behind[:, None]
+    if proposal.precedence == "all":
+        for conflict in found:
+            row = conflict.hypothesis
+            is_oncoming = float(scene.speed[row, conflict.first]) < -ONCOMING_SPEED
+            if not conflict.crosses and not is_oncoming and float(scene.s[row, 0]) > center:
+                leads[row, : conflict.first] = True
+    return np.asarray(leads)

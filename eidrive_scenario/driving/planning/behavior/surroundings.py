@@ -124,3 +124,9 @@ def _yields(prediction: Prediction, gives_way: Callable[[Passage], bool] | None)
     if gives_way is None or not any(prediction.passages):
         return np.zeros(len(prediction.objects), dtype=bool)
     return np.array([any(map(gives_way, passages)) for passages in prediction.passages], dtype=bool)
+
+
+def only_certain(scene: Surroundings) -> Surroundings:
+    """Return the scene without objects of low existence probability, which neither lead nor collide."""
+    aside = np.where(scene.certain[:, None], scene.d, 1e3)
+    return msgspec.structs.replace(scene, d=aside)
