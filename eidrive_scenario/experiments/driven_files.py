@@ -22,12 +22,12 @@ import numpy as np
 from rich.console import Console
 
 from eidrive_scenario.errors import ConstraintError, EidriveError
-from eidrive_scenario.experiments.driven_motion import CONTACT, DrivenMotion
+from eidrive_scenario.experiments.driven_motion import CONTACT, observed_run
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution
 from eidrive_scenario.openscenario.values.parameters import Assignment
-from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation import RunSettings
 
 STACK, REFERENCE = "stack", "reference"
 ORACLE = {"detector": "oracle", "mount": "roof", "range": 150}
@@ -123,19 +123,12 @@ def run_of(job: DrivenJob) -> DrivenRun:
         name: value.text if isinstance(value, Assignment) else value for name, value in job.settings.parameters.items()
     }
     run = DrivenRun(job.file, job.number, job.arm, job.seed, values, group=job.group)
-    motion = DrivenMotion(job.drive)
     try:
-        with Simulation(job.scenario, seed=job.seed, settings=job.settings) as simulation:
-            end = None
-            while end is None:
-                frame, end = simulation.tick()
-                motion.observe(frame, simulation.criteria)
-            result = simulation.result()
+        result, motion = observed_run(job.scenario, job.drive, seed=job.seed, settings=job.settings)
     except ConstraintError:
         return replace(run, excluded=True)
     except EidriveError as error:
         return replace(run, error=str(error).splitlines()[0].replace(f"{Path(job.scenario).parent}{os.sep}", ""))
-    motion.finish()
     own = [verdict for verdict in result.criteria if verdict.name != CONTACT]
     return replace(
         run,

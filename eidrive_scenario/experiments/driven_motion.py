@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from eidrive_scenario.evaluation.criterion import Criterion
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
 
 CONTACT = "contact"
 """Name of the criterion that judges the contacts of the vehicle."""
@@ -126,3 +128,18 @@ class DrivenMotion:
         if not 0 < steps < len(speeds):
             return 0.0
         return float(max((speeds[:-steps] - speeds[steps:]).max() / WINDOW, 0.0))
+
+
+def observed_run(
+    scenario: str | Path, vehicle: str, *, seed: int, settings: RunSettings
+) -> tuple[RunResult, DrivenMotion]:
+    """Run a scenario and return its result and the motion of a vehicle."""
+    motion = DrivenMotion(vehicle)
+    with Simulation(scenario, seed=seed, settings=settings) as simulation:
+        end = None
+        while end is None:
+            frame, end = simulation.tick()
+            motion.observe(frame, simulation.criteria)
+        result = simulation.result()
+    motion.finish()
+    return result, motion

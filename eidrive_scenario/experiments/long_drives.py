@@ -18,11 +18,11 @@ from pathlib import Path
 from rich.console import Console
 
 from eidrive_scenario.errors import EidriveError
-from eidrive_scenario.experiments.driven_motion import CONTACT, DrivenMotion, Stop
+from eidrive_scenario.experiments.driven_motion import CONTACT, Stop, observed_run
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.experiments.town_drives import EGO, write_town_drive
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation import RunSettings
 
 LONGEST = 600.0
 """Maximum duration of a drive [min]."""
@@ -47,14 +47,7 @@ class LongDrive:
 
 def run_of(job: Job) -> LongDrive:
     """Run a job and return its outcome."""
-    motion = DrivenMotion(EGO)
-    with Simulation(job.scenario, seed=job.seed, settings=job.settings) as simulation:
-        end = None
-        while end is None:
-            frame, end = simulation.tick()
-            motion.observe(frame, simulation.criteria)
-        result = simulation.result()
-    motion.finish()
+    result, motion = observed_run(job.scenario, EGO, seed=job.seed, settings=job.settings)
     return LongDrive(
         Path(job.scenario).stem,
         job.seed,
