@@ -101,8 +101,8 @@ def build_agent(
 ) -> Agent:
     """Build the agent of a station. `detector` is an instance that is built already.
 
-    A vehicle without a planner in its settings follows a route. A station that does not drive receives messages only if
-    its settings select senders. Raise SettingError if an actor without wheels has a planner.
+    A vehicle without a planner in its settings has the default one. A station that does not drive receives messages
+    only if its settings select senders. Raise SettingError if an actor without wheels has a planner.
     """
     planner = settings.planner or (DEFAULT_PLANNER if spec.has_wheels else NO_PLANNER)
     if planner != NO_PLANNER and not spec.has_wheels:
