@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
+from mirrored_scenario import mirror_areas, mirror_positions, mirror_road
 
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
@@ -48,18 +49,6 @@ class RunTrace:
         """Do nothing."""
 
 
-def scale(node: Node, *names: str, by: float = -1.0) -> None:
-    for name in names:
-        if node.get(name) is not None:
-            node.set(name, repr(by * float(node.attrib[name])))
-
-
-def negate_lane(node: Node, *names: str) -> None:
-    for name in names:
-        if node.get(name) is not None:
-            node.set(name, str(-int(node.attrib[name])))
-
-
 def rotate(x: float, y: float) -> tuple[float, float]:
     cos, sin = math.cos(TURN), math.sin(TURN)
     return EAST + cos * x - sin * y, NORTH + sin * x + cos * y
@@ -71,36 +60,6 @@ def rotate_road(road: Node) -> None:
         geometry.set("x", repr(x))
         geometry.set("y", repr(y))
         geometry.set("hdg", repr(float(geometry.attrib["hdg"]) + TURN))
-
-
-def mirror_road(road: Node) -> None:
-    for node in road.iter("geometry"):
-        scale(node, "y", "hdg")
-    for node in road.iter("arc", "spiral"):
-        scale(node, "curvature", "curvStart", "curvEnd")
-    for node in road.iter("laneOffset"):
-        scale(node, "a", "b", "c", "d")
-    for node in road.iter("object", "cornerRoad", "signal"):
-        scale(node, "t", "hdg", "hOffset")
-    for node in road.iter("validity"):
-        negate_lane(node, "fromLane", "toLane")
-        first, last = node.attrib["fromLane"], node.attrib["toLane"]
-        node.set("fromLane", last)
-        node.set("toLane", first)
-    for node in road.iter("laneLink"):
-        negate_lane(node, "from", "to")
-    for node in road.iter("road"):
-        node.set("rule", "LHT" if node.get("rule", "RHT") == "RHT" else "RHT")
-    for section in road.iter("laneSection"):
-        for lane in section.iter("lane"):
-            negate_lane(lane, "id")
-            for link in lane.iter("predecessor", "successor"):
-                negate_lane(link, "id")
-        sides = {side.tag: side for side in section if side.tag in ("left", "right")}
-        for side in sides.values():
-            side[:] = list(reversed(side))
-            side.tag = "right" if side.tag == "left" else "left"
-        section[:] = sorted(section, key=lambda side: ["left", "center", "right"].index(side.tag))
 
 
 def rotate_scenario(text: str) -> str:
@@ -115,18 +74,15 @@ def rotate_scenario(text: str) -> str:
     return re.sub(AREA, area, re.sub(PLACE, place, text))
 
 
-def mirror_scenario(text: str) -> str:
-    def area(found: re.Match[str]) -> str:
-        x0, x1, y0, y1 = map(float, found[1].split(","))
-        return f'"conflict_area" value="{[x0, x1, -y1, -y0]}"'
-
-    text = re.sub(PLACE, r'<WorldPosition x="\1" y="\g<2>" z="0" h="\3"/>', text)
-    text = re.sub(PLACE, lambda f: f'<WorldPosition x="{f[1]}" y="{-float(f[2])}" z="0" h="{-float(f[3])}"/>', text)
-    return re.sub(AREA, area, re.sub(r'laneId="(-?\d+)"', lambda f: f'laneId="{-int(f[1])}"', text))
-
-
 PLACE = r'<WorldPosition x="([-\d.]+)" y="([-\d.]+)" z="0" h="([-\d.]+)"/>'
 AREA = r'"conflict_area" value="\[([^\]]*)\]"'
+
+
+def mirror_scenario(text: str) -> str:
+    root = etree.fromstring(text.encode())
+    mirror_positions(root)
+    mirror_areas(root)
+    return etree.tostring(root, encoding="unicode")
 
 
 def rotate_poses(poses: np.ndarray) -> np.ndarray:

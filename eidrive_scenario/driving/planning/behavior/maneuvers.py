@@ -1,4 +1,4 @@
-"""Lateral maneuvers: change to the lane to the left, pass an obstacle on either side."""
+"""Lateral maneuvers: change to the lane for overtaking, pass an obstacle on either side."""
 
 from __future__ import annotations
 
@@ -52,11 +52,12 @@ def passing_profiles(
         return []
     found = []
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
-    if not math.isnan(beside.left) and _rear_is_free(situation, scene, beside.left, body.center):
-        name = "change lane to the left"
+    faster, overtaking = beside.faster, beside.overtaking
+    if not math.isnan(faster) and _rear_is_free(situation, scene, faster, body.center):
+        name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = (*situation.steered, situation.speed)
-        found.append(towards(name, beside.left, *start, settings.lateral_acceleration, side=1))
-    for side in (1, -1):
+        found.append(towards(name, faster, *start, settings.lateral_acceleration, side=overtaking))
+    for side in (overtaking, -overtaking):
         profile = _around_blocker(situation, scene, settings, blocker, body, side)
         if profile is not None:
             found.append(profile)
@@ -136,12 +137,11 @@ def _around_blocker(
         ends = ends + speed * duration
         begin += float(speed.min()) * max(begin - situation.s, 0.0) / max(wanted - float(speed.min()), 0.5)
     end = float(ends.max()) + body.rear + body.wheelbase + BEFORE_OBSTACLE
-    edges = [situation.line.lanes_beside(situation.lanes_at(place)) for place in np.linspace(begin, end, 4).tolist()]
+    beside = [situation.line.lanes_beside(situation.lanes_at(place)) for place in np.linspace(begin, end, 4).tolist()]
     vulnerable = any(situation.kind_of(scene.owner[row]) in VULNERABLE for row in rows)
     clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
     outer = float((side * scene.d[rows, 0] + scene.half_width[rows, 0]).max())
-    own = min(edge.left_edge if side > 0 else -edge.right_edge for edge in edges)
-    every = min(edge.any_left_edge if side > 0 else -edge.right_edge for edge in edges)
+    own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in beside), strict=True))
     for margin in (clearance + SPARE, LEAST_CLEARANCE) if not vulnerable else (clearance + SPARE,):
         value = max(outer + margin + half_width, 0.0)
         if value + half_width <= every:

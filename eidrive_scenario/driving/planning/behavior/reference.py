@@ -22,11 +22,12 @@ WITHOUT_ROAD = 1.75
 class LanesBeside(NamedTuple):
     """Lanes at one point of the reference line; offsets to its left [m], NaN without such a lane.
 
-    own                  center of the lane at the point
-    left, right          centers of the neighboring lanes of the same direction
-    oncoming             center of the left neighboring lane of the opposite direction
-    left_edge            edge of the lanes of the same direction;  any_left_edge  edge of all lanes to the left
-    right_edge           edge of the lanes to the right
+    own                    center of the lane at the point
+    left, right            centers of the neighboring lanes of the same direction
+    oncoming               center of the nearest lane of the opposite direction
+    left_edge, right_edge  edges of the lanes of the same direction
+    far_edge               edge of all lanes on the side for overtaking
+    overtaking             side for overtaking: 1 (left) with traffic on the right, -1 (right) with traffic on the left
     """
 
     own: float = 0.0
@@ -34,8 +35,35 @@ class LanesBeside(NamedTuple):
     right: float = math.nan
     oncoming: float = math.nan
     left_edge: float = WITHOUT_ROAD
-    any_left_edge: float = WITHOUT_ROAD
     right_edge: float = -WITHOUT_ROAD
+    far_edge: float = WITHOUT_ROAD
+    overtaking: int = 1
+
+    @property
+    def faster(self) -> float:
+        """Center of the neighboring lane of the same direction on the side for overtaking [m]."""
+        return self.left if self.overtaking > 0 else self.right
+
+    def room(self, side: int) -> tuple[float, float]:
+        """Return the distances from the line to the edge of the lanes of the same direction and of all lanes [m].
+
+        side  1 for the left, -1 for the right; only on the side for overtaking lanes of the opposite direction count
+        """
+        same = side * (self.left_edge if side > 0 else self.right_edge)
+        return same, side * self.far_edge if side == self.overtaking else same
+
+    def mirrored(self) -> LanesBeside:
+        """Return the lanes with left and right exchanged."""
+        return LanesBeside(
+            -self.own,
+            -self.right,
+            -self.left,
+            -self.oncoming,
+            -self.right_edge,
+            -self.left_edge,
+            -self.far_edge,
+            -self.overtaking,
+        )
 
 
 class ReferenceLine:
@@ -121,23 +149,23 @@ class ReferenceLine:
             center[number] = (lane_t(road, section, lane, place.s)[0] - place.t) * sense
             half[number] = lane.width.value(place.s - section.s) / 2.0
         own = order.index(place.lane)
-        return _beside(
-            [
-                (center[n], half[n], section.lanes[n].drivable, roads.driving_direction(road.id, n) == sense)
-                for n in order
-            ],
-            own,
-        )
+        lanes = [
+            (center[n], half[n], section.lanes[n].drivable, roads.driving_direction(road.id, n) == sense) for n in order
+        ]
+        if road.rule == "RHT":
+            return _beside(lanes, own)
+        lanes = [(-place, width, drivable, with_traffic) for place, width, drivable, with_traffic in reversed(lanes)]
+        return _beside(lanes, len(lanes) - 1 - own).mirrored()
 
 
 def _beside(lanes: list[tuple[float, float, bool, bool]], own: int) -> LanesBeside:
-    """Return the lanes beside one of the lanes of a section, from left to right.
+    """Return the lanes beside one of the lanes of a section, from left to right, with traffic on the right.
 
     lanes  center to the left of the line and half width [m], whether it is drivable, and whether its traffic drives in
            the direction of the line
     """
     center, half, _, _ = lanes[own]
-    left_edge = any_left_edge = center + half
+    left_edge = far_edge = center + half
     right_edge = center - half
     left = right = oncoming = math.nan
     same = True
@@ -145,9 +173,9 @@ def _beside(lanes: list[tuple[float, float, bool, bool]], own: int) -> LanesBesi
         if not drivable:
             break
         same = same and with_traffic
-        any_left_edge = place + width
+        far_edge = place + width
         if same:
-            left_edge = any_left_edge
+            left_edge = far_edge
             left = place if math.isnan(left) and 2.0 * width >= NARROWEST else left
         elif math.isnan(oncoming) and math.isnan(left):
             oncoming = place
@@ -156,4 +184,4 @@ def _beside(lanes: list[tuple[float, float, bool, bool]], own: int) -> LanesBesi
             break
         right_edge = place - width
         right = place if math.isnan(right) and 2.0 * width >= NARROWEST else right
-    return LanesBeside(center, left, right, oncoming, left_edge, any_left_edge, right_edge)
+    return LanesBeside(center, left, right, oncoming, left_edge, right_edge, far_edge)
