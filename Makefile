@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet clean
+.PHONY: help install demo test lint reproduce docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -32,7 +32,8 @@ lint: install   ## check style, types and import contracts
 docs: install   ## update the coverage table of docs/openscenario.md
 	$(BIN)/python tests/coverage_table.py
 
-reproduce-trends: install  ## compare measured with expected trends: reports/trends/*.png
+reproduce: install  ## repeat the experiments of the paper, and compare trends with expected ones: reports/paper, reports/trends
+	OPENBLAS_NUM_THREADS=1 $(BIN)/eidrive reproduce all --out reports/paper
 	$(BIN)/python -m eidrive_scenario.reporting.trends --out reports/trends
 
 bench: install  ## measure simulated seconds per wall second, and the time per package

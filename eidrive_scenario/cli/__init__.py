@@ -11,6 +11,7 @@ import typer
 
 from eidrive_scenario.cli.check import check
 from eidrive_scenario.cli.error_output import Guarded, print_error
+from eidrive_scenario.cli.reproduce import reproduce
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
 from eidrive_scenario.cli.streams import make_writable
@@ -31,6 +32,7 @@ app.command(name="list")(list_names)
 app.command()(tree)
 app.command()(view)
 app.command()(report)
+app.command()(reproduce)
 
 
 def _show_version(requested: bool) -> None:

@@ -95,7 +95,7 @@ def run(
     """Run and evaluate a scenario, or all runs of a parameter value distribution."""
     from eidrive_scenario.cli.batch import run_distribution
     from eidrive_scenario.cli.verdicts import show, show_warnings
-    from eidrive_scenario.experiments.reproduction import reproduction_lines
+    from eidrive_scenario.experiments.commands import reproduction_lines
     from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.recording import Explanation

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
-from eidrive_scenario.experiments.reproduction import reproduction_lines
+from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.simulation import RunResult
 
 _OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("time limit", "bold red")}

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.experiments.published import TABLE_2, Published
 from eidrive_scenario.experiments.repetitions import Job
 from eidrive_scenario.experiments.statistics import (
     PairedDifference,
@@ -60,27 +61,6 @@ ARMS = (
 LINKS = ModelVariant("links", "the channel acts on links only", False)
 OWN = ModelVariant("own_perception", "the ego's own detections too, as the paper's code has it", True)
 VARIANTS = (LINKS, OWN)
-
-
-@dataclass(frozen=True)
-class Published:
-    """Published mean, standard deviation and distances of the five episodes [m]."""
-
-    mean: float
-    sd: float
-    episodes: tuple[float, ...]
-
-
-PUBLISHED = {
-    ("coop/scenario_1", "none"): Published(3.26, 0.08, (3.2948, 3.2945, 3.2914, 3.1012, 3.2947)),
-    ("coop/scenario_1", "cooperation"): Published(3.98, 0.16, (3.8461, 3.8395, 3.8452, 4.1794, 4.1811)),
-    ("coop/scenario_1", "latency"): Published(2.50, 0.68, (1.9975, 1.9975, 3.3246, 3.3245, 1.8549)),
-    ("coop/scenario_1", "error"): Published(3.15, 1.07, (4.0286, 1.8226, 4.0330, 1.8549, 4.0292)),
-    ("coop/scenario_2", "none"): Published(3.90, 0.01, (3.9105, 3.9156, 3.8966, 3.8785, 3.9165)),
-    ("coop/scenario_2", "cooperation"): Published(4.42, 0.00, (4.4243, 4.4243, 4.4243, 4.4243, 4.4245)),
-    ("coop/scenario_2", "latency"): Published(3.50, 0.01, (3.5012, 3.4880, 3.5024, 3.5010, 3.5052)),
-    ("coop/scenario_2", "error"): Published(4.32, 0.21, (4.4409, 4.4243, 3.9156, 4.4243, 4.4243)),
-}
 
 
 def run_settings(detector: str | None = None) -> dict[str, RunSettings]:
@@ -154,7 +134,7 @@ def tabulate(runs: Sequence[tuple[Job, RunResult]], variant: ModelVariant) -> Ta
                     centers=tuple(_metric(result, f"min_distance.{EGO}.{HIDDEN}.center") for _, result in mine),
                     boxes=tuple(_metric(result, f"min_distance.{EGO}.{HIDDEN}.box") for _, result in mine),
                     collision_free=wilson(free, len(mine)),
-                    published=PUBLISHED[scenario, arm.name],
+                    published=TABLE_2[scenario, "oracle", arm.name],
                 )
             )
     return Table(variant, tuple(cells))

@@ -47,8 +47,11 @@ def run_jobs(
     workers: int | None = None,
     console: Console | None = None,
     title: str = "runs",
+    finished: Callable[[T], None] | None = None,
 ) -> tuple[T, ...]:
     """Return the result of the task for every job, in the order of the jobs.
+
+    finished  function that gets each result in this process when its run has ended, in the order of the ends
 
     `task` is a module-level function: function and result are pickled for other processes. `workers` defaults to the
     number of cores; 1 runs all jobs in this process. `console` shows a progress bar.
@@ -67,25 +70,25 @@ def run_jobs(
     )
     with Progress(*columns, console=console, disable=console is None) as progress:
         bar = progress.add_task(title, total=len(jobs))
+
+        def end(result: T) -> T:
+            if finished is not None:
+                finished(result)
+            progress.advance(bar)
+            return result
+
         if workers == 1:
-            results = []
-            for job in jobs:
-                results.append(task(job))
-                progress.advance(bar)
-            return tuple(results)
-        return _in_processes(jobs, task, workers, lambda: progress.advance(bar))
+            return tuple(end(task(job)) for job in jobs)
+        return _in_processes(jobs, task, workers, end)
 
 
-def _in_processes(
-    jobs: Sequence[J], task: Callable[[J], T], workers: int, advance: Callable[[], None]
-) -> tuple[T, ...]:
+def _in_processes(jobs: Sequence[J], task: Callable[[J], T], workers: int, end: Callable[[T], T]) -> tuple[T, ...]:
     # Spawned, not forked: a child process must not inherit a physics client or a running progress thread.
     pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
     try:
         futures: list[Future[T]] = [pool.submit(task, job) for job in jobs]
         for future in as_completed(futures):
-            future.result()
-            advance()
+            end(future.result())
         return tuple(future.result() for future in futures)
     except BrokenProcessPool as error:
         raise SimulationError("a worker process died; run with one worker to see the error") from error

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.experiments.reproduction import command_of
+from eidrive_scenario.experiments.commands import command_of
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.library import resolve_scenario

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest, bootstrap
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.randomness import generator
 
 
@@ -71,8 +73,26 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Proportion:
 
 
 @dataclass(frozen=True)
+class MeanInterval:
+    """Mean of a sample with its bootstrap interval, in the unit of its values."""
+
+    mean: float
+    low: float
+    high: float
+
+
+def mean_interval(values: Sequence[float], *, confidence: float = 0.95) -> MeanInterval:
+    """Return the mean of at least one value with its percentile bootstrap interval, of zero width for a single value.
+
+    The bootstrap, because minimum distances of runs with and without a crash have two modes.
+    """
+    difference = paired_difference([0.0] * len(values), values, confidence=confidence)
+    return MeanInterval(difference.mean, difference.low, difference.high)
+
+
+@dataclass(frozen=True)
 class PairedDifference:
-    """Difference, second minus first, of pairs with equal seeds, with a bootstrap interval of its mean."""
+    """Difference, second minus first, of pairs with equal seeds, with its bootstrap interval."""
 
     pairs: int
     mean: float
@@ -84,23 +104,51 @@ class PairedDifference:
 def paired_difference(
     first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95, resamples: int = 10_000, seed: int = 0
 ) -> PairedDifference:
-    """Compare two arms with equal seeds in equal order (percentile bootstrap over the pairs).
+    """Compare the means of two arms with equal seeds in equal order (percentile bootstrap over the pairs).
 
     A single pair has an interval of zero width. Raise ValueError if the arms differ in length or are empty.
     """
+    return _compare(_mean_difference, first, second, confidence, resamples, seed)
+
+
+def paired_spread(
+    first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95, resamples: int = 10_000, seed: int = 0
+) -> PairedDifference:
+    """Compare the population standard deviations of two arms as `paired_difference` compares their means."""
+    return _compare(_spread_difference, first, second, confidence, resamples, seed)
+
+
+def _mean_difference(first: Array, second: Array, axis: int = -1) -> Any:
+    return np.mean(second - first, axis=axis)
+
+
+def _spread_difference(first: Array, second: Array, axis: int = -1) -> Any:
+    return np.std(second, axis=axis) - np.std(first, axis=axis)
+
+
+def _compare(
+    difference: Callable[..., Any],
+    first: Sequence[float],
+    second: Sequence[float],
+    confidence: float,
+    resamples: int,
+    seed: int,
+) -> PairedDifference:
     if len(first) != len(second) or not first:
         raise ValueError(f"pairs: lengths differ or are 0 (got {len(first)} and {len(second)} values)")
-    difference = np.asarray(second, dtype=np.float64) - np.asarray(first, dtype=np.float64)
-    mean = float(difference.mean())
-    low, high = mean, mean
-    if len(difference) > 1:
+    arms = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+
+    value = float(difference(*arms))
+    low, high = value, value
+    if len(first) > 1:
         interval = bootstrap(
-            (difference,),
-            np.mean,
+            arms,
+            difference,
+            paired=True,
             n_resamples=resamples,
             confidence_level=confidence,
             method="percentile",
             rng=generator(seed, "paired bootstrap"),
         ).confidence_interval
         low, high = float(interval.low), float(interval.high)
-    return PairedDifference(pairs=len(difference), mean=mean, low=low, high=high, confidence=confidence)
+    return PairedDifference(pairs=len(first), mean=value, low=low, high=high, confidence=confidence)

@@ -1,6 +1,6 @@
 """Known trends of cooperative perception over a radio channel: measured and expected values.
 
-Each function returns the arrays of one figure of `make reproduce-trends`. Expected values follow from closed forms that
+Each function returns the arrays of one figure of `make reproduce`. Expected values follow from closed forms that
 are independent of the measured code.
 """
 

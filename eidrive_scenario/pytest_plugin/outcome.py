@@ -167,7 +167,7 @@ def setting_properties(settings: ResolvedSettings) -> Properties:
 
 def explain(result: RunResult) -> str:
     """Return the reasons of a failed run, the command that repeats it, and the path of its recording."""
-    from eidrive_scenario.experiments.reproduction import reproduction_lines
+    from eidrive_scenario.experiments.commands import reproduction_lines
 
     lines = [f"{verdict.name}: {verdict.reason}{_limit(verdict)}" for verdict in result.criteria if not verdict.passed]
     if not lines:

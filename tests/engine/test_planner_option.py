@@ -9,7 +9,7 @@ from openscenario_xml import agent_xml, controller_xml, object_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, teleport_xml, world_position_xml
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.experiments.reproduction import command_of
+from eidrive_scenario.experiments.commands import command_of
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 PASSING_BY = Path(__file__).parents[1] / "data" / "passing_by.xosc"

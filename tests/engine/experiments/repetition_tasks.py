@@ -21,3 +21,10 @@ def die(job: Job) -> None:
 def fail(job: Job) -> None:
     """Raise ValueError."""
     raise ValueError(f"seed {job.seed} is invalid")
+
+
+def fail_at_seed_3(job: Job) -> int:
+    """Return the seed; raise ValueError for seed 3."""
+    if job.seed == 3:
+        fail(job)
+    return job.seed

@@ -55,3 +55,16 @@ def test_run_jobs_raises_error_of_task(tasks: ModuleType, workers: int) -> None:
 def test_run_jobs_without_worker_raises_value_error(tasks: ModuleType) -> None:
     with pytest.raises(ValueError, match=r"workers: not a positive number \(got 0\)"):
         run_jobs(JOBS, tasks.draw, workers=0)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_run_jobs_passes_each_result_when_its_run_has_ended(tasks: ModuleType, workers: int) -> None:
+    ended: list[tuple[str, int, float]] = []
+    assert sorted(run_jobs(JOBS, tasks.draw, workers=workers, finished=ended.append)) == sorted(ended)
+
+
+def test_run_jobs_passes_results_before_an_error(tasks: ModuleType) -> None:
+    ended: list[object] = []
+    with pytest.raises(ValueError, match="seed 3 is invalid"):
+        run_jobs(JOBS, tasks.fail_at_seed_3, workers=1, finished=ended.append)
+    assert len(ended) == 6, "two arms of the seeds 0 to 2"

@@ -8,7 +8,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from eidrive_scenario.experiments.statistics import paired_difference, summarize, wilson
+from eidrive_scenario.experiments.statistics import mean_interval, paired_difference, paired_spread, summarize, wilson
 
 
 @pytest.mark.parametrize(
@@ -97,3 +97,26 @@ def test_paired_difference_interval_has_nominal_coverage() -> None:
 def test_paired_difference_is_deterministic() -> None:
     first, second = [1.0, 2.0, 4.0, 8.0], [2.0, 1.0, 6.0, 9.0]
     assert paired_difference(first, second) == paired_difference(first, second)
+
+
+def test_mean_interval_of_normal_sample_is_near_its_closed_form() -> None:
+    """The half width of the interval of a mean is 1.96 s / sqrt(n)."""
+    values = [NormalDist(3.0, 0.5).inv_cdf((index + 0.5) / 200) for index in range(200)]
+    interval = mean_interval(values)
+    half = 1.96 * float(np.std(values)) / math.sqrt(200)
+    assert interval.mean == pytest.approx(3.0)
+    assert (interval.low, interval.high) == pytest.approx((3.0 - half, 3.0 + half), abs=0.01)
+
+
+def test_mean_interval_of_single_value_has_zero_width() -> None:
+    interval = mean_interval([4.5])
+    assert (interval.mean, interval.low, interval.high) == (4.5, 4.5, 4.5)
+
+
+def test_paired_spread_is_difference_of_population_standard_deviations() -> None:
+    """±1 has the standard deviation 1, ±3 has 3, whatever their means."""
+    wide, narrow = [10.0 - 3.0, 10.0 + 3.0] * 10, [-1.0, 1.0] * 10
+    spread = paired_spread(narrow, wide)
+    assert spread.mean == pytest.approx(2.0)
+    assert 1.5 < spread.low <= 2.0 <= spread.high < 2.5
+    assert paired_spread(wide, wide).high == 0.0

@@ -1,4 +1,4 @@
-"""Trends of `make reproduce-trends` at a few points."""
+"""Trends of `make reproduce` at a few points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Command line that repeats a run."""
+"""Command lines that repeat runs."""
 
 from __future__ import annotations
 

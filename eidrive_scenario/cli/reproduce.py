@@ -1,0 +1,57 @@
+"""Command `eidrive reproduce`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def reproduce(
+    parts: Annotated[
+        list[str] | None, typer.Argument(metavar="[PART]", help="table2, table3, or all.", show_default="all")
+    ] = None,
+    episodes: Annotated[
+        int | None,
+        typer.Option(min=1, help="Episodes of each cell, with seeds from 1.", show_default="20 (table2), 40 (table3)"),
+    ] = None,
+    detectors: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Detectors of the stations.", show_default="oracle, in table2 also yolov5"),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the tables and of the records of all runs.")] = Path(
+        "reports/paper"
+    ),
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes.", show_default="number of cores")
+    ] = None,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Repeat the runs of the record, too; without it they are kept.")
+    ] = False,
+) -> None:
+    """Reproduce the experiments of the EI-Drive paper, and write tables beside its numbers."""
+    from rich.console import Console
+
+    from eidrive_scenario.experiments.reproduction.parts import ALL, selected_detectors, selected_parts
+    from eidrive_scenario.experiments.reproduction.reproduce import reproduce as reproduce_part
+
+    names = [name.strip() for name in (detectors or "").split(",") if name.strip()]
+    chosen = [(part, selected_detectors(part, names)) for part in selected_parts(parts or [ALL])]
+    for part, used in chosen:
+        done = reproduce_part(
+            part,
+            out,
+            episodes=episodes or part.episodes,
+            detectors=used,
+            workers=workers,
+            restart=restart,
+            console=Console(stderr=True),
+        )
+        kept = len(done.episodes) - done.added
+        typer.echo(
+            f"{part.name}: {done.added} runs in {done.elapsed_s:.0f} s, {kept} from the record; all "
+            f"{len(done.episodes)} took {done.computed_s:.0f} s of one process; wrote {out / part.name}.md"
+        )
+        if done.unused:
+            typer.echo(f"{part.name}: {done.unused} runs of the record have other settings, seeds or code", err=True)

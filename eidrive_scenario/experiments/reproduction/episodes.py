@@ -1,0 +1,90 @@
+"""Episode: one run of a part of the reproduction, with the measured values that the record keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+
+from eidrive_scenario.experiments.repetitions import Job
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import run_file
+
+
+class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Outcome of one run.
+
+    arm      name of the settings within the part
+    digest   digest of the settings and of the code
+    metrics  metrics of the run's criteria, by name
+    counts   number of objects that the counted station knew at each time step, after fusion
+    wall_s   duration of the run [s]
+    """
+
+    scenario: str
+    arm: str
+    seed: int
+    digest: str
+    trace_hash: str
+    simulated_s: float
+    wall_s: float
+    metrics: dict[str, float]
+    counts: tuple[int, ...] = ()
+
+    @property
+    def key(self) -> tuple[str, str, int, str]:
+        """Identity of the run in the record of a part."""
+        return self.scenario, self.arm, self.seed, self.digest
+
+
+@dataclass(frozen=True)
+class EpisodeJob(Job):
+    """Run of a part.
+
+    digest   digest of the settings and of the code
+    counted  station whose known objects are counted at each time step; "" for none
+    """
+
+    digest: str = ""
+    counted: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, int, str]:
+        """Identity of the run in the record of a part."""
+        return self.scenario, self.arm, self.seed, self.digest
+
+
+class ObjectCounter:
+    """Observer that counts the objects of a station after fusion, as EI-Drive counts the boxes of its ego."""
+
+    def __init__(self, station: str) -> None:
+        self._station = station
+        self.counts: list[int] = []
+
+    def observe(self, frame: Frame) -> None:
+        """Add the number of one time step; before the station is present there is none."""
+        step = frame.steps.get(self._station)
+        if step is not None:
+            self.counts.append(len(step.fused.boxes))
+
+    def close(self) -> None:
+        """Finish after the last frame."""
+
+
+def run_episode(job: EpisodeJob) -> Episode:
+    """Run a job and return its outcome."""
+    counter = ObjectCounter(job.counted)
+    observers = (counter,) if job.counted else ()
+    result = run_file(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings, observers=observers)
+    return Episode(
+        scenario=job.scenario,
+        arm=job.arm,
+        seed=job.seed,
+        digest=job.digest,
+        trace_hash=result.trace_hash,
+        simulated_s=result.simulated_s,
+        wall_s=round(result.wall_s, 3),
+        metrics={name: float(value) for name, value in result.metrics.items()},
+        counts=tuple(counter.counts),
+    )

@@ -1,0 +1,109 @@
+"""Tables and texts of a part: Markdown for readers, CSV and JSON with all digits for programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+Value = str | int | float | bool | None
+Row = Mapping[str, Value]
+
+NO_VALUE = "-"
+"""Text of a table cell without a value."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Column of the Markdown table: a format of fields of a row, such as `{low:.2f} to {high:.2f}`.
+
+    fields  fields of the format; if one is None, the cell is empty
+    """
+
+    title: str
+    template: str
+    fields: tuple[str, ...]
+
+    def text(self, row: Row) -> str:
+        """Return the cell of a row."""
+        values = {name: row[name] for name in self.fields}
+        return NO_VALUE if None in values.values() else self.template.format(**values)
+
+
+@dataclass(frozen=True)
+class DataTable:
+    """Table with rows of equal fields.
+
+    name     name of its CSV file, which tables with equal fields may share
+    columns  columns of the Markdown table; empty for a table that is in the CSV and JSON files only
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+
+    def markdown(self) -> str:
+        """Return the table as Markdown."""
+        lines = ["| " + " | ".join(column.title for column in self.columns) + " |", "|---" * len(self.columns) + "|"]
+        lines += ["| " + " | ".join(column.text(row) for column in self.columns) + " |" for row in self.rows]
+        return "\n".join(lines) + "\n"
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """Return rows of equal fields as CSV with all digits; missing values are empty."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    if rows:
+        writer.writerow(rows[0])
+        writer.writerows([_exact(value) for value in row.values()] for row in rows)
+    return out.getvalue()
+
+
+def _exact(value: Value) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True)
+class Section:
+    """Section of the report: paragraphs, then a table."""
+
+    title: str
+    paragraphs: tuple[str, ...] = ()
+    table: DataTable | None = None
+
+    def markdown(self, level: int = 2) -> str:
+        """Return the section as Markdown with a heading of this level."""
+        parts = [f"{'#' * level} {self.title}\n", *(f"{text}\n" for text in self.paragraphs)]
+        if self.table is not None and self.table.columns:
+            parts.append(self.table.markdown())
+        return "\n".join(parts)
+
+
+@dataclass(frozen=True)
+class PartReport:
+    """Report of a part: title and sections."""
+
+    title: str
+    sections: tuple[Section, ...]
+
+    def data(self) -> dict[str, list[Row]]:
+        """Return the rows of all tables by the name of their file, in order."""
+        rows: dict[str, list[Row]] = {}
+        for section in self.sections:
+            if section.table is not None:
+                rows.setdefault(section.table.name, []).extend(section.table.rows)
+        return rows
+
+    def markdown(self) -> str:
+        """Return the report as Markdown."""
+        return "\n".join([f"# {self.title}\n", *(section.markdown() for section in self.sections)])
+
+
+def plain(title: str, field: str, form: str = "") -> Column:
+    """Return a column of one field with a format specification such as `.2f`."""
+    return Column(title, f"{{{field}:{form}}}", (field,))

@@ -1,0 +1,86 @@
+"""Runs, record and files of the parts of the reproduction."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from eidrive_scenario.experiments.repetitions import run_jobs
+from eidrive_scenario.experiments.reproduction.episodes import Episode, run_episode
+from eidrive_scenario.experiments.reproduction.layout import PartReport, as_csv
+from eidrive_scenario.experiments.reproduction.part import Part
+from eidrive_scenario.experiments.reproduction.provenance import read_provenance, write_provenance
+from eidrive_scenario.experiments.reproduction.record import Record
+from eidrive_scenario.files.atomic import create
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """Part with its episodes in the order of the jobs.
+
+    added      number of episodes that this call has run; the others are those of the record
+    unused     number of episodes of the record with other settings, seeds or code
+    elapsed_s  duration of the call [s]
+    """
+
+    report: PartReport
+    episodes: tuple[Episode, ...]
+    added: int
+    unused: int
+    elapsed_s: float
+
+    @property
+    def computed_s(self) -> float:
+        """Sum of the durations of all episodes [s]."""
+        return sum(episode.wall_s for episode in self.episodes)
+
+
+def reproduce(
+    part: Part,
+    out: Path,
+    *,
+    episodes: int,
+    detectors: Sequence[str],
+    workers: int | None = None,
+    restart: bool = False,
+    console: Console | None = None,
+) -> Reproduced:
+    """Run the episodes of a part that its record lacks, and write its report and tables into the folder `out`.
+
+    restart  whether the record is discarded first
+
+    The report depends on the episodes only, so a second call writes the same files. Raise SettingError if a file
+    cannot be written or the record is damaged, and the exceptions of `run_jobs`.
+    """
+    start = time.perf_counter()
+    read_provenance(out)  # a damaged file is an error before the runs, not after them
+    jobs = part.jobs(episodes, detectors)
+    with Record.open(out / f"{part.name}.jsonl", restart=restart) as record:
+        known = len(record.episodes)
+        left = [job for job in jobs if job.key not in record.episodes]
+        if left:
+            run_jobs(left, run_episode, workers=workers, console=console, title=part.name, finished=record.add)
+        found = tuple(record.episodes[job.key] for job in jobs)
+    report = part.report(found, detectors)
+    _write_report(part, out, report)
+    unused = known - (len(jobs) - len(left))
+    done = Reproduced(report, found, len(left), unused, time.perf_counter() - start)
+    durations = {"runs_of_last_call": done.added, "last_call_s": round(done.elapsed_s, 1)}
+    seeds = {"seeds": f"1 to {episodes}", "detectors": list(detectors), "runs": len(found)}
+    write_provenance(out, part.name, {**seeds, **durations, "all_runs_s": round(done.computed_s, 1)})
+    return done
+
+
+def _write_report(part: Part, out: Path, report: PartReport) -> None:
+    """Write Markdown, and the tables as CSV files and as JSON."""
+    tables = report.data()
+    texts = {f"{part.name}.md": report.markdown(), f"{part.name}.json": json.dumps(tables, indent=1) + "\n"}
+    texts |= {f"{name}.csv": as_csv(rows) for name, rows in tables.items()}
+    for name, text in texts.items():
+        with create(out / name) as stream:
+            stream.write(text.encode())

@@ -1,0 +1,234 @@
+"""Reproduction of the paper: record, tables and reports, from episodes with known values."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from eidrive_scenario.errors import SettingError, SimulationError
+from eidrive_scenario.experiments.paper import ARMS
+from eidrive_scenario.experiments.published import TABLE_2, TABLE_3
+from eidrive_scenario.experiments.reproduction import table_2, table_3
+from eidrive_scenario.experiments.reproduction.digests import job_digest
+from eidrive_scenario.experiments.reproduction.episodes import Episode, ObjectCounter
+from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, Row, as_csv, plain
+from eidrive_scenario.experiments.reproduction.part import Part
+from eidrive_scenario.experiments.reproduction.parts import ALL, PARTS, selected_detectors, selected_parts
+from eidrive_scenario.experiments.reproduction.record import Record
+from eidrive_scenario.simulation import RunSettings
+
+
+def episode(scenario: str = "coop/scenario_1", arm: str = "arm", seed: int = 1, **metrics: float) -> Episode:
+    named = {"center": "min_distance.Ego.Incoming.center", "box": "min_distance.Ego.Incoming.box"}
+    values = {named.get(name, name): value for name, value in metrics.items()}
+    return Episode(scenario, arm, seed, "0" * 16, "", 10.0, 0.5, {"collision.count": 0.0, **values})
+
+
+# Record
+
+
+def test_record_returns_the_episodes_of_earlier_calls(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "part.jsonl"
+    added = [episode(seed=seed, center=1.0 / 3.0) for seed in (1, 2)]
+    with Record.open(path) as record:
+        assert record.episodes == {}
+        for one in added:
+            record.add(one)
+    with Record.open(path) as record:
+        assert list(record.episodes.values()) == added
+    with Record.open(path, restart=True) as record:
+        assert record.episodes == {}
+    assert path.read_bytes() == b""
+
+
+def test_incomplete_last_line_of_a_killed_process_is_removed(tmp_path: Path) -> None:
+    path = tmp_path / "part.jsonl"
+    with Record.open(path) as record:
+        record.add(episode(seed=1))
+        record.add(episode(seed=2))
+    complete = path.read_bytes()
+    path.write_bytes(complete[:-20])
+    with Record.open(path) as record:
+        assert [one.seed for one in record.episodes.values()] == [1]
+        record.add(episode(seed=2))
+    assert path.read_bytes() == complete
+
+
+@pytest.mark.parametrize("line", [b"{}", b"nonsense", b"\xff\xfe", b'{"scenario": 1}', b"[" * 5000])
+def test_damaged_record_is_an_error_with_its_line(tmp_path: Path, line: bytes) -> None:
+    path = tmp_path / "part.jsonl"
+    with Record.open(path) as record:
+        record.add(episode())
+    path.write_bytes(path.read_bytes() + line + b"\n")
+    with pytest.raises(SettingError, match=r"part\.jsonl:2: the record is damaged: .*--restart"), Record.open(path):
+        pass
+    with Record.open(path, restart=True) as record:
+        assert record.episodes == {}
+
+
+def test_record_of_another_process_and_unwritable_folders_are_errors(tmp_path: Path) -> None:
+    path = tmp_path / "part.jsonl"
+    with Record.open(path), pytest.raises(SettingError, match="another run writes this file"), Record.open(path):
+        pass
+    with pytest.raises(SettingError, match="cannot write: File exists"), Record.open(path / "below.jsonl"):
+        pass
+    with pytest.raises(SettingError, match="cannot write: Is a directory"), Record.open(tmp_path):
+        pass
+
+
+def test_digest_distinguishes_settings_and_scenarios() -> None:
+    digests = {
+        job_digest("coop/scenario_1", RunSettings()),
+        job_digest("coop/scenario_2", RunSettings()),
+        job_digest("coop/scenario_1", RunSettings(channel="ideal")),
+        job_digest("coop/scenario_1", RunSettings(dt=0.03)),
+    }
+    assert len(digests) == 4
+    assert job_digest("coop/scenario_1", RunSettings()) in digests
+
+
+def test_counter_counts_objects_after_fusion_while_the_station_is_present() -> None:
+    counter = ObjectCounter("Ego")
+    for boxes in (None, [], [1, 2, 3]):
+        steps = {} if boxes is None else {"Ego": SimpleNamespace(fused=SimpleNamespace(boxes=boxes))}
+        counter.observe(SimpleNamespace(steps=steps))  # type: ignore[arg-type]
+    counter.close()
+    assert counter.counts == [0, 3]
+
+
+# Layout
+
+
+def test_csv_has_all_digits_and_markdown_the_format() -> None:
+    rows: tuple[Row, ...] = (
+        {"name": "a", "value": 1.0 / 3.0, "low": None, "holds": True},
+        {"name": "b", "value": 2.0, "low": 1.0},
+    )
+    columns = (plain("name", "name"), Column("range", "{low:.1f} to {value:.2f}", ("low", "value")))
+    lines = DataTable("t", columns, rows).markdown().splitlines()
+    assert lines == ["| name | range |", "|---|---|", "| a | - |", "| b | 1.0 to 2.00 |"]
+    read = list(csv.DictReader(io.StringIO(as_csv(rows[:1]))))
+    assert read == [{"name": "a", "value": repr(1.0 / 3.0), "low": "", "holds": "true"}]
+    assert float(read[0]["value"]) == 1.0 / 3.0
+    assert as_csv([]) == ""
+
+
+# Parts
+
+
+def test_parts_are_in_the_order_of_the_paper() -> None:
+    assert selected_parts([ALL]) == tuple(PARTS.values())
+    assert [part.name for part in selected_parts(["table3", "table2", "table3"])] == ["table2", "table3"]
+    with pytest.raises(SettingError, match="unknown name 'tabel2'; did you mean 'table2'"):
+        selected_parts(["tabel2"])
+
+
+def test_detectors_are_those_of_the_part() -> None:
+    part = PARTS["table2"]
+    assert selected_detectors(part, []) == ("oracle", "yolov5")
+    assert selected_detectors(part, ["yolov5", "oracle"]) == ("oracle", "yolov5")
+    with pytest.raises(SettingError, match="unknown name 'yolo'"):
+        selected_detectors(part, ["yolo"])
+
+
+@pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.name)
+def test_jobs_are_distinct_and_ordered_by_seed(part: Part) -> None:
+    jobs = part.jobs(2, part.detectors)
+    assert len({job.key for job in jobs}) == len({(job.scenario, job.arm, job.seed) for job in jobs}) == len(jobs)
+    assert [job.seed for job in jobs] == sorted(job.seed for job in jobs)
+    assert {job.seed for job in jobs} == {1, 2}
+
+
+# Table II
+
+
+def published_episodes() -> list[Episode]:
+    """Return the paper's five episodes of each cell, under each planner and rule for the channel."""
+    found = []
+    for case in table_2.cases(table_2.DETECTORS):
+        detector, _, channel = case.arm.split()
+        arm = next(arm for arm in ARMS if channel in (arm.links, arm.own))
+        for seed, center in enumerate(TABLE_2[case.scenario, detector, arm.name].episodes, 1):
+            hit = float(center < 3.4)
+            more = {"collision.count": hit, **({"collision.impact_speed": 10.0} if hit else {})}
+            found.append(episode(case.scenario, case.arm, seed, center=center, box=max(0.0, center - 3.4), **more))
+    return found
+
+
+def test_table_2_of_the_papers_episodes_agrees_with_the_paper() -> None:
+    """The orders that the facts list: cooperation > none and > latency 4 of 4, latency < none 3, error < none 1."""
+    report = table_2.report(published_episodes(), table_2.DETECTORS)
+    data = report.data()
+    counts = {
+        str(row["statement"]): (row["holds"], row["paper"])
+        for row in data["table2_summary"]
+        if (row["planner"], row["channel"]) == ("conflict_area", "links")
+    }
+    assert counts == {
+        "cooperation > none": (4, 4),
+        "cooperation > latency": (4, 4),
+        "sd of error > cooperation": (4, 4),
+        "none > latency": (3, 3),
+        "none > error": (1, 1),
+    }
+    assert all(abs(float(row["difference"] or 0.0)) < 0.01 for row in data["table2"]), "truncated means differ by 0.009"
+    text = report.markdown()
+    assert "40 of 40 comparisons have the sign of the paper" in text
+    assert "Likely reason" not in text
+
+
+def test_table_2_of_equal_arms_departs_from_the_paper() -> None:
+    """Episodes of 4 m in all arms: no order holds, and the mean absolute difference follows from the paper's means."""
+    cases = table_2.cases(("oracle",))
+    same = [episode(case.scenario, case.arm, seed, center=4.0, box=0.6) for case in cases for seed in (1, 2)]
+    report = table_2.report(same, ("oracle",))
+    assert {row["holds"] for row in report.data()["table2_summary"]} == {0}
+    oracle = [published.mean for (_, detector, _), published in TABLE_2.items() if detector == "oracle"]
+    expected = sum(abs(4.0 - mean) for mean in oracle) / len(oracle)
+    text = report.markdown()
+    assert f"`conflict_area`, `links`: {expected:.2f} m from the 8 means of the paper" in text
+    assert "Likely reason (none > latency)" in text
+    assert "none 0 of 4, cooperation 0 of 4" in text
+
+
+def test_episode_without_metric_is_an_error() -> None:
+    runs = [episode(case.scenario, case.arm) for case in table_2.cases(("oracle",))]
+    with pytest.raises(SimulationError, match=r"metric min_distance\.Ego\.Incoming\.center is missing"):
+        table_2.report(runs, ("oracle",))
+
+
+# Table III
+
+
+def episodes_of_rates(rates: dict[tuple[str, str], float], count: int) -> list[Episode]:
+    found = []
+    for case in table_3.cases(("oracle",)):
+        free = round(count * rates[case.scenario, case.arm.split()[1]])
+        found += [
+            episode(case.scenario, case.arm, seed, center=3.0, box=1.0, **_hit(seed > free))
+            for seed in range(1, count + 1)
+        ]
+    return found
+
+
+def _hit(hit: bool) -> dict[str, float]:
+    return {"collision.count": 1.0, "collision.impact_speed": 3.0} if hit else {"collision.count": 0.0}
+
+
+def test_table_3_of_the_papers_rates_agrees_with_the_paper() -> None:
+    rates = {key: value.rate for key, value in TABLE_3.items()}
+    text = table_3.report(episodes_of_rates(rates, 40), ("oracle",)).markdown()
+    assert "12 of 12 rates are within 10 points of the paper's, or have it in their interval. both >= rsu in 4" in text
+    assert "rsu > vehicle in 4 of 4 scenarios" in text
+
+
+def test_table_3_of_equal_rates_departs_from_the_paper() -> None:
+    """All runs without a collision: 40 of 40 has the Wilson interval 0.91 to 1, which excludes five of the rates."""
+    report = table_3.report(episodes_of_rates(dict.fromkeys(TABLE_3, 1.0), 40), ("oracle",))
+    apart = {(row["scenario"], row["senders"]) for row in report.data()["table3"] if not row["agrees"]}
+    assert apart == {key for key, value in TABLE_3.items() if value.rate < 0.9}
+    assert "rsu > vehicle in 0 of 4 scenarios" in report.markdown()
