@@ -22,7 +22,7 @@ from eidrive_scenario.experiments.reproduction.encounters import (
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
-from eidrive_scenario.experiments.reproduction.table_2_text import SUMMARY_COLUMNS, findings, setup, summary
+from eidrive_scenario.experiments.reproduction.table_2_text import SUMMARY_COLUMNS, conclusions, setup, summary
 from eidrive_scenario.experiments.statistics import PairedDifference, paired_difference, paired_spread
 from eidrive_scenario.simulation import RunSettings
 
@@ -176,7 +176,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     compared.sort(key=lambda row: order.index(str(row["statement"])))
     sections = [
         Section("Set-up", setup(len(columns[0][0].episodes))),
-        Section("Result", findings(rows, compared), DataTable("table2_summary", SUMMARY_COLUMNS, summary(compared))),
+        Section("Result", conclusions(rows, compared), DataTable("table2_summary", SUMMARY_COLUMNS, summary(compared))),
     ]
     for planner, variant in product(PLANNERS, VARIANTS):
         sections.append(Section(f"Planner `{planner}`, {variant.title}", (), _table(rows, planner, variant)))

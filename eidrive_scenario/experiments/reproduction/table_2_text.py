@@ -44,8 +44,8 @@ SUMMARY_COLUMNS = (
 REASONS = {
     "none > latency": (
         "With a channel that acts on links only, latency can cost the ego what it gains by cooperation, but not more: "
-        "it brakes for its own detections as without cooperation. An order below that of no cooperation needs a delay "
-        "of its own detections, and time to brake for them, which scenario 1 does not leave."
+        "it brakes for what it detects as without cooperation. An order below that of no cooperation needs a delay "
+        "of the ego's detections, too, and time to brake for them, which scenario 1 does not leave."
     ),
     "none > error": (
         "A loss of single frames delays the start of braking by few time steps (by k with probability 0.3^k), and the "
@@ -81,7 +81,7 @@ def summary(compared: Sequence[Row]) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def findings(rows: Sequence[Row], compared: Sequence[Row]) -> tuple[str, ...]:
+def conclusions(rows: Sequence[Row], compared: Sequence[Row]) -> tuple[str, ...]:
     """Return the paragraphs about what agrees with the paper and what does not."""
     return (*_agreement(compared), *_means(rows), _spread(rows), _collisions(rows))
 
