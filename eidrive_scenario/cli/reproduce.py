@@ -10,15 +10,18 @@ import typer
 
 def reproduce(
     parts: Annotated[
-        list[str] | None, typer.Argument(metavar="[PART]", help="table2, table3, or all.", show_default="all")
+        list[str] | None,
+        typer.Argument(metavar="[PART]", help="table2, table3, detection, or all.", show_default="all"),
     ] = None,
     episodes: Annotated[
         int | None,
-        typer.Option(min=1, help="Episodes of each cell, with seeds from 1.", show_default="20 (table2), 40 (table3)"),
+        typer.Option(
+            min=1, help="Episodes of each cell, with seeds from 1.", show_default="20, 40 (table3), 5 (detection)"
+        ),
     ] = None,
     detectors: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Detectors of the stations.", show_default="oracle, in table2 also yolov5"),
+        typer.Option(metavar="A,B", help="Detectors of the stations.", show_default="oracle, yolov5; table3: oracle"),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the tables and of the records of all runs.")] = Path(
         "reports/paper"

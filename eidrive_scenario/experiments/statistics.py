@@ -118,6 +118,22 @@ def paired_spread(
     return _compare(_spread_difference, first, second, confidence, resamples, seed)
 
 
+def paired_ratio(
+    first: Sequence[float], second: Sequence[float], *, confidence: float = 0.95, resamples: int = 10_000, seed: int = 0
+) -> PairedDifference:
+    """Return the ratio of the means, second over first, as `paired_difference` returns their difference.
+
+    Raise ValueError if a value of the first arm is not positive, too.
+    """
+    if min(first, default=1.0) <= 0.0:
+        raise ValueError(f"ratio: not positive (got {min(first)})")
+    return _compare(_mean_ratio, first, second, confidence, resamples, seed)
+
+
+def _mean_ratio(first: Array, second: Array, axis: int = -1) -> Any:
+    return np.mean(second, axis=axis) / np.mean(first, axis=axis)
+
+
 def _mean_difference(first: Array, second: Array, axis: int = -1) -> Any:
     return np.mean(second - first, axis=axis)
 

@@ -56,7 +56,10 @@ class EpisodeJob(Job):
 
 
 class ObjectCounter:
-    """Observer that counts the objects of a station after fusion, as EI-Drive counts the boxes of its ego."""
+    """Observer that counts the objects of a station after fusion, as EI-Drive counts the boxes of its ego.
+
+    Objects of the class `misc` do not count: the masts of roadside units, which are no actors in EI-Drive.
+    """
 
     def __init__(self, station: str) -> None:
         self._station = station
@@ -66,7 +69,7 @@ class ObjectCounter:
         """Add the number of one time step; before the station is present there is none."""
         step = frame.steps.get(self._station)
         if step is not None:
-            self.counts.append(len(step.fused.boxes))
+            self.counts.append(sum(name != "misc" for name in step.fused.classes))
 
     def close(self) -> None:
         """Finish after the last frame."""

@@ -36,7 +36,7 @@ class DataTable:
     """Table with rows of equal fields.
 
     name     name of its CSV file, which tables with equal fields may share
-    columns  columns of the Markdown table; empty for a table that is in the CSV and JSON files only
+    columns  columns of the Markdown table; empty for a table that is in its CSV file only
     """
 
     name: str
@@ -91,11 +91,11 @@ class PartReport:
     title: str
     sections: tuple[Section, ...]
 
-    def data(self) -> dict[str, list[Row]]:
-        """Return the rows of all tables by the name of their file, in order."""
+    def data(self, *, shown: bool = False) -> dict[str, list[Row]]:
+        """Return the rows of all tables by the name of their file, in order; of those with columns, if `shown`."""
         rows: dict[str, list[Row]] = {}
         for section in self.sections:
-            if section.table is not None:
+            if section.table is not None and (section.table.columns or not shown):
                 rows.setdefault(section.table.name, []).extend(section.table.rows)
         return rows
 

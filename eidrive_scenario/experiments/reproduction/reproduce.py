@@ -79,7 +79,10 @@ def reproduce(
 def _write_report(part: Part, out: Path, report: PartReport) -> None:
     """Write Markdown, and the tables as CSV files and as JSON."""
     tables = report.data()
-    texts = {f"{part.name}.md": report.markdown(), f"{part.name}.json": json.dumps(tables, indent=1) + "\n"}
+    texts = {
+        f"{part.name}.md": report.markdown(),
+        f"{part.name}.json": json.dumps(report.data(shown=True), indent=1) + "\n",
+    }
     texts |= {f"{name}.csv": as_csv(rows) for name, rows in tables.items()}
     for name, text in texts.items():
         with create(out / name) as stream:

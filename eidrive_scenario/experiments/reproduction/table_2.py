@@ -29,6 +29,8 @@ from eidrive_scenario.simulation import RunSettings
 PLANNERS = ("conflict_area", "behavior")
 """The rule of the paper, and the default planner of this project."""
 DETECTORS = ("oracle", "yolov5")
+DURATION = 7.0
+"""End of an episode [s]. The cars are nearest before 5 s; afterwards they move away from each other."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ def _arm(detector: str, planner: str, channel: str) -> str:
 
 
 def _settings(detector: str, planner: str, channel: str) -> RunSettings:
-    return RunSettings(channel=channel, detector=detector, planner=planner, criteria=CRITERIA)
+    return RunSettings(channel=channel, detector=detector, planner=planner, criteria=CRITERIA, time_limit=DURATION)
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.experiments.paper import ARMS
-from eidrive_scenario.experiments.published import TABLE_2, TABLE_3
-from eidrive_scenario.experiments.reproduction import table_2, table_3
+from eidrive_scenario.experiments.published import COUNTS, RATIOS, TABLE_2, TABLE_3
+from eidrive_scenario.experiments.reproduction import detection, table_2, table_3
 from eidrive_scenario.experiments.reproduction.digests import job_digest
-from eidrive_scenario.experiments.reproduction.episodes import Episode, ObjectCounter
+from eidrive_scenario.experiments.reproduction.encounters import CENTER, COLLISIONS, GAP, TIME_TO_COLLISION
+from eidrive_scenario.experiments.reproduction.episodes import Episode, EpisodeJob, ObjectCounter, run_episode
 from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, Row, as_csv, plain
 from eidrive_scenario.experiments.reproduction.part import Part
 from eidrive_scenario.experiments.reproduction.parts import ALL, PARTS, selected_detectors, selected_parts
@@ -93,8 +96,8 @@ def test_digest_distinguishes_settings_and_scenarios() -> None:
 
 def test_counter_counts_objects_after_fusion_while_the_station_is_present() -> None:
     counter = ObjectCounter("Ego")
-    for boxes in (None, [], [1, 2, 3]):
-        steps = {} if boxes is None else {"Ego": SimpleNamespace(fused=SimpleNamespace(boxes=boxes))}
+    for classes in (None, [], ["car", "misc", "van", "bicycle"]):
+        steps = {} if classes is None else {"Ego": SimpleNamespace(fused=SimpleNamespace(classes=classes))}
         counter.observe(SimpleNamespace(steps=steps))  # type: ignore[arg-type]
     counter.close()
     assert counter.counts == [0, 3]
@@ -201,6 +204,21 @@ def test_episode_without_metric_is_an_error() -> None:
         table_2.report(runs, ("oracle",))
 
 
+@pytest.mark.parametrize("arm", ["oracle conflict_area ideal", "oracle behavior latency_300ms"])
+def test_table_2_measures_nothing_after_the_end_of_an_episode(arm: str) -> None:
+    """The same run without the time limit, to the goal of the ego, has the same distances and collisions."""
+    case = next(case for case in table_2.cases(("oracle",)) if (case.scenario, case.arm) == ("coop/scenario_2", arm))
+    cut, whole = (
+        run_episode(EpisodeJob(case.scenario, case.arm, 1, settings))
+        for settings in (case.settings, dataclasses.replace(case.settings, time_limit=60.0))
+    )
+    assert cut.simulated_s == pytest.approx(7.0)
+    assert whole.simulated_s > 10.0
+    for name in (CENTER, GAP, COLLISIONS, TIME_TO_COLLISION):
+        assert cut.metrics[name] == whole.metrics[name]
+    assert whole.metrics[CENTER.replace("center", "time")] < 5.0
+
+
 # Table III
 
 
@@ -232,3 +250,52 @@ def test_table_3_of_equal_rates_departs_from_the_paper() -> None:
     apart = {(row["scenario"], row["senders"]) for row in report.data()["table3"] if not row["agrees"]}
     assert apart == {key for key, value in TABLE_3.items() if value.rate < 0.9}
     assert "rsu > vehicle in 0 of 4 scenarios" in report.markdown()
+
+
+# Counts
+
+
+def counted_episodes(counts: dict[tuple[str, str, str], tuple[int, ...]]) -> list[Episode]:
+    found = []
+    for case in detection.cases(detection.DETECTORS):
+        detector, arm = case.arm.split()
+        metrics, known = {"detection_count.Ego.mean": 1.0}, counts[case.scenario, detector, arm]
+        found.append(Episode(case.scenario, case.arm, 1, "", "", 12.0, 0.5, metrics, known))
+    return found
+
+
+def test_detection_of_the_papers_counts_has_its_ratios() -> None:
+    """Counts whose means over ten steps are the paper's, such as 9 and 10 for 9.1, for 401 time steps."""
+    counts = {}
+    for key, published in COUNTS.items():
+        tenths = round(10 * published.mean)
+        counts[key] = tuple(tenths // 10 + (step % 10 < tenths % 10) for step in range(401))
+    report = detection.report(counted_episodes(counts), detection.DETECTORS)
+    for row in report.data()["detection_ratios"]:
+        assert row["ratio"] == pytest.approx(RATIOS[str(row["scenario"]), str(row["detector"])], abs=0.02)
+        assert row["low"] == row["ratio"] == row["high"], "a single episode"
+    assert {row["mean"] == pytest.approx(row["paper_mean"]) for row in report.data()["detection"]} == {True}
+    text = report.markdown()
+    assert "Cooperation finds more objects in 4 of 4 panels" in text
+    assert "`oracle`: with the roadside units the ego knows +0.3 objects more than with the vehicle" in text
+    assert "below" not in text
+    assert len(report.data()["detection_series"]) == 8 * 400
+
+
+def test_detection_without_any_object_has_no_ratio() -> None:
+    report = detection.report(counted_episodes(dict.fromkeys(COUNTS, (0,) * 400)), detection.DETECTORS)
+    assert {row["ratio"] for row in report.data()["detection_ratios"]} == {None}
+    assert "in 0 of 4 panels" in report.markdown()
+
+
+def test_moving_average_is_mean_of_the_window_and_shorter_at_the_start() -> None:
+    counts = np.array([[0.0, 2.0, 4.0, 6.0], [1.0, 1.0, 1.0, 1.0]])
+    assert detection.moving_average(counts, 2).tolist() == [[0.0, 1.0, 3.0, 5.0], [1.0, 1.0, 1.0, 1.0]]
+
+
+def test_counts_of_a_run_have_400_time_steps() -> None:
+    """Scenario 3 with the oracle: the criterion counts the same vehicles, as the oracle has no duplicates."""
+    job = next(job for job in PARTS["detection"].jobs(1, ("oracle",)) if job.arm == "oracle cooperation")
+    one = run_episode(job)
+    assert detection.counts_of([one]).shape == (1, 400)
+    assert np.mean(one.counts) == pytest.approx(one.metrics["detection_count.Ego.mean"])

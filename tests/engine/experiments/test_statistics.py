@@ -8,7 +8,14 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from eidrive_scenario.experiments.statistics import mean_interval, paired_difference, paired_spread, summarize, wilson
+from eidrive_scenario.experiments.statistics import (
+    mean_interval,
+    paired_difference,
+    paired_ratio,
+    paired_spread,
+    summarize,
+    wilson,
+)
 
 
 @pytest.mark.parametrize(
@@ -120,3 +127,12 @@ def test_paired_spread_is_difference_of_population_standard_deviations() -> None
     assert spread.mean == pytest.approx(2.0)
     assert 1.5 < spread.low <= 2.0 <= spread.high < 2.5
     assert paired_spread(wide, wide).high == 0.0
+
+
+def test_paired_ratio_is_ratio_of_means() -> None:
+    """Twice the values: each resample has the ratio 2."""
+    ratio = paired_ratio([1.0, 2.0, 3.0], [2.0, 4.0, 6.0])
+    assert (ratio.mean, ratio.low, ratio.high) == pytest.approx((2.0, 2.0, 2.0))
+    assert paired_ratio([1.0, 3.0], [3.0, 5.0]).mean == pytest.approx(2.0)
+    with pytest.raises(ValueError, match="not positive"):
+        paired_ratio([0.0, 1.0], [1.0, 1.0])
