@@ -11,17 +11,17 @@ import typer
 def reproduce(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PART]", help="table2, table3, detection, or all.", show_default="all"),
+        typer.Argument(metavar="[PART]", help="table2, table3, detection, pipeline, ei, or all.", show_default="all"),
     ] = None,
     episodes: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Episodes of each cell, with seeds from 1.", show_default="20, 40 (table3), 5 (detection)"
+            min=1, help="Episodes of each cell, with seeds from 1.", show_default="20 (table2), 40 (table3), else 5"
         ),
     ] = None,
     detectors: Annotated[
         str | None,
-        typer.Option(metavar="A,B", help="Detectors of the stations.", show_default="oracle, yolov5; table3: oracle"),
+        typer.Option(metavar="A,B", help="Detectors of the stations.", show_default="the paper's; table3: oracle"),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the tables and of the records of all runs.")] = Path(
         "reports/paper"

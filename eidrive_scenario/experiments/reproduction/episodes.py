@@ -18,6 +18,7 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     arm      name of the settings within the part
     digest   digest of the settings and of the code
     metrics  metrics of the run's criteria, by name
+    failed   names of the criteria that failed
     counts   number of objects that the counted station knew at each time step, after fusion
     wall_s   duration of the run [s]
     """
@@ -30,6 +31,7 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     simulated_s: float
     wall_s: float
     metrics: dict[str, float]
+    failed: tuple[str, ...] = ()
     counts: tuple[int, ...] = ()
 
     @property
@@ -89,5 +91,6 @@ def run_episode(job: EpisodeJob) -> Episode:
         simulated_s=result.simulated_s,
         wall_s=round(result.wall_s, 3),
         metrics={name: float(value) for name, value in result.metrics.items()},
+        failed=tuple(verdict.name for verdict in result.criteria if not verdict.passed),
         counts=tuple(counter.counts),
     )

@@ -14,7 +14,7 @@ import pytest
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.experiments.paper import ARMS
 from eidrive_scenario.experiments.published import COUNTS, RATIOS, TABLE_2, TABLE_3
-from eidrive_scenario.experiments.reproduction import detection, table_2, table_3
+from eidrive_scenario.experiments.reproduction import detection, ei, pipeline, table_2, table_3
 from eidrive_scenario.experiments.reproduction.digests import job_digest
 from eidrive_scenario.experiments.reproduction.encounters import CENTER, COLLISIONS, GAP, TIME_TO_COLLISION
 from eidrive_scenario.experiments.reproduction.episodes import Episode, EpisodeJob, ObjectCounter, run_episode
@@ -22,6 +22,7 @@ from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, 
 from eidrive_scenario.experiments.reproduction.part import Part
 from eidrive_scenario.experiments.reproduction.parts import ALL, PARTS, selected_detectors, selected_parts
 from eidrive_scenario.experiments.reproduction.record import Record
+from eidrive_scenario.library import scenarios
 from eidrive_scenario.simulation import RunSettings
 
 
@@ -260,7 +261,7 @@ def counted_episodes(counts: dict[tuple[str, str, str], tuple[int, ...]]) -> lis
     for case in detection.cases(detection.DETECTORS):
         detector, arm = case.arm.split()
         metrics, known = {"detection_count.Ego.mean": 1.0}, counts[case.scenario, detector, arm]
-        found.append(Episode(case.scenario, case.arm, 1, "", "", 12.0, 0.5, metrics, known))
+        found.append(Episode(case.scenario, case.arm, 1, "", "", 12.0, 0.5, metrics, counts=known))
     return found
 
 
@@ -299,3 +300,48 @@ def test_counts_of_a_run_have_400_time_steps() -> None:
     one = run_episode(job)
     assert detection.counts_of([one]).shape == (1, 400)
     assert np.mean(one.counts) == pytest.approx(one.metrics["detection_count.Ego.mean"])
+
+
+# Drives
+
+
+def drives(part: Part, failing: dict[str, str]) -> list[Episode]:
+    """Return two episodes of each case; both fail a criterion in the arms of `failing`."""
+    found = []
+    for case in part.cases(part.detectors):
+        name = failing.get(case.arm.split()[-1], "")
+        hit = {"collision.count": float(name == "collision"), "min_distance.Ego.Lead.box": 1.5}
+        failed = (name,) if name else ()
+        found += [Episode(case.scenario, case.arm, seed, "", "", 20.0 * seed, 0.5, hit, failed) for seed in (1, 2)]
+    return found
+
+
+def test_pipeline_states_completed_runs_and_failed_criteria() -> None:
+    """Four scenarios with the oracle, two with each other detector; the mean of 20 and 40 s is 30 s."""
+    report = pipeline.report(drives(pipeline.PART, {"ssd": "reach_position"}), pipeline.DETECTORS)
+    rows = report.data()["pipeline"]
+    assert [(row["detector"], row["passed"], row["failed"]) for row in rows[:3]] == [
+        ("oracle", 2, ""),
+        ("yolov5", 2, ""),
+        ("ssd", 0, "reach_position 2"),
+    ]
+    assert {(row["duration"], row["gap"]) for row in rows} == {(30.0, 1.5), (None, 1.5)}
+    text = report.markdown()
+    assert "12 of 16 runs complete the task" in text
+    assert "pipeline/scenario_2 ssd (2 runs: reach_position 2)." in text
+
+
+def test_ei_compares_the_lane_follower_with_the_statement_of_the_paper() -> None:
+    text = ei.report(drives(ei.PART, {"route": "collision"}), ei.DETECTORS).markdown()
+    assert "The lane follower has a collision in every run of 17 of 17 scenarios (paper: in all)." in text
+    assert "`behavior` completes 34 of 34 drives. Scenarios with other runs: none." in text
+    other = ei.report(drives(ei.PART, {"behavior": "reach_position"}), ei.DETECTORS).markdown()
+    assert "in every run of 0 of 17 scenarios" in other
+    assert "`behavior` completes 0 of 34 drives. Scenarios with other runs: ei/scenario_01 (2 runs" in other
+
+
+@pytest.mark.parametrize("part", [pipeline.PART, ei.PART], ids=lambda part: part.name)
+def test_scenarios_of_drives_are_those_of_the_library(part: Part) -> None:
+    family = part.name
+    named = {case.scenario for case in part.cases(part.default)}
+    assert named == {name for name in scenarios() if name.startswith(f"{family}/")}
