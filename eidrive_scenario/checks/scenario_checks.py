@@ -49,7 +49,7 @@ def scenario_diagnostics(
     try:
         simulation = Simulation(scenario, settings=settings, load_weights=False)
         simulation.close()
-        for diagnostic in (*simulation.progress_warnings, *simulation.spawn_warnings):
+        for diagnostic in (*simulation.progress_warnings, *simulation.start_warnings):
             yield Level.WARNING, diagnostic
         yield from ((Level.WARNING, diagnostic) for diagnostic in torchscript_warnings(scenario))
     except InputError as error:

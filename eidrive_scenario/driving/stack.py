@@ -147,6 +147,11 @@ class DrivingStack(ABC):
         return ()
 
     @property
+    def undirected(self) -> Collection[str]:
+        """Possible drivers that stand until the scenario gives them a speed: their settings determine none."""
+        return ()
+
+    @property
     def min_existence(self) -> Mapping[str, float]:
         """Existence probability from which on the planner of a present station reacts to an object, by station."""
         return MappingProxyType({})

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.driving.agent_factory import build_detector, build_fusion, vehicle_controller_settings
-from eidrive_scenario.driving.planner_settings import NO_PLANNER
+from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.files.yaml_text import load_yaml
@@ -17,7 +17,7 @@ from eidrive_scenario.openscenario.properties import is_agent_controller, proper
 from eidrive_scenario.openscenario.selections import EntitySelections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
-from eidrive_scenario.registry import registry
+from eidrive_scenario.registry import is_built_in, registry
 from eidrive_scenario.sensing.sensor import sensor_class
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.specs import actor_spec
@@ -69,6 +69,18 @@ def declared_settings(
 def possible_drivers(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> list[str]:
     """Return the stations that drive while their controller is active."""
     return [name for name, station in settings.items() if _drives(scenario, name, station)]
+
+
+def without_speed(settings: AgentSettings, *, limited: bool) -> bool:
+    """Return whether a driving station keeps its initial speed until the storyboard requests another one.
+
+    limited  whether there are roads, which have speed limits
+
+    Planners of third parties may choose a speed by themselves.
+    """
+    planner = registry("planners").load(settings.planner or DEFAULT_PLANNER)
+    from_settings = settings.target_speed is not None or (settings.follow_speed_limit and limited)
+    return is_built_in(planner) and not from_settings
 
 
 def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from eidrive_scenario.driving.station_declarations import (
     declared_encoders,
     declared_settings,
     possible_drivers,
+    without_speed,
 )
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
@@ -102,6 +103,11 @@ class Stations(DrivingStack):
     @property
     def possible_drivers(self) -> Collection[str]:
         return possible_drivers(self._context.scenario, self._settings)
+
+    @property
+    def undirected(self) -> Collection[str]:
+        limited = self._context.roads is not None
+        return [name for name in self.possible_drivers if without_speed(self._settings[name], limited=limited)]
 
     @property
     def min_existence(self) -> Mapping[str, float]:

@@ -11,7 +11,7 @@ from typing import Self
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stack import StackFactory
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.errors import SimulationError, WallLimitError
+from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError, WallLimitError
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
@@ -20,6 +20,7 @@ from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.simulation.attribution import attributed, report_extension, wall_limit_error
 from eidrive_scenario.simulation.command_execution import RunState, add_criteria, execute
+from eidrive_scenario.simulation.destinations import check_destinations
 from eidrive_scenario.simulation.observers import Observers
 from eidrive_scenario.simulation.run import (
     DEFAULT_SEED,
@@ -34,6 +35,7 @@ from eidrive_scenario.simulation.run_setup import set_up_run
 from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.simulation.spawn_checks import check_spawns
 from eidrive_scenario.simulation.spawn_warnings import spawn_warnings
+from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.wall_limit import limit_wall_time
@@ -86,9 +88,9 @@ class Simulation:
             self._environment: Environment | None = commands.environment
             execute(commands, self._state)
             drivers = commands.driven & {*self.stack.possible_drivers}
-            check_spawns(self.scenario, self.roads, self.world, drivers)
-            self.spawn_warnings = tuple(spawn_warnings(self.scenario, self.roads, self.world, drivers))
-            self._state.warnings += map(str, self.spawn_warnings)
+            self.start_warnings = self._check_start(commands, drivers)
+            """Warnings about starts and destinations; they are warnings of the result as well."""
+            self._state.warnings += map(str, self.start_warnings)
             add_criteria(setup.added_criteria, self._state)
             resolved = resolve_settings(setup, seed, self.settings)
         except BaseException:
@@ -100,6 +102,18 @@ class Simulation:
         """All settings of this run."""
         self._ended: RunEnd | None = None
         self._started = time.perf_counter()
+
+    def _check_start(self, commands: Commands, drivers: Collection[str]) -> tuple[Diagnostic, ...]:
+        """Return the warnings about the state after Init. Raise InputError with all errors of it."""
+        collector = ErrorCollector()
+        found: list[Diagnostic] = []
+        with collector:
+            check_spawns(self.scenario, self.roads, self.world, drivers)
+            found += spawn_warnings(self.scenario, self.roads, self.world, drivers)
+        with collector:
+            found += check_destinations(self.scenario, self.stack.undirected, self.world.view(), commands)
+        collector.raise_if_any()
+        return tuple(found)
 
     def __enter__(self) -> Self:
         return self

@@ -58,7 +58,7 @@ def test_run_with_the_option_equals_a_file_with_the_planner(tmp_path: Path) -> N
 
 
 def test_planner_settings_of_the_file_do_not_apply_to_another_planner() -> None:
-    nested = agent_xml(planner="conflict_area", planner_settings=f"{{conflict_area: {AREA}}}")
+    nested = agent_xml(planner="conflict_area", planner_settings=f"{{conflict_area: {AREA}}}", target_speed=5)
     assert planners(scenario(object_xml("Ego", controller=nested)), planner="route") == {"Ego": "route"}
 
 

@@ -106,6 +106,6 @@ def test_criteria_of_the_library_that_demand_progress() -> None:
 
 
 def test_check_reports_the_warning_of_the_run() -> None:
-    with Simulation(scenario("collision: {of: Ego}", controller=agent_xml())) as simulation:
+    with Simulation(scenario("collision: {of: Ego}", controller=agent_xml(target_speed=5))) as simulation:
         assert len(simulation.progress_warnings) == 1
         assert simulation.run().warnings[-1] == str(simulation.progress_warnings[0])
