@@ -3,14 +3,16 @@
 python -m eidrive_scenario.experiments.driven_files FILE… --drive Ego --reference ALKSController=alks --samples 200
 
 Each file is run with a driving stack for the entity. Of a parameter value distribution, `--samples` runs are taken that
-are spread over all values. With `--reference` each run is repeated without the stack and with that controller
-model, so that collisions which the reference driver avoids are counted separately. The output is the table
-driven_files.md, and driven_files.jsonl with one line per run; `--resume` repeats no run of that file.
+are spread over all values; combinations that violate the constraints of a parameter do not count. With `--reference`
+each run is repeated without the stack and with that controller model, so that collisions which the reference driver
+avoids are counted separately. The output is the table driven_files.md, and driven_files.jsonl with one line per run;
+`--resume` repeats no run of that file.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import sys
@@ -21,12 +23,15 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from eidrive_scenario.errors import ConstraintError, EidriveError
+from eidrive_scenario.errors import ConstraintError, Diagnostic, EidriveError, InputError, quoted, suggestion
 from eidrive_scenario.experiments.driven_motion import CONTACT, observed_run
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.library import definition
-from eidrive_scenario.openscenario import load_distribution
+from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution, load_scenario
+from eidrive_scenario.openscenario.model import Controller
+from eidrive_scenario.openscenario.properties import is_agent_controller
 from eidrive_scenario.openscenario.values.parameters import Assignment
+from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings
 
 STACK, REFERENCE = "stack", "reference"
@@ -34,6 +39,9 @@ ORACLE = {"detector": "oracle", "mount": "roof", "range": 150}
 """Perception of the driven vehicle."""
 TIME_LIMIT = 60.0
 """Maximum simulated time of a run [s]."""
+DRAWS = 20
+"""Maximum number of combinations that are drawn per requested sample: each is read, and all may violate constraints."""
+REFERENCE_OPTION = "--reference"
 AT_ONCE = 20
 """Number of runs after which the record is extended."""
 
@@ -113,8 +121,28 @@ def _runs(path: Path, samples: int) -> Iterator[tuple[int, Path, dict[str, str |
         yield 0, path, {}
         return
     runs = load_distribution(path)
-    for number in runs.spread(samples):
+    for number in selected_runs(runs, samples):
         yield number, runs[number].scenario, dict(runs[number].assignments)
+
+
+def selected_runs(runs: DistributionExpansion, samples: int) -> list[int]:
+    """Return the ascending numbers of the first `samples` runs of a spread whose values satisfy all constraints.
+
+    They are fewer if the distribution is exhausted, or after DRAWS combinations per sample. A larger number of samples
+    adds runs to those of a smaller one. A run with another error is selected, as its outcome is that error.
+    """
+    drawn = (runs[number] for number in itertools.islice(runs.draws(), DRAWS * samples))
+    return sorted(run.number for run in itertools.islice(filter(_satisfies_constraints, drawn), samples))
+
+
+def _satisfies_constraints(run: ConcreteRun) -> bool:
+    try:
+        load_scenario(run.scenario, run.assignments)
+    except ConstraintError:
+        return False
+    except InputError:
+        return True
+    return True
 
 
 def run_of(job: DrivenJob) -> DrivenRun:
@@ -214,13 +242,39 @@ def run_recorded(
     return [runs[(*job.case, job.arm)] for job in jobs]
 
 
+def wrong_reference(files: Iterable[Path], name: str, model: str) -> Diagnostic | None:
+    """Return the error of a reference driver that does not exist, or whose controller a file lacks; None without one.
+
+    Runs of the reference would else move the vehicle without any driver. A file with errors is left to its runs.
+    """
+    if model not in registry("controllers"):
+        return registry("controllers").unknown(model, source=REFERENCE_OPTION)
+    for path in files:
+        try:
+            known = _controller_names(path)
+        except InputError:
+            continue
+        if name not in known:
+            hint = suggestion(name, known) if known else "the file has no controller of another tool"
+            return Diagnostic(f"{path.name} has no controller {quoted(name)}", hint, REFERENCE_OPTION)
+    return None
+
+
+def _controller_names(path: Path) -> list[str]:
+    """Return the names of the controllers of other tools in a scenario, or in that of a distribution."""
+    scenario = load_scenario(load_distribution(path).scenario if definition(path) == "distribution" else path)
+    trees = (scenario.document, *scenario.entries.values())
+    found = (one for tree in trees for one in tree.walk() if isinstance(one, Controller))
+    return list(dict.fromkeys(one.name for one in found if not is_agent_controller(one)))
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", type=Path, nargs="+", help="scenarios and parameter value distributions")
     parser.add_argument("--drive", default="Ego", help="entity that gets the driving stack")
     parser.add_argument("--planner", default="behavior")
     parser.add_argument("--samples", type=int, default=200, help="number of runs of a distribution")
-    parser.add_argument("--reference", metavar="CONTROLLER=MODEL", help="controller model of the reference driver")
+    parser.add_argument(REFERENCE_OPTION, metavar="CONTROLLER=MODEL", help="controller model of the reference driver")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
@@ -228,6 +282,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     name, separator, model = (options.reference or "").partition("=")
     if options.reference and not (name and separator and model):
         parser.error("--reference: expected CONTROLLER=MODEL, for example ALKSController=alks")
+    if options.reference and (wrong := wrong_reference(options.files, name, model)) is not None:
+        parser.error(str(wrong))
     reference = {name: model} if options.reference else None
     jobs = [
         job

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import overload
@@ -88,12 +88,17 @@ class DistributionExpansion(Sequence[ConcreteRun]):
         ones of those that vary slowly. A larger count adds runs to those of a smaller one. Of random draws, the first
         ones are selected.
         """
-        if count >= len(self) or isinstance(self.varied, StochasticSampler):
-            return range(min(count, len(self)))
+        return range(len(self)) if count >= len(self) else sorted(itertools.islice(self.draws(), count))
+
+    def draws(self) -> Iterator[int]:
+        """Yield the numbers of all runs, each once, in the order in which `spread` selects them."""
+        if isinstance(self.varied, StochasticSampler):
+            yield from range(len(self))
+            return
         # Steps of the golden ratio are the most even ones for any count (Weyl); a step without a common divisor reaches
         # every run before it repeats one, and every value of each digit of the mixed radix.
         step = next(step for step in itertools.count(round(len(self) * _GOLDEN)) if math.gcd(step, len(self)) == 1)
-        return sorted(index * step % len(self) for index in range(count))
+        yield from (index * step % len(self) for index in range(len(self)))
 
 
 def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansion:

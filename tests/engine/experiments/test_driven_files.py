@@ -6,12 +6,31 @@ from pathlib import Path
 
 import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
-from openscenario_xml import object_xml, road_file_xml, scenario_xml
+from openscenario_xml import (
+    controller_xml,
+    deterministic_xml,
+    distribution_xml,
+    object_xml,
+    road_file_xml,
+    scenario_xml,
+    values_xml,
+)
 from storyboard_xml import end_xml, init_xml, lane_position_xml, speed_xml, teleport_xml
 
+from eidrive_scenario.errors import ConstraintError, Diagnostic
 from eidrive_scenario.experiments import driven_corpora, driven_files
 from eidrive_scenario.experiments.driven_corpora import GROUPS, Group, summary
-from eidrive_scenario.experiments.driven_files import REFERENCE, STACK, DrivenRun, read_record, table, worse_runs
+from eidrive_scenario.experiments.driven_files import (
+    DRAWS,
+    REFERENCE,
+    STACK,
+    DrivenRun,
+    jobs_of_file,
+    read_record,
+    table,
+    worse_runs,
+)
+from eidrive_scenario.openscenario import load_distribution
 
 
 def run(arm: str = STACK, number: int = 0, *, file: str = "a.xosc", **given: object) -> DrivenRun:
@@ -122,3 +141,98 @@ def test_corpora_of_a_folder_are_driven_by_groups(
     assert "| ASAM | 1 | 1 | 0 | 0 | 0 | - |" in output.splitlines()
     assert output == (tmp_path / "out" / "driven_corpora.md").read_text()
     assert len({group.name for group in GROUPS}) == len(GROUPS)
+
+
+LIMITED = """<ParameterDeclarations><ParameterDeclaration name="Speed" parameterType="double" value="{default}">
+<ConstraintGroup><ValueConstraint rule="lessThan" value="{limit}"/></ConstraintGroup></ParameterDeclaration>
+<ParameterDeclaration name="Other" parameterType="double" value="0"/></ParameterDeclarations>"""
+
+
+def write_variation(folder: Path, limit: int, count: int = 60) -> Path:
+    """Write a distribution over speeds 0 to `count` - 1, of which those below the limit are allowed, and two others."""
+    text = write(folder, 70.0).read_text().replace('value="10"', 'value="$Speed"')
+    declared = LIMITED.format(default=min(0, limit - 1), limit=limit)
+    (folder / "a.xosc").write_text(text.replace("<CatalogLocations", f"{declared}<CatalogLocations", 1))
+    path = folder / "v.xosc"
+    speeds = values_xml("Speed", *map(str, range(count)))
+    path.write_bytes(distribution_xml(deterministic_xml(speeds, values_xml("Other", "1", "2")), scenario="a.xosc"))
+    return path
+
+
+def numbers(path: Path, samples: int) -> list[int]:
+    """Return the numbers of the runs of a file; the stack has one run of each."""
+    return [job.number for job in jobs_of_file(path, "Ego", "route", samples, None)]
+
+
+def test_combinations_that_violate_constraints_do_not_count_as_samples(tmp_path: Path) -> None:
+    """Of 120 combinations the first 40 satisfy the constraint: the speed varies more slowly than the other."""
+    path = write_variation(tmp_path, 20)
+    found = numbers(path, 15)
+    assert len(found) == 15
+    assert found == sorted(set(found))
+    assert max(found) < 40
+    assert numbers(path, 15) == found
+
+
+def test_more_samples_contain_fewer_ones(tmp_path: Path) -> None:
+    path = write_variation(tmp_path, 20)
+    some = load_distribution(path)
+    for fewer, more in ((3, 8), (8, 25)):
+        assert set(numbers(path, fewer)) < set(numbers(path, more))
+    assert {number for number in some.spread(30) if number < 40} <= set(numbers(path, 30)), "as the plain spread does"
+
+
+def test_samples_end_with_the_distribution(tmp_path: Path) -> None:
+    assert numbers(write_variation(tmp_path, 3), 50) == list(range(6))
+
+
+def test_number_of_combinations_without_a_valid_one_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = []
+
+    def violating(path: object, values: object) -> None:
+        read.append(values)
+        raise ConstraintError(Diagnostic("outside its constraints"))
+
+    path = write_variation(tmp_path, 20)
+    monkeypatch.setattr(driven_files, "load_scenario", violating)
+    assert not numbers(path, 2)
+    assert len(read) == 2 * DRAWS
+
+
+def test_run_with_another_error_is_a_sample(tmp_path: Path) -> None:
+    path = write_variation(tmp_path, 20, 3)
+    (tmp_path / "a.xosc").write_text("damaged")
+    assert numbers(path, 4) == load_distribution(path).spread(4)
+
+
+def test_record_of_samples_is_continued(tmp_path: Path) -> None:
+    path = write_variation(tmp_path, 2, 30)
+    arguments = [str(path), "--out", str(tmp_path), "--workers", "1", "--planner", "route", "--samples"]
+    driven_files.main([*arguments, "1"])
+    (first,) = read_record(tmp_path / "driven_files.jsonl")
+    driven_files.main([*arguments, "2", "--resume"])
+    both = read_record(tmp_path / "driven_files.jsonl")
+    assert both[0] == first
+    assert [run.excluded for run in both] == [False, False]
+    assert len({run.number for run in both}) == 2
+
+
+@pytest.mark.parametrize(
+    ("reference", "message"),
+    [
+        ("Driver=alkss", "--reference: unknown controller model 'alkss'; did you mean 'alks'?"),
+        ("Drivr=alks", "--reference: a.xosc has no controller 'Drivr'; did you mean 'Driver'?"),
+        ("Driver", "--reference: expected CONTROLLER=MODEL"),
+    ],
+)
+def test_unknown_reference_driver_is_an_error(
+    reference: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, 70.0)
+    text = path.read_text()
+    path.write_text(text.replace("</ScenarioObject>", f"{controller_xml(name='Driver')}</ScenarioObject>", 1))
+    with pytest.raises(SystemExit) as exit_:
+        driven_files.main([str(path), "--reference", reference, "--out", str(tmp_path)])
+    assert exit_.value.code == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "driven_files.jsonl").exists()
