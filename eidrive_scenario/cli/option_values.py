@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 
 
 def parse_senders(text: str | None) -> tuple[str, ...] | None:
@@ -19,12 +19,18 @@ def parse_senders(text: str | None) -> tuple[str, ...] | None:
 
 
 def parse_assignments(option: str, assignments: Iterable[str]) -> dict[str, str]:
-    """Return the values of texts `NAME=VALUE` by name. Raise SettingError for any other text."""
+    """Return the values of texts `NAME=VALUE` by name.
+
+    Raise SettingError for any other text, and for a name with two values.
+    """
     values: dict[str, str] = {}
     for assignment in assignments:
         name, equals, value = assignment.partition("=")
         if not equals or not name:
             raise SettingError(Diagnostic(f"{option}: no value is assigned (got {assignment!r}; expected NAME=VALUE)"))
+        if name in values:
+            message = f"{option}: {quoted(name)} is given twice, as {quoted(values[name])} and {quoted(value)}"
+            raise SettingError(Diagnostic(message, "give each name once"))
         values[name] = value
     return values
 

@@ -115,6 +115,12 @@ def test_run_beyond_time_limit_ends_with_exit_code_3(eidrive: Eidrive, passing_b
         (["{file}", "--param", "OtherY"], "--param: no value is assigned (got 'OtherY'; expected NAME=VALUE)"),
         (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
         (["{file}", "--user-value", "mood"], "--user-value: no value is assigned (got 'mood'; expected NAME=VALUE)"),
+        (
+            ["{file}", "--param", "OtherY=1", "--param", "End=2", "--param", "OtherY=3"],
+            "--param: 'OtherY' is given twice, as '1' and '3'; give each name once",
+        ),
+        (["{file}", "--user-value", "a=1", "--user-value", "a=1"], "--user-value: 'a' is given twice"),
+        (["{file}", "--controller", "K=alks", "--controller", "K=external"], "--controller: 'K' is given twice"),
         (["{file}", "--controller", "ALKSController"], "--controller: no value is assigned (got 'ALKSController'"),
         (["{file}", "--controller", "ALKSController=alk"], "unknown controller model 'alk'; did you mean 'alks'?"),
         (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
