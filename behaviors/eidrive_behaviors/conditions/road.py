@@ -7,11 +7,19 @@ from eidrive_scenario.api.actions import ConditionContext, model
 
 
 class EndOfRoadCondition(DurationCondition):
-    """End of the road reached for a duration [s]."""
+    """End of the road reached for a duration [s]: the reference point is at an end of its lane without continuation.
+
+    A driven vehicle has reached the end from 1 m before it.
+    """
 
     element: model.EndOfRoadCondition
     state, otherwise, requirement = "at the end of its road", "on its way", "at the end of its road"
     rule_of_duration = model.Rule.GREATER_OR_EQUAL
+
+    def bind(self, context: ConditionContext) -> None:
+        """Enable the check of driven entities, which runs without this condition do not need."""
+        for name in self.entities:
+            context.actors[name].track_end_of_road()
 
     def since(self, context: ConditionContext, entity: str) -> float | None:
         """Return the time at which the end was reached [s]."""

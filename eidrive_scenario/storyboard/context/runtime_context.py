@@ -114,6 +114,8 @@ class RuntimeContext:
                 actor.observe(view, row)
                 if actor.tracks_off_road:
                     actor.update_off_road(self.roads, view)
+                if actor.tracks_end_of_road and actor.driven:
+                    actor.update_end_of_road(self.roads, view)
 
     def pose(self, name: str) -> Pose:
         """Return the current pose of an actor. Raise EntityAbsentError if it is absent."""

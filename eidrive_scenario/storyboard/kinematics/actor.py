@@ -15,6 +15,10 @@ from eidrive_scenario.world.view import ActorState, WorldView
 STANDSTILL = 1e-3
 """Maximum speed of a standing actor [m/s]."""
 
+END_REACH = 1.0
+"""Distance before the end of its lane at which a driven vehicle has reached it [m]: it stops there as well as it can,
+while a scripted actor stops exactly at the end."""
+
 Entity = model.Vehicle | model.Pedestrian | model.MiscObject
 
 
@@ -26,8 +30,8 @@ class Actor:
     keeps_controller  whether actions cannot assign or switch its controllers
     present    whether it is in the world; `RuntimeContext.add_actor` and `remove_actor` set it
     traveled   distance covered without teleports [m]
-    standing_since, end_of_road_since, off_road_since  start of the state [s], None outside of it; `off_road_since` is
-               updated after `track_off_road` only
+    standing_since, end_of_road_since, off_road_since  start of the state [s], None outside of it; `off_road_since`, and
+               `end_of_road_since` of a driven vehicle, are updated after `track_off_road` or `track_end_of_road` only
     """
 
     def __init__(
@@ -56,7 +60,7 @@ class Actor:
         self.standing_since: float | None = None
         self.end_of_road_since: float | None = None
         self.off_road_since: float | None = None
-        self._tracks_off_road = False
+        self._tracks_off_road = self._tracks_end_of_road = False
         self._last_position: tuple[float, float] | None = None
         self._last_state: ActorState | None = None
         self._location: LaneLocation | None = None
@@ -146,12 +150,10 @@ class Actor:
             self.standing_since = None
         elif self.standing_since is None:
             self.standing_since = view.time
-        if not self.motion.end_of_road:
-            self.end_of_road_since = None
-        elif self.end_of_road_since is None:
-            self.end_of_road_since = view.time
         if self.driven:
             self.motion.set_observed_state(pose_of(view, row), speed)
+        else:
+            self._set_at_end_of_road(self.motion.end_of_road, view.time)
 
     @property
     def tracks_off_road(self) -> bool:
@@ -169,6 +171,31 @@ class Actor:
             self.off_road_since = None
         elif self.off_road_since is None:
             self.off_road_since = view.time
+
+    @property
+    def tracks_end_of_road(self) -> bool:
+        """Whether a condition reads `end_of_road_since`."""
+        return self._tracks_end_of_road
+
+    def track_end_of_road(self) -> None:
+        """Update `end_of_road_since` of a driven vehicle in every tick from now on."""
+        self._tracks_end_of_road = True
+
+    def update_end_of_road(self, roads: RoadNetwork | None, view: WorldView) -> None:
+        """Update `end_of_road_since` of a driven vehicle: its reference point is at most END_REACH before the end."""
+        here = None if roads is None else self.location(roads, view.tick)
+        if roads is None or here is None:
+            self._set_at_end_of_road(False, view.time)
+            return
+        heading = roads.lane_pose_at(here.road, here.lane, here.s).h
+        along = roads.driving_direction(here.road, here.lane) * math.cos(self.motion.pose.h - heading) >= 0.0
+        self._set_at_end_of_road(roads.advance(here, END_REACH if along else -END_REACH) is None, view.time)
+
+    def _set_at_end_of_road(self, at_end: bool, time: float) -> None:
+        if not at_end:
+            self.end_of_road_since = None
+        elif self.end_of_road_since is None:
+            self.end_of_road_since = time
 
     def enter_world(self) -> None:
         """Enter the world; the durations of states restart."""
