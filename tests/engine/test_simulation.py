@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from scenario_1 import FrameCollector, edited
+from storyboard_xml import init_xml, speed_xml, teleport_xml, world_position_xml
 
 from eidrive_scenario.errors import ExtensionError, InputError
 from eidrive_scenario.library import resolve_scenario
@@ -34,8 +35,7 @@ def test_set_driven_is_called_in_order_of_names(tmp_path: Path, monkeypatch: pyt
     start, end = text.index('<ScenarioObject name="Ego">'), text.index('<ScenarioObject name="Incoming">')
     more = "".join(text[start:end].replace('name="Ego"', f'name="{name}"') for name in names)
     init = "".join(
-        f'<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>'
-        f'<WorldPosition x="{60 + 8 * number}" y="0"/></Position></TeleportAction></PrivateAction></Private>'
+        init_xml(name, teleport_xml(world_position_xml(60 + 8 * number)), speed_xml(5))
         for number, name in enumerate(names)
     )
     text = (
