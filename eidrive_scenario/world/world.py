@@ -67,6 +67,10 @@ class World:
         self._friction = 1.0
         self._tracker = ContactTracker()
         self._contacts: tuple[Contact, ...] = ()
+        self._late_contacts: tuple[Contact, ...] = ()
+        """Contacts of actors that were added after the view of the tick was taken: those of the next view."""
+        self._is_viewed = False
+        """Whether a view of this tick was taken."""
         self._view: WorldView | None = None
         self._table: ActorTable | None = None
         self._scenery = Scenery(self._client, roads, entities)
@@ -107,7 +111,11 @@ class World:
         if spec.name in self._bodies:
             raise SimulationError(f"actor {spec.name!r} is already in the world")
         self._enter(spec, placement, driven)
-        self._contacts = self._contacts + self._tracker.update(tuple(self._bodies.values()), {})
+        found = self._tracker.update(tuple(self._bodies.values()), {})
+        if self._is_viewed:
+            self._late_contacts += found
+        else:
+            self._contacts += found
 
     def remove(self, name: str) -> None:
         """Remove an actor. Raise SimulationError if it is not present."""
@@ -115,6 +123,7 @@ class World:
         del self._bodies[name]
         self._driven.pop(name, None)
         self._tracker.forget(name)
+        self._late_contacts = tuple(one for one in self._late_contacts if name not in (one.first, one.second))
         self._changed()
 
     def set_driven(self, name: str, driven: bool) -> None:
@@ -188,12 +197,14 @@ class World:
         touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
-        self._contacts = self._tracker.update(self._actors.bodies, touches)
+        self._contacts = self._late_contacts + self._tracker.update(self._actors.bodies, touches)
+        self._late_contacts, self._is_viewed = (), False
 
     def view(self) -> WorldView:
         """Return the current view, the same object until a change."""
         if self._view is None:
             self._view = self._actors.view(self.time, self.tick, self._contacts, self._unseen, self._unseen_by)
+            self._is_viewed = True
         return self._view
 
     def distance(self, first: str, second: str) -> float:

@@ -7,8 +7,24 @@ import sys
 from pathlib import Path
 
 import pytest
+from openscenario_xml import object_xml, scenario_xml
 from scenario_1 import FrameCollector, edited
-from storyboard_xml import init_xml, speed_xml, teleport_xml, world_position_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    end_xml,
+    event_xml,
+    global_xml,
+    group_xml,
+    init_xml,
+    maneuver_xml,
+    speed_xml,
+    teleport_xml,
+    time_xml,
+    trigger_xml,
+    world_position_xml,
+)
 
 from eidrive_scenario.errors import ExtensionError, InputError
 from eidrive_scenario.library import resolve_scenario
@@ -209,3 +225,20 @@ def test_observers_are_closed_even_if_one_raises() -> None:
     with pytest.raises(ExtensionError, match=r"observer 'Closes' .*OSError: full disk"):
         play(ONE, 1, Closes("first"), Closes("second", "full disk"), Closes("third"))
     assert order == ["first", "second", "third"]
+
+
+@pytest.mark.parametrize(("x", "touches"), [(4.4, True), (4.6, False)])
+def test_actor_that_an_action_adds_inside_of_a_standing_one_is_a_collision(x: float, touches: bool) -> None:
+    """The bodies are 4.5 m long; the event of 0.5 s adds Other, which the next view shows."""
+    place = f"<AddEntityAction><Position>{world_position_xml(x)}</Position></AddEntityAction>"
+    action = global_xml(f'<EntityAction entityRef="Other">{place}</EntityAction>')
+    event = event_xml("e", action, trigger_xml(condition_xml(time_xml(0.5, "greaterOrEqual"))))
+    source = scenario_xml(
+        entities=object_xml("Ego") + object_xml("Other"),
+        init=init_xml("Ego", teleport_xml(world_position_xml(0))),
+        story=acts_xml(act_xml(group_xml(maneuver_xml(event), ""), "<StartTrigger/>")),
+        stop=end_xml(1),
+    )
+    (verdict,) = run_file(source, settings=RunSettings(criteria={"collision": {"of": "Ego"}})).criteria
+    assert verdict.passed is not touches
+    assert ("Ego and Other hit each other at 0.55 s" in verdict.reason) is touches

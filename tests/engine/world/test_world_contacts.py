@@ -162,3 +162,40 @@ def test_building_stops_a_car(world: World, car: CarFactory) -> None:
     assert contacts[0].impact_speed == pytest.approx(10.0, rel=0.05)
     # The front, 3.6 m ahead of the rear axle, does not pass the wall at 20 m.
     assert world.view().position[0, 0] + 3.6 <= 20.05
+
+
+@pytest.mark.parametrize("driven", [False, True], ids=["scripted", "driven"])
+def test_contact_of_an_actor_that_is_added_inside_of_a_standing_one(
+    world: World, car: CarFactory, driven: bool
+) -> None:
+    """A view of the tick exists already, as in a run; the next one has the contact."""
+    world.add(car("A"), Placement(0.0, 0.0))
+    world.step({}, {})
+    assert world.view().contacts == ()
+    world.add(car("B"), Placement(1.0, 0.0), driven=driven)
+    world.step({}, {})
+    (contact,) = world.view().contacts
+    assert (contact.first, contact.second) == ("A", "B")
+    assert contact.impact_speed == 0.0
+    world.step({}, {})
+    assert not [one for one in world.view().contacts if {one.first, one.second} == {"A", "B"}], "reported once"
+
+
+def test_contact_of_an_actor_that_is_added_before_the_view_is_part_of_it(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0))
+    world.add(car("B"), Placement(1.0, 0.0))
+    assert len(world.view().contacts) == 1
+    world.step({}, {})
+    assert world.view().contacts == ()
+
+
+def test_contact_of_an_added_actor_ends_with_its_removal(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0))
+    world.view()
+    world.add(car("B"), Placement(1.0, 0.0))
+    world.remove("B")
+    world.step({}, {})
+    assert world.view().contacts == ()
+    world.add(car("B"), Placement(1.0, 0.0))
+    world.step({}, {})
+    assert len(world.view().contacts) == 1
