@@ -11,7 +11,7 @@ import typer
 def reproduce(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PART]", help="table2, table3, detection, pipeline, ei, or all.", show_default="all"),
+        typer.Argument(metavar="PART", help="table2, table3, detection, pipeline, ei, or all.", show_default="all"),
     ] = None,
     episodes: Annotated[
         int | None,
@@ -33,11 +33,13 @@ def reproduce(
         bool, typer.Option("--restart", help="Repeat the runs of the record, too; without it they are kept.")
     ] = False,
 ) -> None:
-    """Reproduce the experiments of the EI-Drive paper, and write tables beside its numbers."""
+    """Reproduce the experiments of the EI-Drive paper, and write reports with its numbers beside the measured ones."""
     from rich.console import Console
 
     from eidrive_scenario.experiments.reproduction.parts import ALL, selected_detectors, selected_parts
     from eidrive_scenario.experiments.reproduction.reproduce import reproduce as reproduce_part
+    from eidrive_scenario.reporting.reproduction.figures import draw
+    from eidrive_scenario.reporting.reproduction.page import write_paper_page
 
     names = [name.strip() for name in (detectors or "").split(",") if name.strip()]
     chosen = [(part, selected_detectors(part, names)) for part in selected_parts(parts or [ALL])]
@@ -51,10 +53,12 @@ def reproduce(
             restart=restart,
             console=Console(stderr=True),
         )
+        draw(part.name, done.report, out)
+        page = write_paper_page(out)
         kept = len(done.episodes) - done.added
         typer.echo(
             f"{part.name}: {done.added} runs in {done.elapsed_s:.0f} s, {kept} from the record; all "
-            f"{len(done.episodes)} took {done.computed_s:.0f} s of one process; wrote {out / part.name}.md"
+            f"{len(done.episodes)} took {done.computed_s:.0f} s of one process; wrote {out / part.name}.md and {page}"
         )
         if done.unused:
             typer.echo(f"{part.name}: {done.unused} runs of the record have other settings, seeds or code", err=True)

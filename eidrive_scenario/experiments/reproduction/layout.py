@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 Value = str | int | float | bool | None
 Row = Mapping[str, Value]
@@ -76,10 +77,21 @@ class Section:
     paragraphs: tuple[str, ...] = ()
     table: DataTable | None = None
 
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Columns of the table; empty without a table."""
+        return () if self.table is None else self.table.columns
+
+    def cells(self) -> list[list[str]]:
+        """Return the formatted cells of the table by row; empty for a table without columns."""
+        if self.table is None or not self.columns:
+            return []
+        return [[column.text(row) for column in self.columns] for row in self.table.rows]
+
     def markdown(self, level: int = 2) -> str:
         """Return the section as Markdown with a heading of this level."""
         parts = [f"{'#' * level} {self.title}\n", *(f"{text}\n" for text in self.paragraphs)]
-        if self.table is not None and self.table.columns:
+        if self.table is not None and self.columns:
             parts.append(self.table.markdown())
         return "\n".join(parts)
 
@@ -98,6 +110,19 @@ class PartReport:
             if section.table is not None and (section.table.columns or not shown):
                 rows.setdefault(section.table.name, []).extend(section.table.rows)
         return rows
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the texts of the sections, and the rows of the tables that the report shows with all digits."""
+        sections = [
+            {
+                "title": section.title,
+                "paragraphs": list(section.paragraphs),
+                "columns": [column.title for column in section.columns],
+                "rows": section.cells(),
+            }
+            for section in self.sections
+        ]
+        return {"title": self.title, "sections": sections, "tables": self.data(shown=True)}
 
     def markdown(self) -> str:
         """Return the report as Markdown."""

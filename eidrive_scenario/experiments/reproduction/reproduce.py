@@ -81,7 +81,7 @@ def _write_report(part: Part, out: Path, report: PartReport) -> None:
     tables = report.data()
     texts = {
         f"{part.name}.md": report.markdown(),
-        f"{part.name}.json": json.dumps(report.data(shown=True), indent=1) + "\n",
+        f"{part.name}.json": json.dumps(report.as_json(), indent=1) + "\n",
     }
     texts |= {f"{name}.csv": as_csv(rows) for name, rows in tables.items()}
     for name, text in texts.items():

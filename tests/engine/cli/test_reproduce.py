@@ -17,8 +17,9 @@ QUICK = ("--detectors", "oracle", "--workers", "1")
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the report and the tables, without the record and the durations."""
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix in (".md", ".csv")}
+    """Return report, tables and figures, without the record and the files that contain durations."""
+    found = (path for path in folder.iterdir() if path.suffix in (".md", ".csv", ".json", ".png"))
+    return {path.name: path.read_bytes() for path in found if path.name != "provenance.json"}
 
 
 @pytest.mark.timeout(300)
@@ -32,8 +33,9 @@ def test_table_2_continues_after_a_kill_and_repeats_its_tables(
     first = eidrive(*arguments)
     assert (first.exit_code, first.stdout.split(" runs in")[0]) == (0, "table2: 28")
     written = files(out)
-    assert set(written) == {"table2.md", "table2.csv", "table2_summary.csv", "table2_comparisons.csv"}
-    summary = json.loads((out / "table2.json").read_bytes())["table2_summary"]
+    tables = {"table2.csv", "table2_summary.csv", "table2_comparisons.csv"}
+    assert set(written) == {"table2.md", "table2.json", "table2.png", *tables}
+    summary = json.loads((out / "table2.json").read_bytes())["tables"]["table2_summary"]
     orders = [row for row in summary if row["statement"] in ("cooperation > none", "cooperation > latency")]
     assert [row["holds"] for row in orders] == [2] * len(orders) != []
     origin = json.loads((out / "provenance.json").read_bytes())["table2"]

@@ -1,0 +1,76 @@
+"""Page of the reproduction: the reports of all parts in a folder, with their figures, in one file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup, escape
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.reproduction.parts import PARTS
+from eidrive_scenario.experiments.reproduction.provenance import read_provenance
+from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.reporting.page import png_address, write_page
+
+PAGE = "index.html"
+"""Name of the page in the folder of the results."""
+
+
+def write_paper_page(out: Path) -> Path:
+    """Write the page of a folder from the JSON files and figures of its parts. Return its path.
+
+    Raise SettingError if a JSON file is damaged, or if the page cannot be written.
+    """
+    origins = read_provenance(out)
+    parts = [_part(out, name, origins.get(name, {})) for name in PARTS if (out / f"{name}.json").is_file()]
+    return write_page(out / PAGE, "reproduction.html.jinja", title="Reproduction of the EI-Drive paper", parts=parts)
+
+
+def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
+    path, figure = out / f"{name}.json", out / f"{name}.png"
+    try:
+        report = load_json(path.read_bytes())
+        sections = [
+            {
+                "title": str(section["title"]),
+                "paragraphs": [_with_code(str(text)) for text in section["paragraphs"]],
+                "columns": [str(title) for title in section["columns"]],
+                "rows": [[str(cell) for cell in row] for row in section["rows"]],
+            }
+            for section in report["sections"]
+        ]
+        title = str(report["title"])
+    except (ValueError, KeyError, TypeError) as error:
+        hint = "run `eidrive reproduce` for this part again"
+        raise SettingError(Diagnostic(f"the file is damaged: {error!r}", hint, str(path))) from error
+    return {
+        "name": name,
+        "title": title,
+        "sections": sections,
+        "figure": png_address(figure.read_bytes()) if figure.is_file() else "",
+        "origin": ", ".join(_origin(origin)),
+    }
+
+
+def _origin(origin: Mapping[str, Any]) -> list[str]:
+    """Return version, commit, seeds and durations as texts, without unknown ones."""
+    texts = {
+        "version": "eidrive-scenario {}",
+        "commit": "commit {}",
+        "seeds": "seeds {}",
+        "runs": "{} runs",
+        "all_runs_s": "{} s of one process",
+        "runs_of_last_call": "last call {} runs",
+        "last_call_s": "in {} s",
+    }
+    return [text.format(origin[key]) for key, text in texts.items() if origin.get(key) is not None]
+
+
+def _with_code(text: str) -> Markup:
+    """Return a paragraph as HTML, with words between backticks as code."""
+    parts = text.split("`")
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if number % 2 else escape(part) for number, part in enumerate(parts)
+    )
