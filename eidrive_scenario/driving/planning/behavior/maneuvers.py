@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, passing, towards
@@ -142,26 +143,29 @@ def _around_blocker(
     clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
     outer = float((side * scene.d[rows, 0] + scene.half_width[rows, 0]).max())
     own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in beside), strict=True))
-    for margin in (clearance + SPARE, LEAST_CLEARANCE) if not vulnerable else (clearance + SPARE,):
-        value = max(outer + margin + half_width, 0.0)
-        if value + half_width <= every:
-            where = "on the left" if side > 0 else "on the right"
-            kind = situation.kind_of(scene.owner[blocker])
-            profile = passing(
-                f"pass {kind} {where}",
-                side * value,
-                (begin, end),
-                *situation.steered,
-                max(situation.speed, 2.0),
-                settings.lateral_acceleration,
-                side,
-            )
-            if profile is not None and value + half_width > own:
-                return LateralProfile(
-                    profile.name, profile.places, profile.values, profile.slope, profile.side, uses_oncoming=True
-                )
-            return profile
-    return None
+    room = every - outer - 2.0 * half_width
+    if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
+        return None
+    value = max(outer + _beside_obstacle(room, clearance) + half_width, 0.0)
+    profile = passing(
+        f"pass {situation.kind_of(scene.owner[blocker])} on the {'left' if side > 0 else 'right'}",
+        side * value,
+        (begin, end),
+        *situation.steered,
+        max(situation.speed, 2.0),
+        settings.lateral_acceleration,
+        side,
+    )
+    if profile is not None and value + half_width > own:
+        return msgspec.structs.replace(profile, uses_oncoming=True)
+    return profile
+
+
+def _beside_obstacle(room: float, clearance: float) -> float:
+    """Return the distance from an obstacle [m] if the road leaves `room` [m] in addition to the vehicle."""
+    if room >= clearance + SPARE:
+        return clearance + SPARE
+    return (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
 
 
 def _together(situation: Situation, scene: Surroundings, blocker: int, half_width: float) -> list[int]:

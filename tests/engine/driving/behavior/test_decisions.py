@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detections, two_lane_road
+from signal_street import CAR
 
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.requests import Goal
@@ -155,6 +156,18 @@ def test_oncoming_traffic_is_awaited_before_passing(roads: RoadNetwork) -> None:
     assert beside, "the car passes"
     assert min(beside) > last_passed
     assert run.front > 130.0
+
+
+def test_lateral_margin_is_kept_in_a_narrow_gap(roads: RoadNetwork) -> None:
+    """The road leaves 0.5 m in addition to the width of the car: 0.1 m more than the lateral margin."""
+    width = CAR.size[1]
+    left_side = 3.5 - 0.5 - width
+    obstacle = KnownBox(100.0, left_side - 2.0, kind="misc", size=(2.0, 4.0), deviation=0.0)
+    run = drive(roads, lambda now: [obstacle], 30.0)
+    assert run.front > 130.0
+    beside = [y for x, y, _ in run.path if 99.0 < x < 101.0]
+    assert min(beside) - width / 2.0 - left_side > DEFAULTS.lateral_margin - 0.02
+    assert max(beside) + width / 2.0 < 3.5 + 0.1, "on the road, within the error of the lateral control"
 
 
 def test_lane_changes_can_be_switched_off(roads: RoadNetwork) -> None:
