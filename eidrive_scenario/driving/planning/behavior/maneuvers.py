@@ -21,6 +21,8 @@ LONG = 15.0
 """Time after which a vehicle in the middle of the lane counts as parked [s]; before, the vehicle waits behind it."""
 WAITING = 1.0
 """Speed below which the vehicle waits [m/s]."""
+WRONG_WAY = 2.0
+"""Speed against the direction of the lane from which on a vehicle in it is oncoming [m/s]; slower ones maneuver."""
 ASIDE = 0.8
 """Offset from the route from which on a standing vehicle is parked at the edge of the lane [m]."""
 SETTING_OFF = 5.0
@@ -47,7 +49,13 @@ REAR_REACTION, REAR_DECELERATION, REAR_GAP = 1.0, 1.5, 3.0
 def passing_profiles(
     situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body
 ) -> list[LateralProfile]:
-    """Return maneuvers past what holds the vehicle up; none if it queues or nothing is free beside it."""
+    """Return maneuvers past what holds the vehicle up, or out of the way of an oncoming vehicle in its lane.
+
+    The result is empty if the vehicle queues or nothing is free beside it.
+    """
+    head_on = _head_on(situation, scene, body)
+    if head_on is not None:
+        return _evasions(situation, scene, settings, body, head_on)
     blocker = _blocker(situation, scene, body.center, body.half_width)
     if blocker is None or _queues(situation, scene, blocker):
         return []
@@ -62,6 +70,33 @@ def passing_profiles(
         profile = _around_blocker(situation, scene, settings, blocker, body, side)
         if profile is not None:
             found.append(profile)
+    return found
+
+
+def _head_on(situation: Situation, scene: Surroundings, body: Body) -> int | None:
+    """Return the nearest hypothesis that comes towards the vehicle in the lane of its route."""
+    ahead = scene.certain & (scene.s[:, 0] > situation.s + body.center) & ~scene.crosses[:, 0]
+    in_way = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < body.half_width
+    found: list[int] = np.flatnonzero(ahead & in_way & (scene.speed[:, 0] < -WRONG_WAY)).tolist()
+    return min(found, key=lambda row: float(scene.s[row, 0])) if found else None
+
+
+def _evasions(
+    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, head_on: int
+) -> list[LateralProfile]:
+    """Return changes to the neighboring lanes that reach as far as an oncoming vehicle, and are free behind.
+
+    The first one is away from the lanes of the opposite direction.
+    """
+    far = float(scene.s[head_on, 0])
+    here, there = (situation.line.lanes_beside(situation.lanes_at(place)) for place in (situation.s + 10.0, far))
+    found = []
+    for side in (-here.overtaking, here.overtaking):
+        offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
+        if not (math.isnan(offset) or math.isnan(beyond)) and _rear_is_free(situation, scene, offset, body.center):
+            name = f"change lane to the {'left' if side > 0 else 'right'}"
+            start = (*situation.steered, situation.speed)
+            found.append(towards(name, offset, *start, settings.lateral_acceleration, side=side))
     return found
 
 

@@ -1,0 +1,72 @@
+"""A vehicle that comes towards the car in its lane: a neighboring lane of the same direction is the way out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
+from planned_drive import LANE, KnownBox, PlannedDrive, behavior
+from signal_street import CAR
+
+from eidrive_scenario.roads import RoadNetwork
+
+Traffic = Callable[[float], KnownBox]
+WIDTH, SPEED = 3.5, 20.0
+
+
+def wrong_way(now: float) -> KnownBox:
+    """Return the oncoming car in the lane of the driven one, 200 m ahead at the start."""
+    return KnownBox(220.0 - SPEED * now, LANE, vx=-SPEED, yaw=math.pi)
+
+
+def drive(lanes: int, own: int, *others: Traffic, **settings: bool) -> PlannedDrive:
+    """Drive at 10 m/s in lane `own` (1 is the one on the left) of a direction with a number of lanes."""
+    middle = LANE + (own - 0.5) * WIDTH
+    roads = RoadNetwork.parse(map_xml(road_xml(length=500.0, y=middle, lanes=lanes_xml(1, lanes))))
+    run = PlannedDrive(behavior(roads, **settings), roads)
+    run.run(14.0, lambda now: [wrong_way(now), *(other(now) for other in others)])
+    run.world.close()
+    return run
+
+
+def clearance(run: PlannedDrive, other: Traffic) -> float:
+    """Return the minimum distance from another car along or across the road [m], negative after a contact."""
+    found = []
+    for tick, (x, y, _) in enumerate(run.path):
+        box = other(tick * 0.05)
+        along = abs(x + CAR.offset[0] - box.x) - (CAR.size[0] + box.size[0]) / 2.0
+        across = abs(y - box.y) - (CAR.size[1] + box.size[1]) / 2.0
+        found.append(max(along, across))
+    return min(found)
+
+
+@pytest.mark.parametrize(("lanes", "own", "side"), [(2, 1, "right"), (2, 2, "left"), (3, 2, "right")])
+def test_vehicle_leaves_the_lane_of_a_wrong_way_driver(lanes: int, own: int, side: str) -> None:
+    run = drive(lanes, own)
+    assert f"change lane to the {side}; keep speed" in run.reasons
+    # A lane is 3.5 m wide, the cars 1.84 and 1.8 m.
+    assert clearance(run, wrong_way) > WIDTH - 1.82 - 0.1
+    assert run.path[-1][1] == pytest.approx(LANE, abs=0.1), "back in the lane of the route"
+    assert run.speeds[-1] == pytest.approx(10.0, abs=0.3)
+
+
+def test_vehicle_lets_traffic_in_the_neighboring_lane_pass_first() -> None:
+    def beside(now: float) -> KnownBox:
+        return KnownBox(15.0 + 10.0 * now, LANE + WIDTH, vx=10.0)
+
+    run = drive(2, 2, beside)
+    assert clearance(run, wrong_way) > 1.0
+    assert clearance(run, beside) > 1.0
+
+
+def test_vehicle_without_a_neighboring_lane_keeps_its_lane() -> None:
+    run = drive(1, 1)
+    assert max(abs(y - LANE) for _, y, _ in run.path) < 0.1
+    assert min(run.speeds) < 2.0
+
+
+def test_lane_is_kept_if_lane_changes_are_switched_off() -> None:
+    run = drive(2, 1, lane_changes=False)
+    assert max(abs(y - LANE) for _, y, _ in run.path) < 0.1
