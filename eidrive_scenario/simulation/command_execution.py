@@ -76,6 +76,11 @@ def remove_actors(commands: Commands, run: RunState) -> None:
         run.stack.remove(name)
 
 
+def set_trailers(commands: Commands, run: RunState) -> None:
+    """Set which actors are connected, before a trailer enters the world."""
+    run.world.set_trailers(commands.trailers)
+
+
 def spawn_actors(commands: Commands, run: RunState) -> None:
     """Add actors to the world and the stack."""
     for name, placement in commands.spawns.items():
@@ -154,6 +159,7 @@ def end_run(command: CustomCommand, run: RunState) -> None:
 
 HANDLERS: tuple[Callable[[Commands, RunState], None], ...] = (
     remove_actors,
+    set_trailers,
     spawn_actors,
     switch_drivers,
     set_inputs,

@@ -144,6 +144,7 @@ class Storyboard:
         Return towing vehicles and trailers, from front to end of each train.
         """
         towed_pairs = list(pairs(self.context.actors))
+        self.context.commands.trailers = frozenset(frozenset((front.name, back.name)) for front, back in towed_pairs)
         for front, back in towed_pairs:
             if front.present and (not back.present or self.context.view.tick < 0):
                 back.motion.set_speed(front.motion.speed)

@@ -20,6 +20,7 @@ from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
 from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
 from eidrive_scenario.world.physics.bullet import connect, disconnect
 from eidrive_scenario.world.physics.contacts import ContactTracker
+from eidrive_scenario.world.physics.couplings import Couplings
 from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.ground import GroundUnder
@@ -65,7 +66,8 @@ class World:
         self._unseen: tuple[str, ...] = ()
         self._unseen_by: Mapping[str, tuple[str, ...]] = {}
         self._friction = 1.0
-        self._tracker = ContactTracker()
+        self._couplings = Couplings(self._client)
+        self._tracker = ContactTracker(self._couplings)
         self._contacts: tuple[Contact, ...] = ()
         self._late_contacts: tuple[Contact, ...] = ()
         """Contacts of actors that were added after the view of the tick was taken: those of the next view."""
@@ -142,6 +144,10 @@ class World:
         self._bodies = {key: self._bodies[key] for key in order}
         self._changed()
 
+    def set_trailers(self, pairs: Collection[frozenset[str]]) -> None:
+        """Set the pairs of a vehicle and its trailer, which may overlap; actors may be absent."""
+        self._couplings.pairs = frozenset(pairs)
+
     @property
     def weather(self) -> Weather:
         """Current weather."""
@@ -194,6 +200,7 @@ class World:
                     body.place(placement)
             elif placement is not None:
                 self._driven[name].teleport(placement)
+        self._couplings.update(self._bodies)
         touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None

@@ -30,9 +30,9 @@ ASIDE = private_xml("""<LateralAction><LaneChangeAction>
   <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
 
 
-def play(run: Run, end: float, *steps: tuple[str, ...]) -> RecordedRun:
+def play(run: Run, end: float, *steps: tuple[str, ...], train: str = TRAIN) -> RecordedRun:
     placed = global_xml(PLACE.format("Truck", 200)) + global_xml(PLACE.format("Trailer", 196))
-    return run(end, *steps, driven=False, ego=(1, 900.0, 0.0), more=TRAIN, globally=placed)
+    return run(end, *steps, driven=False, ego=(1, 900.0, 0.0), more=train, globally=placed)
 
 
 @pytest.mark.element("ConnectTrailerAction", "DisconnectTrailerAction")
@@ -48,6 +48,15 @@ def test_trailer_follows_from_connection_to_disconnection(run: Run) -> None:
     assert truck[-1] == pytest.approx(230.0)
     assert trailer[-1] == trailer[62] < 217.0
     assert played.of("Trailer", "speed")[-1] == 0.0
+
+
+@pytest.mark.element("ConnectTrailerAction")
+def test_connected_trailer_may_overlap_its_vehicle(run: Run) -> None:
+    """With the coupler 1.2 m ahead of its center the trailer begins 0.3 m before the end of the truck."""
+    overlapping = TRAIN.replace('TrailerCoupler dx="3"', 'TrailerCoupler dx="1.2"')
+    played = play(run, 4, ("Truck", COUPLE), ("Truck", DRIVE), ("Truck", UNCOUPLE, after(3.0)), train=overlapping)
+    assert played.x("Truck")[40] - played.x("Trailer")[40] == pytest.approx(2.2)
+    assert not [contact for frame in played.frames for contact in frame.view.contacts]
 
 
 def test_unconnected_trailer_does_not_move(run: Run) -> None:

@@ -11,10 +11,8 @@ import numpy as np
 from eidrive_scenario.geometry import box_corners, box_distance, overlap, points_in_box
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bodies import Body
+from eidrive_scenario.world.physics.couplings import PARTED, Couplings
 from eidrive_scenario.world.view import FEW, Contact
-
-PARTED = 0.05
-"""Minimum gap after a contact before a new one is counted [m]. It prevents that a scrape counts as many contacts."""
 
 
 class Touch(NamedTuple):
@@ -25,9 +23,13 @@ class Touch(NamedTuple):
 
 
 class ContactTracker:
-    """Tracker of starting contacts: overlaps of boxes at the ends of steps, and contacts in pybullet."""
+    """Tracker of starting contacts: overlaps of boxes at the ends of steps, and contacts in pybullet.
 
-    def __init__(self) -> None:
+    A contact that began while a trailer was connected to its vehicle is none until they have parted.
+    """
+
+    def __init__(self, couplings: Couplings) -> None:
+        self._couplings = couplings
         self._touching: dict[tuple[str, str], None] = {}
 
     def forget(self, name: str) -> None:
@@ -53,6 +55,8 @@ class ContactTracker:
             if pair in self._touching or pair in touches or not overlap(first.box, second.box):
                 continue
             self._touching[pair] = None
+            if frozenset(pair) in self._couplings.pairs:
+                continue
             begun.append(
                 Contact(
                     *pair, _shared_point(first, second), relative_speed(first.velocity_before, second.velocity_before)
