@@ -13,6 +13,9 @@ import msgspec
 
 from eidrive_scenario.arrays import Array
 
+LONGEST_WAY = 200_000.0
+"""Maximum length of a way to a destination [m]: a planner may have a point for each meter."""
+
 
 class Goal(msgspec.Struct, frozen=True):
     """Goal of a driven vehicle that the storyboard sets; for None the settings of the agent apply.

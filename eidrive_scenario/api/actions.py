@@ -8,7 +8,7 @@ from eidrive_scenario import traffic
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.properties import is_agent_controller, property_entries
 from eidrive_scenario.openscenario.trajectory_times import TIME_ATTRIBUTES, has_times
-from eidrive_scenario.requests import Goal, Override
+from eidrive_scenario.requests import LONGEST_WAY, Goal, Override
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import (
     Condition,
@@ -54,6 +54,7 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.physics.multi_axle import turning_wheelbase
 
 __all__ = [
+    "LONGEST_WAY",
     "STEEPEST",
     "TIME_ATTRIBUTES",
     "ActionBehaviour",

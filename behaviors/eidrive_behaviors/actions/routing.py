@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.teleport import describe_position
 from eidrive_scenario.api.actions import (
+    LONGEST_WAY,
     ActionBehaviour,
     ActionContext,
     Goal,
@@ -78,6 +81,8 @@ class AcquirePositionAction(ActionBehaviour):
                 raise self.error(error.diagnostics[0].message, error.diagnostics[0].hint) from None
             assign_route(self, route)
         elif self.actor.driven:
+            start = self.actor.motion.pose
+            check_way(self, math.hypot(place.pose.x - start.x, place.pose.y - start.y))
             goal = self.actor.goal
             self.actor.set_goal(replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]])))
         return Status.SUCCESS
@@ -134,5 +139,15 @@ def assign_route(behaviour: ActionBehaviour, route: Route) -> None:
     actor = behaviour.actor
     actor.motion.set_route(route)
     if actor.driven:
+        check_way(behaviour, route.length)
         lap = None if route.onward is None else route.onward.polyline(POINTS_APART)
         actor.set_goal(replace(actor.goal or Goal(), path=route.polyline(POINTS_APART), lap=lap))
+
+
+def check_way(behaviour: ActionBehaviour, length: float) -> None:
+    """Raise ScenarioError if a way that is requested of a driven vehicle is longer than LONGEST_WAY [m]."""
+    if not length <= LONGEST_WAY:
+        message = f"the way to the destination has a length of {length / 1000.0:,.0f} km"
+        raise behaviour.error(
+            message, f"a driven vehicle accepts at most {LONGEST_WAY / 1000.0:.0f} km: check the position"
+        )

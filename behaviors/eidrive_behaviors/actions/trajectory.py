@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
-from eidrive_behaviors.actions.routing import POINTS_APART
+from eidrive_behaviors.actions.routing import POINTS_APART, check_way
 from eidrive_scenario.api.actions import (
     TIME_ATTRIBUTES,
     ActionBehaviour,
@@ -103,6 +103,8 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._heading = motion.pose.h if present else None
         """Heading before the action [rad]; None for an actor that the trajectory adds to the world."""
         self._put: Pose | None = None
+        self._driver_path: tuple[float, np.ndarray[tuple[int, int], np.dtype[np.float64]]] | None = None
+        """Start on the trajectory [m], and points (M, 3) from there, which a driven vehicle follows."""
         self._pursuit = self._run = None
         self._begun = self._direction_known = self._teleports = False
         if self._timing is not None and not (self._follows_limits and present):
@@ -276,8 +278,12 @@ class FollowTrajectoryAction(ActionBehaviour):
         return back._replace(h=wrap_angle(back.h))
 
     def _set_driver_goal(self) -> Status:
-        count = max(2, math.ceil(self._layout.length / POINTS_APART) + 1)
-        points = np.array([self._layout.at(s)[:3] for s in np.linspace(self._s, self._layout.length, count).tolist()])
+        if self._driver_path is None or self._driver_path[0] != self._s:
+            check_way(self, self._layout.length)
+            count = max(2, math.ceil(self._layout.length / POINTS_APART) + 1)
+            places = np.linspace(self._s, self._layout.length, count).tolist()
+            self._driver_path = self._s, np.array([self._layout.at(s)[:3] for s in places])
+        points = self._driver_path[1]
         goal = self.actor.goal
         self.actor.set_goal(replace(goal or Goal(), path=points, lap=None))
         here = self.actor.motion.pose

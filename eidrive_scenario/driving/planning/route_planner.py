@@ -17,7 +17,7 @@ from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoin
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.requests import Goal
+from eidrive_scenario.requests import LONGEST_WAY, Goal
 from eidrive_scenario.roads import LaneLocation, RoadNetwork, RouteError
 from eidrive_scenario.roads.routing.costs import assumed_speed
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
@@ -31,8 +31,6 @@ STRIDE = 10
 """Number of lane points that are computed in one step on a continuous lane."""
 TURNS = 50.0
 """Maximum length of a road that may lead into itself within a stride [m]."""
-LONGEST = 200_000.0
-"""Maximum length of a way to a destination [m]; a path has a point for each meter."""
 BEYOND = 100.0
 """Distance beyond the end of the road within which a vehicle still stops for it [m]; farther away it was teleported."""
 BEHIND = 5
@@ -232,12 +230,12 @@ def _with_laps(line: Array, lap: Array) -> PlannedPath:
 
 
 def _check_length(line: Array) -> None:
-    """Raise RouteError if a polyline (K, 3) is longer than LONGEST."""
+    """Raise RouteError if a polyline (K, 3) is longer than LONGEST_WAY."""
     length = float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
-    if not length <= LONGEST:
+    if not length <= LONGEST_WAY:
         x, y = line[-1, :2].tolist()
         message = f"the way to the destination at ({x:g}, {y:g}) m has a length of {length / 1000.0:,.0f} km"
-        raise RouteError(Diagnostic(message, f"a way has at most {LONGEST / 1000.0:.0f} km: check the position"))
+        raise RouteError(Diagnostic(message, f"a way has at most {LONGEST_WAY / 1000.0:.0f} km: check the position"))
 
 
 def _same(first: Array | None, second: Array | None) -> bool:
