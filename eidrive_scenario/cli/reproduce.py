@@ -16,7 +16,10 @@ def reproduce(
     episodes: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Episodes of each cell, with seeds from 1.", show_default="20 (table2), 40 (table3), else 5"
+            min=1,
+            max=10_000,
+            help="Episodes of each cell, with seeds from 1.",
+            show_default="table2: 20, table3: 40, else 5",
         ),
     ] = None,
     detectors: Annotated[
@@ -41,7 +44,7 @@ def reproduce(
     from eidrive_scenario.reporting.reproduction.figures import draw
     from eidrive_scenario.reporting.reproduction.page import write_paper_page
 
-    names = [name.strip() for name in (detectors or "").split(",") if name.strip()]
+    names = [] if detectors is None else [name.strip() for name in detectors.split(",")]
     chosen = [(part, selected_detectors(part, names)) for part in selected_parts(parts or [ALL])]
     for part, used in chosen:
         done = reproduce_part(

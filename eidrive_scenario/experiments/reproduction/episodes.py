@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import msgspec
@@ -17,7 +18,7 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     arm      name of the settings within the part
     digest   digest of the settings and of the code
-    metrics  metrics of the run's criteria, by name
+    metrics  finite metrics of the run, by name
     failed   names of the criteria that failed
     counts   number of objects that the counted station knew at each time step, after fusion
     wall_s   duration of the run [s]
@@ -90,7 +91,7 @@ def run_episode(job: EpisodeJob) -> Episode:
         trace_hash=result.trace_hash,
         simulated_s=result.simulated_s,
         wall_s=round(result.wall_s, 3),
-        metrics={name: float(value) for name, value in result.metrics.items()},
+        metrics={name: float(value) for name, value in result.metrics.items() if math.isfinite(value)},
         failed=tuple(verdict.name for verdict in result.criteria if not verdict.passed),
         counts=tuple(counter.counts),
     )

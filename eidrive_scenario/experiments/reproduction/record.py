@@ -36,8 +36,8 @@ class Record:
         An incomplete last line, as a killed process leaves it, is removed. Raise SettingError if any other line is
         invalid, if the file cannot be written, or if another process writes it.
         """
-        if path.is_dir():
-            raise SettingError(Diagnostic("cannot write: Is a directory", "choose another folder", str(path)))
+        if path.exists() and not path.is_file():
+            raise SettingError(Diagnostic("cannot write: not a regular file", "choose another folder", str(path)))
         with ExitStack() as stack:
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)

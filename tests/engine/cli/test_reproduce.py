@@ -60,6 +60,10 @@ def test_table_2_continues_after_a_kill_and_repeats_its_tables(
     [
         (("tabel2",), "part: unknown name 'tabel2'; did you mean 'table2'?"),
         (("table2", "--detectors", "yolov6"), "--detectors: unknown name 'yolov6'"),
+        (("table2", "--detectors", "oracle,"), "--detectors: unknown name ''"),
+        (("table2", "--detectors", "ssd"), "--detectors: part table2 uses none of them (got 'ssd'); known: oracle"),
+        (("all", "table2", "--detectors", "ssd"), "--detectors: part table2 uses none of them"),
+        (("table2", "--episodes", "1000000000"), "less than or equal to 10000"),
         (("table2", "--episodes", "0"), "greater than or equal to 1"),
         (("table2", "--episodes", "many"), "should be a valid integer"),
         (("table2", "--workers", "0"), "greater than or equal to 1"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import time
+from pathlib import Path
 
 from eidrive_scenario.experiments.repetitions import Job
 from eidrive_scenario.randomness import generator
@@ -28,3 +30,9 @@ def fail_at_seed_3(job: Job) -> int:
     if job.seed == 3:
         fail(job)
     return job.seed
+
+
+def sleep(job: Job) -> None:
+    """Write the number of this process into the folder that the job names as its scenario, and sleep."""
+    (Path(job.scenario) / f"{os.getpid()}.pid").touch()
+    time.sleep(100.0)

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import importlib
 import io
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -50,6 +55,43 @@ def test_run_jobs_with_dead_worker_raises_error(tasks: ModuleType) -> None:
 def test_run_jobs_raises_error_of_task(tasks: ModuleType, workers: int) -> None:
     with pytest.raises(ValueError, match="seed 0 is invalid"):
         run_jobs(JOBS[:2], tasks.fail, workers=workers)
+
+
+def test_workers_of_a_killed_process_end(tmp_path: Path) -> None:
+    """Each worker writes its process number and sleeps; after the kill of their parent both end within seconds."""
+    code = (
+        "if __name__ == '__main__':\n"
+        "    import repetition_tasks\n"
+        "    from eidrive_scenario.experiments.repetitions import jobs_of, run_jobs\n"
+        "    from eidrive_scenario.simulation import RunSettings\n"
+        f"    jobs = jobs_of({str(tmp_path)!r}, {{'a': RunSettings()}}, range(2))\n"
+        "    run_jobs(jobs, repetition_tasks.sleep, workers=2)\n"
+    )
+    script = tmp_path / "parent.py"
+    script.write_text(code)
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    with subprocess.Popen([sys.executable, str(script)], env=environment) as parent:
+        wait_until(lambda: len(list(tmp_path.glob("*.pid"))) == 2)
+        numbers = [int(path.stem) for path in tmp_path.glob("*.pid")]
+        assert all(map(is_running, numbers))
+        parent.kill()
+    wait_until(lambda: not any(map(is_running, numbers)))
+
+
+def wait_until(condition: Callable[[], bool], limit: float = 60.0) -> None:
+    """Wait for a condition. Fail after the limit [s]."""
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, "the condition is not met in time"
+        time.sleep(0.1)
+
+
+def is_running(number: int) -> bool:
+    """Return whether a process exists and is not a zombie."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
 def test_run_jobs_without_worker_raises_value_error(tasks: ModuleType) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
+import os
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -80,8 +81,10 @@ def test_record_of_another_process_and_unwritable_folders_are_errors(tmp_path: P
         pass
     with pytest.raises(SettingError, match="cannot write: File exists"), Record.open(path / "below.jsonl"):
         pass
-    with pytest.raises(SettingError, match="cannot write: Is a directory"), Record.open(tmp_path):
-        pass
+    os.mkfifo(tmp_path / "pipe")
+    for other in (tmp_path, tmp_path / "pipe"):
+        with pytest.raises(SettingError, match="cannot write: not a regular file"), Record.open(other):
+            pass
 
 
 def test_digest_distinguishes_settings_and_scenarios() -> None:
