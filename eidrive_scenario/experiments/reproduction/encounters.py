@@ -48,6 +48,7 @@ def encounter_fields(episodes: Sequence[Episode]) -> dict[str, Value]:
     mean, sd, low, high   minimum distance between the centers: mean, population standard deviation, 95 % interval [m]
     gap, gap_least        mean and minimum of the distance between the bodies, 0 after a contact [m]
     impact_speed          mean relative speed at the first contact of the runs with one [m/s]; None without one
+    crash_least           least minimum distance between the centers of the runs with a contact [m]; None without one
     time_to_collision     median of the minimum time to collision [s]; None if most runs have no collision course
     collisions, collision_low, collision_high   number of runs with a contact, and Wilson interval of their share
     """
@@ -67,6 +68,7 @@ def encounter_fields(episodes: Sequence[Episode]) -> dict[str, Value]:
         "gap": sum(gaps) / len(gaps),
         "gap_least": min(gaps),
         "impact_speed": sum(speeds) / len(speeds) if speeds else None,
+        "crash_least": min(centers(hits)) if hits else None,
         "time_to_collision": times if math.isfinite(times) else None,
         "collisions": len(hits),
         "collision_low": share.low,
