@@ -8,7 +8,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
 from eidrive_scenario.driving.planning.behavior.oncoming import first_oncoming, meets_oncoming
-from eidrive_scenario.driving.planning.behavior.proposals import Proposal
+from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Proposal
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
@@ -32,6 +32,8 @@ FARTHER = 0.8
 """Share by which the weight of a risk decreases toward the horizon."""
 LEAST_LACK = 0.3
 """Risk of a clearance that is just too small; it increases to 1 at a contact."""
+AT_REST = 0.1
+"""Speed below which the vehicle stands [m/s]."""
 COMFORTABLE = 2.0
 """Deceleration up to which a proposal is comfortable [m/s²]."""
 
@@ -76,7 +78,8 @@ def evaluate(
     impact, cause = np.zeros(count), np.full(count, -1)
     near = _near(rolled, (front, rear), scene, ego)
     if near.size:
-        touching, lack = _overlaps(rolled, (front, rear), scene.rows(near), times, ego, settings)
+        stops = np.array([proposal.share == 0.0 for proposal in proposals])
+        touching, lack = _overlaps(rolled, (front, rear), stops, scene.rows(near), times, ego, settings)
         collision, step, cause = _first(touching, times)
         cause = np.where(cause >= 0, near[cause], -1)
         impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
@@ -129,6 +132,7 @@ def _near(rolled: Rollout, offsets: tuple[Array, Array], scene: Surroundings, eg
 def _overlaps(
     rolled: Rollout,
     offsets: tuple[Array, Array],
+    stops: Bools,
     scene: Surroundings,
     times: Array,
     ego: Body,
@@ -137,6 +141,7 @@ def _overlaps(
     """Return where the bodies touch (P, N, K), and the lack of clearance (P, N, K) in [0, 1].
 
     offsets  of the front and the rear axle (P, K) [m]; each determines the position of its half of the vehicle
+    stops    whether a proposal stops as soon as possible (P,)
     """
     shape = (len(rolled.s), len(scene), len(times))
     touching, lack = np.zeros(shape, dtype=bool), np.zeros(shape)
@@ -165,11 +170,18 @@ def _overlaps(
             along = np.abs(s - center) - (length + half_length)
             aside = np.abs(place - beside) - (width + ego.half_width)
             lack[:, rows] = np.maximum(lack[:, rows], (along < CONTACT) & (aside < CONTACT))
-    ignored = scene.behind | touching[:, :, 0].any(axis=0)
+    head_on = (scene.speed < -ONCOMING_SPEED) & ~scene.crosses
+    ignored = scene.behind | (touching[:, :, 0].any(axis=0) & ~head_on[:, 0])
     keep = ~ignored[None, :, None]
-    at_rest = (rolled.speed < 0.1)[:, None, :]
-    touching &= keep & ~(at_rest & (np.abs(scene.speed)[None] > 0.0))
-    return touching, np.where(keep & ~at_rest, np.minimum(lack, 1.0), 0.0)
+    stands = rolled.speed < AT_REST
+    at_rest = stands[:, None, :]
+    touching &= keep
+    # Before a head-on collision the vehicle has to stand for some time, instead of a stop in the last moment.
+    before = np.maximum.reduce([_shifted(rolled.speed, -steps) for steps in range(shift + 1)])
+    has_just_stopped = stands & (before >= AT_REST) & ~stops[:, None]
+    late = touching & head_on & has_just_stopped[:, None, :]
+    touching &= ~(at_rest & (np.abs(scene.speed)[None] > 0.0))
+    return touching, np.where(late, 1.0, np.where(keep & ~at_rest, np.minimum(lack, 1.0), 0.0))
 
 
 def _shifted(values: Array, steps: int) -> Array:

@@ -61,10 +61,13 @@ def test_vehicle_lets_traffic_in_the_neighboring_lane_pass_first() -> None:
     assert clearance(run, beside) > 1.0
 
 
-def test_vehicle_without_a_neighboring_lane_keeps_its_lane() -> None:
+def test_vehicle_without_a_neighboring_lane_stands_before_the_collision() -> None:
+    """It does not come closer to stop in the last moment."""
     run = drive(1, 1)
     assert max(abs(y - LANE) for _, y, _ in run.path) < 0.1
-    assert min(run.speeds) < 2.0
+    gaps = [wrong_way(tick * 0.05).x - x - CAR.offset[0] for tick, (x, _, _) in enumerate(run.path)]
+    contact = next(tick for tick, gap in enumerate(gaps) if gap < (CAR.size[0] + 4.5) / 2.0)
+    assert max(run.speeds[contact - 20 : contact]) < 0.1
 
 
 def test_lane_is_kept_if_lane_changes_are_switched_off() -> None:
