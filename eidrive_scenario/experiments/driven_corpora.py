@@ -23,6 +23,7 @@ from eidrive_scenario.experiments.driven_files import (
     STACK,
     DrivenRun,
     jobs_of_file,
+    positive,
     run_recorded,
     table,
     worse_runs,
@@ -150,7 +151,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("groups", nargs="*", help=f"groups, all by default: {', '.join(one.name for one in GROUPS)}")
     parser.add_argument("--planner", default="behavior")
-    parser.add_argument("--samples", type=int, default=200, help="number of runs of a distribution")
+    parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
     parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")

@@ -242,6 +242,14 @@ def run_recorded(
     return [runs[(*job.case, job.arm)] for job in jobs]
 
 
+def positive(text: str) -> int:
+    """Return the positive number of an option. Raise ValueError for any other text."""
+    number = int(text)
+    if number < 1:
+        raise ValueError
+    return number
+
+
 def wrong_reference(files: Iterable[Path], name: str, model: str) -> Diagnostic | None:
     """Return the error of a reference driver that does not exist, or whose controller a file lacks; None without one.
 
@@ -273,7 +281,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("files", type=Path, nargs="+", help="scenarios and parameter value distributions")
     parser.add_argument("--drive", default="Ego", help="entity that gets the driving stack")
     parser.add_argument("--planner", default="behavior")
-    parser.add_argument("--samples", type=int, default=200, help="number of runs of a distribution")
+    parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
     parser.add_argument(REFERENCE_OPTION, metavar="CONTROLLER=MODEL", help="controller model of the reference driver")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")

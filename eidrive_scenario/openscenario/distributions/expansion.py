@@ -88,7 +88,7 @@ class DistributionExpansion(Sequence[ConcreteRun]):
         ones of those that vary slowly. A larger count adds runs to those of a smaller one. Of random draws, the first
         ones are selected.
         """
-        return range(len(self)) if count >= len(self) else sorted(itertools.islice(self.draws(), count))
+        return range(len(self)) if count >= len(self) else sorted(itertools.islice(self.draws(), max(count, 0)))
 
     def draws(self) -> Iterator[int]:
         """Yield the numbers of all runs, each once, in the order in which `spread` selects them."""

@@ -217,6 +217,14 @@ def test_record_of_samples_is_continued(tmp_path: Path) -> None:
     assert len({run.number for run in both}) == 2
 
 
+@pytest.mark.parametrize("samples", ["0", "-1", "many"])
+def test_number_of_samples_is_positive(samples: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        driven_files.main([str(write(tmp_path, 70.0)), "--samples", samples])
+    assert exit_.value.code == 2
+    assert f"argument --samples: invalid positive value: '{samples}'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("reference", "message"),
     [

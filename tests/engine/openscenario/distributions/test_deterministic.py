@@ -134,6 +134,7 @@ def test_spread_covers_all_values(distribution_file: Write) -> None:
     assert list(runs.spread(839)) != list(range(839))
     assert list(runs.spread(840)) == list(runs.spread(10**6)) == list(range(840))
     assert sorted(islice(runs.draws(), 50)) == runs.spread(50)
+    assert runs.spread(0) == runs.spread(-1) == []
     assert sorted(runs.draws()) == list(range(840)), "each run once"
 
 
