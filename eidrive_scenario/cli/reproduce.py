@@ -11,7 +11,11 @@ import typer
 def reproduce(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="PART", help="table2, table3, detection, pipeline, ei, or all.", show_default="all"),
+        typer.Argument(
+            metavar="PART",
+            help="table2, table3, detection, pipeline, ei, sensitivity, or all.",
+            show_default="all",
+        ),
     ] = None,
     episodes: Annotated[
         int | None,

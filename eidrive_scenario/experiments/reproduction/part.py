@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from eidrive_scenario.experiments.reproduction.digests import job_digest
 from eidrive_scenario.experiments.reproduction.episodes import Episode, EpisodeJob
@@ -17,12 +17,22 @@ class Case:
 
     arm      name of the settings, without the scenario
     counted  station whose known objects are counted; "" for none
+    varied   function that returns the parameters of a seed, if the part draws them instead of the scenario
     """
 
     scenario: str
     arm: str
     settings: RunSettings
     counted: str = ""
+    varied: Callable[[int], Mapping[str, str]] | None = None
+
+    def job(self, seed: int) -> EpisodeJob:
+        """Return the run of a seed."""
+        settings = self.settings
+        if self.varied is not None:
+            settings = replace(settings, parameters={**settings.parameters, **self.varied(seed)})
+        digest = job_digest(self.scenario, settings)
+        return EpisodeJob(self.scenario, self.arm, seed, settings, digest, self.counted)
 
 
 @dataclass(frozen=True)
@@ -49,12 +59,15 @@ class Part:
     def jobs(self, episodes: int, detectors: Sequence[str]) -> list[EpisodeJob]:
         """Return all runs, ordered by seed, so that an interrupted part has complete pairs."""
         cases = self.cases(detectors)
-        digests = [job_digest(case.scenario, case.settings) for case in cases]
-        return [
-            EpisodeJob(case.scenario, case.arm, seed, case.settings, digest, case.counted)
-            for seed in range(1, episodes + 1)
-            for case, digest in zip(cases, digests, strict=True)
-        ]
+        return [case.job(seed) for seed in range(1, episodes + 1) for case in cases]
+
+
+def by_case(episodes: Sequence[Episode]) -> dict[tuple[str, str], list[Episode]]:
+    """Return the episodes of each case by scenario and arm, ordered by seed."""
+    found: dict[tuple[str, str], list[Episode]] = {}
+    for episode in sorted(episodes, key=lambda one: one.seed):
+        found.setdefault((episode.scenario, episode.arm), []).append(episode)
+    return found
 
 
 def select(episodes: Sequence[Episode], scenario: str, arm: str) -> list[Episode]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.experiments.reproduction import detection, ei, pipeline, table_2, table_3
+from eidrive_scenario.experiments.reproduction import detection, ei, pipeline, sensitivity, table_2, table_3
 from eidrive_scenario.experiments.reproduction.part import Part
 
-PARTS = {part.name: part for part in (table_2.PART, table_3.PART, detection.PART, pipeline.PART, ei.PART)}
+MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity)
+PARTS = {module.PART.name: module.PART for module in MODULES}
+"""Parts by name."""
 ALL = "all"
 """Name of all parts together."""
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from eidrive_scenario.experiments.published import COUNTS, TABLE_2
 from eidrive_scenario.experiments.reproduction.layout import PartReport, Row
 from eidrive_scenario.files.atomic import create
+from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
 
 COLORS = ("#0b6e99", "#c2410c")
 PAPER = "#111827"
@@ -115,6 +116,7 @@ FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
     "table2": table_2_figure,
     "table3": table_3_figure,
     "detection": detection_figure,
+    "sensitivity": sensitivity_figure,
 }
 """Figure of a part, by the name of the part. The others have none."""
 

@@ -15,7 +15,7 @@ import pytest
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.experiments.paper import ARMS
 from eidrive_scenario.experiments.published import COUNTS, RATIOS, TABLE_2, TABLE_3
-from eidrive_scenario.experiments.reproduction import detection, ei, pipeline, table_2, table_3
+from eidrive_scenario.experiments.reproduction import detection, ei, pipeline, sensitivity, table_2, table_3
 from eidrive_scenario.experiments.reproduction.digests import job_digest
 from eidrive_scenario.experiments.reproduction.encounters import CENTER, COLLISIONS, GAP, TIME_TO_COLLISION
 from eidrive_scenario.experiments.reproduction.episodes import Episode, EpisodeJob, ObjectCounter, run_episode
@@ -349,3 +349,53 @@ def test_scenarios_of_drives_are_those_of_the_library(part: Part) -> None:
     family = part.name
     named = {case.scenario for case in part.cases(part.default)}
     assert named == {name for name in scenarios() if name.startswith(f"{family}/")}
+
+
+# Sensitivity
+
+
+def sensitivity_episodes() -> list[Episode]:
+    """Return two episodes of each case, whose collisions follow a known rule.
+
+    On the maps none collides from 9 m/s on, cooperation never, an arm with latency or error below 8 m/s; on the curve
+    all runs from 0.3 s on.
+    """
+    found = []
+    for case in sensitivity.cases(("oracle",)):
+        _, kind, *place = case.arm.split(maxsplit=4)
+        if kind == "map":
+            speed, arm = float(place[1]), place[2]
+            hit = {"none": speed >= 9.0, "cooperation": False}.get(arm, speed < 8.0)
+        else:
+            hit = float(place[0]) >= 0.3
+        found += [episode(case.scenario, case.arm, seed, **_hit(hit)) for seed in (1, 2)]
+    return found
+
+
+def test_sensitivity_counts_cells_in_which_messages_help_or_harm() -> None:
+    """Of 7 speeds, 4 are from 9 m/s on and 2 below 8 m/s; each has 7 starts."""
+    report = sensitivity.report(sensitivity_episodes(), ("oracle",))
+    effects = {(row["scenario"], row["arm"]): row for row in report.data()["sensitivity_effects"]}
+    assert len(effects) == 2 * 6
+    for (_, arm), row in effects.items():
+        counts = (row["helps"], row["nothing"], row["harms"], row["collisions"])
+        expected = {"none": (0, 49, 0, 56), "cooperation": (28, 21, 0, 0)}.get(str(arm), (28, 7, 14, 28))
+        assert counts == expected
+    text = report.markdown()
+    assert "the largest step is from 0% at 0.25 s to 100% at 0.3 s" in text
+    assert "scenario 1, start of EI-Drive: none 0, cooperation 0, latency 0.1 s 0" in text
+    assert "of 2 at 39 m and 8 m/s" in text
+    assert "of 2 at 30 m and 8 m/s" in text
+
+
+def test_sensitivity_seeds_vary_within_limits_and_equally_in_all_cells() -> None:
+    drawn = [sensitivity.offsets(seed) for seed in range(1, 201)]
+    for name, bound in sensitivity.OFFSETS.items():
+        values = [float(one[name]) for one in drawn]
+        assert -bound <= min(values) < -0.9 * bound < 0.9 * bound < max(values) <= bound
+    jobs = [job for job in sensitivity.PART.jobs(1, ("oracle",)) if " map " in job.arm]
+    assert {tuple(job.settings.parameters[name] for name in sensitivity.OFFSETS) for job in jobs} == {
+        tuple(sensitivity.offsets(1).values())
+    }
+    curve = [job for job in sensitivity.PART.jobs(1, ("oracle",)) if " curve 0.3 " in job.arm]
+    assert len({job.settings.parameters["EgoOffset"] for job in curve}) == sensitivity.CURVE_SEEDS

@@ -6,16 +6,18 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from lxml import html
 from matplotlib.figure import Figure
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.published import COUNTS, TABLE_3
-from eidrive_scenario.experiments.reproduction import detection, table_3
+from eidrive_scenario.experiments.reproduction import detection, sensitivity, table_3
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import PartReport
 from eidrive_scenario.reporting.reproduction.figures import detection_figure, draw, table_3_figure
+from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
 from eidrive_scenario.reporting.reproduction.page import write_paper_page
 
 
@@ -106,3 +108,14 @@ def test_text_of_a_report_is_escaped(tmp_path: Path) -> None:
     text = write_paper_page(tmp_path).read_text(encoding="utf-8")
     assert "a &lt; b <code>&lt;i&gt;</code>" in text
     assert [tag for tag in ("<b>", "<u>", "<s>", "<i>") if tag in text] == []
+
+
+def test_figure_of_sensitivity_shows_shares_of_collisions() -> None:
+    """Without cooperation every run collides, with any messages none: the first map is 1, the others 0."""
+    found = []
+    for case in sensitivity.cases(("oracle",)):
+        hit = float(case.arm.endswith(" none"))
+        found.append(Episode(case.scenario, case.arm, 1, "", "", 9.0, 0.3, {"collision.count": hit}))
+    figure = sensitivity_figure(sensitivity.report(found, ("oracle",)).data())
+    maps = [axes.collections[0].get_array() for axes in figure.axes if "hidden" in axes.get_xlabel()]
+    assert [set(np.asarray(values).ravel()) for values in maps] == [{1.0}, *[{0.0}] * 5]

@@ -1,0 +1,175 @@
+"""Sensitivity of scenarios 1 and 2, which the paper lacks: collisions over start, speed and latency.
+
+The start of the hidden car and the speed of the ego span a map per arm. Seeds differ as traffic does, by ±2 m and
+±1 m/s, so that each cell of a map has a probability of a collision. A curve over the latency is measured at the values
+of the library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any
+
+from eidrive_scenario.experiments.paper import SCENARIOS
+from eidrive_scenario.experiments.reproduction.encounters import collided
+from eidrive_scenario.experiments.reproduction.episodes import Episode
+from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
+from eidrive_scenario.experiments.reproduction.part import Case, Part, by_case
+from eidrive_scenario.experiments.reproduction.sensitivity_text import conclusions, setup
+from eidrive_scenario.experiments.statistics import wilson
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.simulation import RunSettings
+
+STARTS: Mapping[str, tuple[float, ...]] = {
+    "coop/scenario_1": (33.0, 34.5, 36.0, 37.5, 39.0, 40.5, 42.0),
+    "coop/scenario_2": (27.0, 28.5, 30.0, 31.5, 33.0, 34.5, 36.0),
+}
+"""Starts of the hidden car on the maps, its distance from the path of the ego along y [m]."""
+SPEEDS = (6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
+"""Speeds of the ego on the maps [m/s]."""
+LATENCIES = tuple(round(0.05 * step, 2) for step in range(13))
+"""Latencies of the curve [s]."""
+CURVE_SEEDS = 4
+"""Number of runs of the curve per episode of a map."""
+OFFSETS = {"EgoOffset": 2.0, "IncomingOffset": 2.0, "EgoSpeedOffset": 1.0, "IncomingSpeedOffset": 1.0}
+"""Maximum offset between seeds by parameter [m, m/s]."""
+DURATION = 9.0
+"""End of an episode [s]; at the lowest speed the cars are nearest at 6 s."""
+DETECTORS = ("oracle",)
+
+
+def delay(seconds: float) -> Mapping[str, Any]:
+    """Return the channel profile of a constant latency on links."""
+    return {"model": "composed", "delay": {"kind": "constant", "seconds": seconds}}
+
+
+ARMS: Mapping[str, str | Mapping[str, Any]] = {
+    "none": "none",
+    "cooperation": "ideal",
+    "latency 0.1 s": delay(0.1),
+    "latency 0.3 s": delay(0.3),
+    "latency 0.6 s": delay(0.6),
+    "error 30 %": "error_30pct",
+}
+"""Channel of each arm of the maps; it acts on links only."""
+
+
+def offsets(seed: int) -> dict[str, str]:
+    """Return the offsets of a seed as parameters: uniform, independent, and equal in all cells."""
+    random = generator(seed, "sensitivity")
+    return {name: repr(float(random.uniform(-bound, bound))) for name, bound in OFFSETS.items()}
+
+
+def cases(detectors: Sequence[str]) -> list[Case]:
+    """Return the runs of the maps and of the curves."""
+    found = []
+    for detector, scenario in product(detectors, SCENARIOS):
+        for start, speed, (arm, channel) in product(STARTS[scenario], SPEEDS, ARMS.items()):
+            place = {"IncomingStart": repr(start), "EgoSpeed": repr(speed)}
+            found.append(_case(scenario, f"{detector} map {start} {speed} {arm}", detector, channel, place))
+        for latency, block in product(LATENCIES, range(CURVE_SEEDS)):
+            name = f"{detector} curve {latency} {block}"
+            found.append(_case(scenario, name, detector, delay(latency), {}, block=block))
+    return found
+
+
+def _case(
+    scenario: str,
+    arm: str,
+    detector: str,
+    channel: str | Mapping[str, Any],
+    parameters: Mapping[str, str],
+    block: int = 0,
+) -> Case:
+    """Return a case whose seeds have own offsets; those of different blocks differ."""
+    settings = RunSettings(detector=detector, channel=channel, parameters=parameters, time_limit=DURATION)
+    return Case(scenario, arm, settings, varied=lambda seed: offsets(1000 * block + seed))
+
+
+def map_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
+    """Yield the collisions of each cell of the maps."""
+    found = by_case(episodes)
+    for detector, scenario, arm in product(detectors, SCENARIOS, ARMS):
+        for start, speed in product(STARTS[scenario], SPEEDS):
+            mine = found[scenario, f"{detector} map {start} {speed} {arm}"]
+            hits = sum(map(collided, mine))
+            place: dict[str, Value] = {"scenario": scenario, "detector": detector, "arm": arm}
+            yield {**place, "start": start, "speed": speed, "episodes": len(mine), "collisions": hits}
+
+
+def curve_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
+    """Yield the collisions over the latency."""
+    found = by_case(episodes)
+    for detector, scenario, latency in product(detectors, SCENARIOS, LATENCIES):
+        mine = [one for block in range(CURVE_SEEDS) for one in found[scenario, f"{detector} curve {latency} {block}"]]
+        share = wilson(sum(map(collided, mine)), len(mine))
+        yield {
+            "scenario": scenario,
+            "detector": detector,
+            "latency": latency,
+            "episodes": len(mine),
+            "collisions": share.successes,
+            "share": share.share,
+            "low": share.low,
+            "high": share.high,
+        }
+
+
+def effects(rows: Sequence[Row]) -> Iterator[Row]:
+    """Yield for each arm with messages in how many cells of its map they help, change nothing, or harm.
+
+    A cell counts by the number of collisions, with the same seeds as without cooperation.
+    """
+    hits = {(row["detector"], row["scenario"], row["arm"], row["start"], row["speed"]): row for row in rows}
+    for detector, scenario, arm in dict.fromkeys((row["detector"], row["scenario"], row["arm"]) for row in rows):
+        mine = [row for key, row in hits.items() if key[:3] == (detector, scenario, arm)]
+        changes = [_count(row) - _count(hits[detector, scenario, "none", row["start"], row["speed"]]) for row in mine]
+        yield {
+            "detector": detector,
+            "scenario": scenario,
+            "arm": arm,
+            "cells": len(mine),
+            "episodes": sum(int(row["episodes"] or 0) for row in mine),
+            "collisions": sum(map(_count, mine)),
+            "helps": sum(change < 0 for change in changes),
+            "nothing": sum(change == 0 for change in changes),
+            "harms": sum(change > 0 for change in changes),
+        }
+
+
+def _count(row: Row) -> int:
+    return int(row["collisions"] or 0)
+
+
+EFFECT_COLUMNS = (
+    plain("scenario", "scenario"),
+    plain("arm", "arm"),
+    Column("collisions", "{collisions} of {episodes}", ("collisions", "episodes")),
+    Column("cells with fewer than without cooperation", "{helps} of {cells}", ("helps", "cells")),
+    plain("as many", "nothing"),
+    plain("more", "harms"),
+)
+CURVE_COLUMNS = (
+    plain("scenario", "scenario"),
+    plain("latency [s]", "latency", ".2f"),
+    Column("collisions", "{collisions} of {episodes}", ("collisions", "episodes")),
+    Column("95 %", "{low:.0%} to {high:.0%}", ("low", "high")),
+)
+
+
+def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
+    """Return the report: where cooperation helps, does nothing or harms, and the curves over the latency."""
+    cells = tuple(map_rows(episodes, detectors))
+    summary, curve = tuple(effects(cells)), tuple(curve_rows(episodes, detectors))
+    table = DataTable("sensitivity_effects", EFFECT_COLUMNS, summary)
+    sections = (
+        Section("Set-up", setup(int(cells[0]["episodes"] or 0), int(curve[0]["episodes"] or 0))),
+        Section("Result", conclusions(cells, summary, curve), table),
+        Section("Latency", (), DataTable("sensitivity_latency", CURVE_COLUMNS, curve)),
+        Section("Maps", ("All cells: sensitivity.csv.",), DataTable("sensitivity", (), cells)),
+    )
+    return PartReport(PART.title, sections)
+
+
+PART = Part("sensitivity", "Sensitivity of scenarios 1 and 2", 5, DETECTORS, DETECTORS, cases, report)

@@ -1,0 +1,75 @@
+"""Figure of the sensitivity: maps of the probability of a collision, and curves over the latency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from eidrive_scenario.experiments.reproduction.layout import Row
+from eidrive_scenario.experiments.reproduction.sensitivity_text import LIBRARY, ORIGINAL
+
+COLORS = "RdYlGn_r"
+"""Color map of the probability of a collision, from 0 (green) to 1 (red)."""
+MARKS = (("s", "start of EI-Drive", ORIGINAL), ("o", "start of the library", LIBRARY))
+"""Marks on the maps: symbol, label and places."""
+
+
+def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
+    """Draw one map per scenario and arm, and the curve over the latency beside them."""
+    cells, curve = data["sensitivity"], data["sensitivity_latency"]
+    scenarios, arms = (list(dict.fromkeys(str(row[name]) for row in cells)) for name in ("scenario", "arm"))
+    figure = Figure(figsize=(2.1 * len(arms) + 3.6, 2.9 * len(scenarios)), layout="constrained")
+    panels = figure.subplots(len(scenarios), len(arms) + 1, squeeze=False, width_ratios=[1.0] * len(arms) + [1.5])
+    for scenario, line in zip(scenarios, panels, strict=True):
+        for arm, axes in zip(arms, line[:-1], strict=True):
+            mine = [row for row in cells if (row["scenario"], row["arm"]) == (scenario, arm)]
+            image = _map(axes, mine)
+            _marks(axes, scenario)
+            axes.set_title(f"{_place(scenario)}, {arm}", fontsize=8)
+            axes.tick_params(labelsize=7, labelleft=arm == arms[0])
+        line[0].set_ylabel("speed of the ego [m/s]", fontsize=8)
+        _curve(line[-1], [row for row in curve if row["scenario"] == scenario])
+        line[-1].set_title(f"{_place(scenario)}, start of the library", fontsize=8)
+    for axes in panels[-1][:-1]:
+        axes.set_xlabel("start of the hidden car [m]", fontsize=7)
+    panels[-1][-1].set_xlabel("latency [s]", fontsize=8)
+    panels[0][0].legend(fontsize=6, loc="upper left")
+    figure.colorbar(image, ax=list(panels[:, :-1].ravel()), pad=0.01).set_label(
+        "share of runs with a collision", fontsize=8
+    )
+    return figure
+
+
+def _map(axes: Axes, rows: Sequence[Row]) -> object:
+    starts, speeds = (sorted({_number(row, name) for row in rows}) for name in ("start", "speed"))
+    shares = np.full((len(speeds), len(starts)), np.nan)
+    for row in rows:
+        place = speeds.index(_number(row, "speed")), starts.index(_number(row, "start"))
+        shares[place] = _number(row, "collisions") / _number(row, "episodes")
+    return axes.pcolormesh(starts, speeds, shares, cmap=COLORS, vmin=0.0, vmax=1.0, shading="nearest")
+
+
+def _marks(axes: Axes, scenario: str) -> None:
+    for symbol, label, places in MARKS:
+        start, speed = places[scenario]
+        axes.plot(start, speed, symbol, ms=5, mfc="none", mec="black", label=label)
+
+
+def _curve(axes: Axes, rows: Sequence[Row]) -> None:
+    latency, low, share, high = ([_number(row, name) for row in rows] for name in ("latency", "low", "share", "high"))
+    axes.fill_between(latency, low, high, color="#0b6e99", alpha=0.2, lw=0)
+    axes.plot(latency, share, "o-", color="#0b6e99", ms=3, lw=1)
+    axes.axvline(0.3, color="black", lw=0.8, ls="--")
+    axes.set_ylim(-0.03, 1.03)
+    axes.tick_params(labelsize=7)
+
+
+def _number(row: Row, name: str) -> float:
+    return float(row[name] or 0.0)
+
+
+def _place(scenario: str) -> str:
+    return scenario.removeprefix("coop/").replace("_", " ")
