@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.reproduction.layout import Row
@@ -43,7 +44,7 @@ def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
     return figure
 
 
-def _map(axes: Axes, rows: Sequence[Row]) -> object:
+def _map(axes: Axes, rows: Sequence[Row]) -> QuadMesh:
     starts, speeds = (sorted({_number(row, name) for row in rows}) for name in ("start", "speed"))
     shares = np.full((len(speeds), len(starts)), np.nan)
     for row in rows:
