@@ -36,6 +36,8 @@ OFFSETS = {"EgoOffset": 2.0, "IncomingOffset": 2.0, "EgoSpeedOffset": 1.0, "Inco
 """Maximum offset between seeds by parameter [m, m/s]."""
 DURATION = 9.0
 """End of an episode [s]; at the lowest speed the cars are nearest at 6 s."""
+PLANNERS = ("conflict_area", "behavior")
+"""The rule of the paper, and the default planner of this project."""
 DETECTORS = ("oracle",)
 
 
@@ -64,49 +66,53 @@ def offsets(seed: int) -> dict[str, str]:
 def cases(detectors: Sequence[str]) -> list[Case]:
     """Return the runs of the maps and of the curves."""
     found = []
-    for detector, scenario in product(detectors, SCENARIOS):
+    for stack, scenario in product(product(detectors, PLANNERS), SCENARIOS):
         for start, speed, (arm, channel) in product(STARTS[scenario], SPEEDS, ARMS.items()):
             place = {"IncomingStart": repr(start), "EgoSpeed": repr(speed)}
-            found.append(_case(scenario, f"{detector} map {start} {speed} {arm}", detector, channel, place))
+            found.append(_case(scenario, stack, f"map {start} {speed} {arm}", channel, place))
         for latency, block in product(LATENCIES, range(CURVE_SEEDS)):
-            name = f"{detector} curve {latency} {block}"
-            found.append(_case(scenario, name, detector, delay(latency), {}, block=block))
+            found.append(_case(scenario, stack, f"curve {latency} {block}", delay(latency), {}, block=block))
     return found
 
 
 def _case(
     scenario: str,
-    arm: str,
-    detector: str,
+    stack: tuple[str, str],
+    place: str,
     channel: str | Mapping[str, Any],
     parameters: Mapping[str, str],
     block: int = 0,
 ) -> Case:
-    """Return a case whose seeds have own offsets; those of different blocks differ."""
-    settings = RunSettings(detector=detector, channel=channel, parameters=parameters, time_limit=DURATION)
-    return Case(scenario, arm, settings, varied=lambda seed: offsets(1000 * block + seed))
+    """Return a case whose seeds have own offsets; those of different blocks differ. `stack`: detector and planner."""
+    detector, planner = stack
+    settings = RunSettings(
+        detector=detector, planner=planner, channel=channel, parameters=parameters, time_limit=DURATION
+    )
+    return Case(scenario, f"{detector} {planner} {place}", settings, varied=lambda seed: offsets(1000 * block + seed))
 
 
 def map_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
     """Yield the collisions of each cell of the maps."""
     found = by_case(episodes)
-    for detector, scenario, arm in product(detectors, SCENARIOS, ARMS):
+    for detector, planner, scenario, arm in product(detectors, PLANNERS, SCENARIOS, ARMS):
         for start, speed in product(STARTS[scenario], SPEEDS):
-            mine = found[scenario, f"{detector} map {start} {speed} {arm}"]
+            mine = found[scenario, f"{detector} {planner} map {start} {speed} {arm}"]
             hits = sum(map(collided, mine))
-            place: dict[str, Value] = {"scenario": scenario, "detector": detector, "arm": arm}
+            place: dict[str, Value] = {"scenario": scenario, "detector": detector, "planner": planner, "arm": arm}
             yield {**place, "start": start, "speed": speed, "episodes": len(mine), "collisions": hits}
 
 
 def curve_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
     """Yield the collisions over the latency."""
     found = by_case(episodes)
-    for detector, scenario, latency in product(detectors, SCENARIOS, LATENCIES):
-        mine = [one for block in range(CURVE_SEEDS) for one in found[scenario, f"{detector} curve {latency} {block}"]]
+    for detector, planner, scenario, latency in product(detectors, PLANNERS, SCENARIOS, LATENCIES):
+        names = [f"{detector} {planner} curve {latency} {block}" for block in range(CURVE_SEEDS)]
+        mine = [one for name in names for one in found[scenario, name]]
         share = wilson(sum(map(collided, mine)), len(mine))
         yield {
             "scenario": scenario,
             "detector": detector,
+            "planner": planner,
             "latency": latency,
             "episodes": len(mine),
             "collisions": share.successes,
@@ -121,13 +127,14 @@ def effects(rows: Sequence[Row]) -> Iterator[Row]:
 
     A cell counts by the number of collisions, with the same seeds as without cooperation.
     """
-    hits = {(row["detector"], row["scenario"], row["arm"], row["start"], row["speed"]): row for row in rows}
-    for detector, scenario, arm in dict.fromkeys((row["detector"], row["scenario"], row["arm"]) for row in rows):
-        mine = [row for key, row in hits.items() if key[:3] == (detector, scenario, arm)]
-        changes = [_count(row) - _count(hits[detector, scenario, "none", row["start"], row["speed"]]) for row in mine]
+    hits = {(_map(row), row["arm"], row["start"], row["speed"]): row for row in rows}
+    for key, arm in dict.fromkeys((_map(row), row["arm"]) for row in rows):
+        mine = [row for row in rows if (_map(row), row["arm"]) == (key, arm)]
+        changes = [_count(row) - _count(hits[key, "none", row["start"], row["speed"]]) for row in mine]
         yield {
-            "detector": detector,
-            "scenario": scenario,
+            "detector": key[0],
+            "planner": key[1],
+            "scenario": key[2],
             "arm": arm,
             "cells": len(mine),
             "episodes": sum(int(row["episodes"] or 0) for row in mine),
@@ -138,11 +145,16 @@ def effects(rows: Sequence[Row]) -> Iterator[Row]:
         }
 
 
+def _map(row: Row) -> tuple[str, str, str]:
+    return str(row["detector"]), str(row["planner"]), str(row["scenario"])
+
+
 def _count(row: Row) -> int:
     return int(row["collisions"] or 0)
 
 
 EFFECT_COLUMNS = (
+    plain("planner", "planner"),
     plain("scenario", "scenario"),
     plain("arm", "arm"),
     Column("collisions", "{collisions} of {episodes}", ("collisions", "episodes")),
@@ -151,6 +163,7 @@ EFFECT_COLUMNS = (
     plain("more", "harms"),
 )
 CURVE_COLUMNS = (
+    plain("planner", "planner"),
     plain("scenario", "scenario"),
     plain("latency [s]", "latency", ".2f"),
     Column("collisions", "{collisions} of {episodes}", ("collisions", "episodes")),
@@ -172,4 +185,4 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     return PartReport(PART.title, sections)
 
 
-PART = Part("sensitivity", "Sensitivity of scenarios 1 and 2", 5, DETECTORS, DETECTORS, cases, report)
+PART = Part("sensitivity", "Sensitivity of scenarios 1 and 2", 3, DETECTORS, DETECTORS, cases, report)

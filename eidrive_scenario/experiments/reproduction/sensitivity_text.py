@@ -16,7 +16,8 @@ LIBRARY = {"coop/scenario_1": (36.5, 8.0556), "coop/scenario_2": (30.5, 8.3333)}
 def setup(per_cell: int, per_latency: int) -> tuple[str, ...]:
     """Return the paragraphs about the runs."""
     return (
-        "Scenarios 1 and 2 with the rule of the paper and a channel that acts on links only. Maps over the start of "
+        "Scenarios 1 and 2 with a channel that acts on links only, and with two planners: the rule of the paper "
+        "(`conflict_area`) and the default planner `behavior`. Maps over the start of "
         f"the hidden car and the speed of the ego have {per_cell} episodes a cell, the curves over the latency "
         f"{per_latency} episodes a point. Seeds vary the starts of both cars by ±2 m and their speeds by ±1 "
         "m/s. Their values are equal in all cells, so that arms differ by their messages only.",
@@ -26,24 +27,36 @@ def setup(per_cell: int, per_latency: int) -> tuple[str, ...]:
 
 
 def conclusions(cells: Sequence[Row], effects: Sequence[Row], curve: Sequence[Row]) -> tuple[str, ...]:
-    """Return where messages help, do nothing or harm, and at which latency their effect ends."""
+    """Return per planner where messages help, do nothing or harm, and at which latency their effect ends."""
     texts = []
-    for row in effects:
-        if row["arm"] == "none":
-            continue
-        texts.append(
-            f"{_place(row)}, {row['arm']}: fewer collisions than without cooperation in {row['helps']} of "
-            f"{row['cells']} cells, as many in {row['nothing']}, more in {row['harms']}"
-        )
-    near = []
-    for scenario in dict.fromkeys(str(row["scenario"]) for row in cells):
-        for name, places in (("of EI-Drive", ORIGINAL), ("of the library", LIBRARY)):
-            near.append(f"{_short(scenario)}, start {name}: {_at(cells, scenario, *places[scenario])}")
-    return (
-        f"Cells of the maps. {'; '.join(texts)}.",
-        f"Collisions in the cell that is nearest to a start. {'; '.join(near)}.",
-        *(_threshold(curve, scenario) for scenario in dict.fromkeys(str(row["scenario"]) for row in curve)),
-    )
+    for planner in dict.fromkeys(str(row["planner"]) for row in cells):
+        some, effect, line = ([row for row in rows if row["planner"] == planner] for rows in (cells, effects, curve))
+        texts += [f"`{planner}`. {_effects(effect)}", f"`{planner}`. {_places(some)}"]
+        texts += [f"`{planner}`, {_threshold(line, scenario)}" for scenario in _scenarios(line)]
+    return tuple(texts)
+
+
+def _effects(effects: Sequence[Row]) -> str:
+    listed = [
+        f"{_short(str(row['scenario']))}, {row['arm']}: {row['helps']}, {row['nothing']} and {row['harms']} of "
+        f"{row['cells']}"
+        for row in effects
+        if row["arm"] != "none"
+    ]
+    return f"Cells with fewer, as many and more collisions than without cooperation. {'; '.join(listed)}."
+
+
+def _places(cells: Sequence[Row]) -> str:
+    near = [
+        f"{_short(scenario)}, start {name}: {_at(cells, scenario, *places[scenario])}"
+        for scenario in _scenarios(cells)
+        for name, places in (("of EI-Drive", ORIGINAL), ("of the library", LIBRARY))
+    ]
+    return f"Collisions in the cell that is nearest to a start. {'; '.join(near)}."
+
+
+def _scenarios(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(str(row["scenario"]) for row in rows))
 
 
 def _at(cells: Sequence[Row], scenario: str, start: float, speed: float) -> str:
@@ -58,19 +71,18 @@ def _threshold(curve: Sequence[Row], scenario: str) -> str:
     mine = [row for row in curve if row["scenario"] == scenario]
     first, last = mine[0], mine[-1]
     before, after = max(pairwise(mine), key=lambda pair: _number(pair[1], "share") - _number(pair[0], "share"))
-    return (
+    ends = (
         f"{_short(scenario)}: {first['share']:.0%} of the runs have a collision without latency, {last['share']:.0%} "
-        f"at {last['latency']:g} s; the largest step is from {before['share']:.0%} at {before['latency']:g} s to "
-        f"{after['share']:.0%} at {after['latency']:g} s."
+        f"at {last['latency']:g} s"
     )
+    if _number(after, "share") <= _number(before, "share"):
+        return f"{ends}; the share nowhere increases."
+    step = f"{before['share']:.0%} at {before['latency']:g} s to {after['share']:.0%} at {after['latency']:g} s"
+    return f"{ends}; the largest step is from {step}."
 
 
 def _number(row: Row, name: str) -> float:
     return float(row[name] or 0.0)
-
-
-def _place(row: Row) -> str:
-    return _short(str(row["scenario"]))
 
 
 def _short(scenario: str) -> str:

@@ -19,20 +19,21 @@ MARKS = (("s", "start of EI-Drive", ORIGINAL), ("o", "start of the library", LIB
 
 
 def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
-    """Draw one map per scenario and arm, and the curve over the latency beside them."""
+    """Draw one map per planner, scenario and arm, and the curve over the latency beside them."""
     cells, curve = data["sensitivity"], data["sensitivity_latency"]
-    scenarios, arms = (list(dict.fromkeys(str(row[name]) for row in cells)) for name in ("scenario", "arm"))
-    figure = Figure(figsize=(2.1 * len(arms) + 3.6, 2.9 * len(scenarios)), layout="constrained")
-    panels = figure.subplots(len(scenarios), len(arms) + 1, squeeze=False, width_ratios=[1.0] * len(arms) + [1.5])
-    for scenario, line in zip(scenarios, panels, strict=True):
+    arms = list(dict.fromkeys(str(row["arm"]) for row in cells))
+    lines = list(dict.fromkeys((str(row["planner"]), str(row["scenario"])) for row in cells))
+    figure = Figure(figsize=(2.1 * len(arms) + 3.6, 2.7 * len(lines)), layout="constrained")
+    panels = figure.subplots(len(lines), len(arms) + 1, squeeze=False, width_ratios=[1.0] * len(arms) + [1.5])
+    for (planner, scenario), line in zip(lines, panels, strict=True):
         for arm, axes in zip(arms, line[:-1], strict=True):
-            mine = [row for row in cells if (row["scenario"], row["arm"]) == (scenario, arm)]
+            mine = [row for row in cells if (row["planner"], row["scenario"], row["arm"]) == (planner, scenario, arm)]
             image = _map(axes, mine)
             _marks(axes, scenario)
             axes.set_title(f"{_place(scenario)}, {arm}", fontsize=8)
             axes.tick_params(labelsize=7, labelleft=arm == arms[0])
-        line[0].set_ylabel("speed of the ego [m/s]", fontsize=8)
-        _curve(line[-1], [row for row in curve if row["scenario"] == scenario])
+        line[0].set_ylabel(f"{planner}\nspeed of the ego [m/s]", fontsize=8)
+        _curve(line[-1], [row for row in curve if (row["planner"], row["scenario"]) == (planner, scenario)])
         line[-1].set_title(f"{_place(scenario)}, start of the library", fontsize=8)
     for axes in panels[-1][:-1]:
         axes.set_xlabel("start of the hidden car [m]", fontsize=7)

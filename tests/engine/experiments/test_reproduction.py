@@ -362,7 +362,7 @@ def sensitivity_episodes() -> list[Episode]:
     """
     found = []
     for case in sensitivity.cases(("oracle",)):
-        _, kind, *place = case.arm.split(maxsplit=4)
+        _, _, kind, *place = case.arm.split(maxsplit=5)
         if kind == "map":
             speed, arm = float(place[1]), place[2]
             hit = {"none": speed >= 9.0, "cooperation": False}.get(arm, speed < 8.0)
@@ -375,9 +375,9 @@ def sensitivity_episodes() -> list[Episode]:
 def test_sensitivity_counts_cells_in_which_messages_help_or_harm() -> None:
     """Of 7 speeds, 4 are from 9 m/s on and 2 below 8 m/s; each has 7 starts."""
     report = sensitivity.report(sensitivity_episodes(), ("oracle",))
-    effects = {(row["scenario"], row["arm"]): row for row in report.data()["sensitivity_effects"]}
-    assert len(effects) == 2 * 6
-    for (_, arm), row in effects.items():
+    effects = {(row["planner"], row["scenario"], row["arm"]): row for row in report.data()["sensitivity_effects"]}
+    assert len(effects) == 2 * 2 * 6
+    for (_, _, arm), row in effects.items():
         counts = (row["helps"], row["nothing"], row["harms"], row["collisions"])
         expected = {"none": (0, 49, 0, 56), "cooperation": (28, 21, 0, 0)}.get(str(arm), (28, 7, 14, 28))
         assert counts == expected
@@ -398,4 +398,5 @@ def test_sensitivity_seeds_vary_within_limits_and_equally_in_all_cells() -> None
         tuple(sensitivity.offsets(1).values())
     }
     curve = [job for job in sensitivity.PART.jobs(1, ("oracle",)) if " curve 0.3 " in job.arm]
-    assert len({job.settings.parameters["EgoOffset"] for job in curve}) == sensitivity.CURVE_SEEDS
+    drawn_on_curve = {job.settings.parameters["EgoOffset"] for job in curve}
+    assert len(drawn_on_curve) == sensitivity.CURVE_SEEDS
