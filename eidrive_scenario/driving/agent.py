@@ -10,9 +10,11 @@ import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
+from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
 from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.planner import Planner
@@ -32,6 +34,9 @@ from eidrive_scenario.world.actor import ActorSpec, Control
 EGO_BODY_MARGIN = 0.9
 """Maximum distance of a reported box center from the ego outline at which the box is the ego body [m]. It is half the
 width of a car: the center of another car is closer only after a collision."""
+
+REGION_LIFETIME = 1.0
+"""Time for which a perception region counts as perceived [s]."""
 
 SENDER_REPORT_SUFFIX = " itself"
 """Suffix of the reports of a station about itself, which are kept as those of another station."""
@@ -78,6 +83,11 @@ class Agent:
         self._usual_lifetime = settings.lifetime(complete=True)
         self._lifetimes: dict[str, float] = {}
         """Lifetime of the reports of each station [s]."""
+        self._regions: PerceptionRegionStore | None = None
+        if planner is not None and planner.observes_regions:
+            self._regions = PerceptionRegionStore(REGION_LIFETIME)
+            everywhere = ViewSector(*spec.offset, 0.0, math.pi, math.inf)
+            self._view = (everywhere,) if planner.view is None else planner.view
         self._own_places: deque[tuple[float, float, float, float, float]] = deque(
             maxlen=math.ceil(settings.lifetime(complete=False) / dt) + 2
         )
@@ -129,6 +139,7 @@ class Agent:
         found = fresh if self.points is None else self.points.perceive(readings, fresh)
         if found is not None and not own_perception:
             self._accept_report(Report(self.name, found, now, state))
+            self._add_own_region(found.time)
         fused = self.fusion.fuse(list(self._reports.values()), now)
         if self._fusion_checked:
             check_detections(self.fusion, "fuse", fused)
@@ -136,6 +147,8 @@ class Agent:
         if self.planner is not None:
             if self.settings.obey_signals:
                 self.planner.observe_signals(self.perception.signals(readings))
+            if self._regions is not None:
+                self.planner.observe_regions(self._regions.newest(now))
             plan = self.planner.plan(ego, fused, goal, now)
             if self._planner_checked:
                 check_plan(self.planner, plan)
@@ -161,6 +174,15 @@ class Agent:
         ahead, aside, _ = self.spec.offset
         self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
 
+    def _add_own_region(self, time: float) -> None:
+        """Store the region that the own sensors perceived at `time` [s]."""
+        if self._regions is not None:
+            x, y, z, yaw = self._own_place(time)
+            cos, sin = math.cos(yaw), math.sin(yaw)
+            ahead, aside, _ = self.spec.offset
+            pose = (x - cos * ahead + sin * aside, y - sin * ahead - cos * aside, z, yaw)
+            self._regions.add(self.name, time, pose, self._view)
+
     def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float, own_perception: bool) -> None:
         """Store the newest report of each sender, and delete reports that exceed their lifetime."""
         for received in inbox:
@@ -171,6 +193,8 @@ class Agent:
             if self.points is not None and message.points is not None and sender != self.name:
                 self.points.add_points(sender, message.points, self._own_body(message.points.time))
                 continue
+            if self._regions is not None:
+                self._regions.add_message(message)
             detections = _numbered(message)
             if sender != self.name:
                 detections = self._without_own_body(detections)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
@@ -114,6 +115,8 @@ def build_agent(
     installation = DetectorContext(spec, sensors, roads, seed)
     detector.setup(installation)
     fusion = build_fusion(settings, detector)
+    used = [sensor for sensor in sensors.values() if sensor.kind in detector.needs]
+    view = view_sectors(used, spec)
     points = None
     listens = planner != NO_PLANNER or settings.restricts_senders
     if fusion.shares_points:
@@ -132,9 +135,9 @@ def build_agent(
         fusion=fusion,
         planner=None
         if planner == NO_PLANNER
-        else _planner(planner, settings, installation, detector, dt=dt, seed=seed),
+        else _planner(planner, settings, installation, view or None, dt=dt, seed=seed),
         controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
-        message_generator=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
+        message_generator=MessageGenerator(spec, settings, sensors=len(sensors), view=view, encoder=encoder),
         dt=dt,
         receives_messages=listens,
         points=points,
@@ -142,13 +145,18 @@ def build_agent(
 
 
 def _planner(
-    name: str, settings: AgentSettings, installation: DetectorContext, detector: Detector, *, dt: float, seed: int
+    name: str,
+    settings: AgentSettings,
+    installation: DetectorContext,
+    view: tuple[ViewSector, ...] | None,
+    *,
+    dt: float,
+    seed: int,
 ) -> Planner:
     """Build the planner of a vehicle, with the sectors that its detector covers."""
     kind = registry("planners").load(name, Planner)
     planner: Planner = construct(kind, settings, installation.spec, installation.roads, dt=dt, seed=seed)
-    used = [sensor for sensor in installation.sensors.values() if sensor.kind in detector.needs]
-    planner.view = view_sectors(used, installation.spec) if used else None
+    planner.view = view
     return planner
 
 

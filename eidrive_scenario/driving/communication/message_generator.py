@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec.structs import replace
 
+from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
@@ -24,15 +25,23 @@ class MessageGenerator:
     """Generator of the messages of one station, by the rules that its settings select.
 
     sensors  number of sensors of the station
+    view     sectors that they cover, for the sensor information of its CPMs
     encoder  encodes messages to measure their size; None uses the size model
     """
 
     def __init__(
-        self, spec: ActorSpec, settings: AgentSettings, *, sensors: int, encoder: Asn1Encoder | None = None
+        self,
+        spec: ActorSpec,
+        settings: AgentSettings,
+        *,
+        sensors: int,
+        view: tuple[ViewSector, ...] = (),
+        encoder: Asn1Encoder | None = None,
     ) -> None:
         self._spec = spec
         self._settings = settings
         self._sensors = sensors
+        self._view = view
         self._encoder = encoder
         self._clock = settings.clock
         self._number = 0
@@ -101,7 +110,9 @@ class MessageGenerator:
     def _full_cpm(self, state: StationState, detections: Detections, now: float) -> Message:
         """Return a CPM with all detections. An empty CPM states that no object is in sight."""
         size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
-        return self._sized(Message(self._spec.name, self._take_number(), now, state, detections, size), self._sensors)
+        number = self._take_number()
+        message = Message(self._spec.name, number, now, state, detections, size, sensors=self._view)
+        return self._sized(message, self._sensors)
 
     def _triggered_cpms(
         self, state: StationState, detections: Detections, now: float, shortest: float
@@ -126,6 +137,7 @@ class MessageGenerator:
                 detections.subset(part),
                 cpm_size(len(part), sensors, security),
                 objects=tuple(numbers[row] for row in part),
+                sensors=self._view if sensors else None,
             )
             generated.append(self._sized(message, sensors))
             sensors = 0

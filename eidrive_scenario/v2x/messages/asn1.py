@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
@@ -190,7 +191,9 @@ def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
             },
         )
     if sensors:
-        parameters["sensorInformationContainer"] = [_sensor(number) for number in range(sensors)]
+        sectors = (message.sensors or ())[:sensors]
+        known = [_sensor(number, sector) for number, sector in enumerate(sectors)]
+        parameters["sensorInformationContainer"] = known + [_sensor(n) for n in range(len(known), sensors)]
     if len(detections):
         delay = _within((state.time - detections.time) * 1e3, -1500, 1500)
         parameters["perceivedObjectContainer"] = [
@@ -236,10 +239,19 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
     }
 
 
-def _sensor(number: int) -> dict[str, Any]:
-    """Return a sensor with unknown properties."""
+def _sensor(number: int, sector: ViewSector | None = None) -> dict[str, Any]:
+    """Return a sensor with its sector in the frame of the station; without one with unknown properties."""
     properties = {"range": 0, "horizontalOpeningAngleStart": 3601, "horizontalOpeningAngleEnd": 3601}
-    area = {"refPointId": 0, "xSensorOffset": 0, "ySensorOffset": 0, "vehicleSensorPropertyList": [properties]}
+    area: dict[str, Any] = {"refPointId": 0, "xSensorOffset": 0, "ySensorOffset": 0}
+    if sector is not None:
+        first, last = 0, 3600
+        if sector.half_angle < math.pi:
+            first, last = (_tenths_of_degrees(sector.yaw + side * sector.half_angle) for side in (-1.0, 1.0))
+        reach = _within(10.0 * sector.range, 0, 10000) if math.isfinite(sector.range) else 10000
+        properties = {"range": reach, "horizontalOpeningAngleStart": first, "horizontalOpeningAngleEnd": last}
+        area["xSensorOffset"] = _within(100.0 * sector.x, -5000, 0)
+        area["ySensorOffset"] = _within(100.0 * sector.y, -1000, 1000)
+    area["vehicleSensorPropertyList"] = [properties]
     return {"sensorID": number % 256, "type": 0, "detectionArea": ("vehicleSensor", area)}
 
 

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
@@ -52,6 +53,8 @@ class Message(msgspec.Struct, frozen=True):
     objects: tuple[int, ...] | None = None
     points: PointCloud | None = None
     """Shared lidar point cloud of the sender, included in `size`; None if it is not shared."""
+    sensors: tuple[ViewSector, ...] | None = None
+    """Sensor information of a CPM: sectors that the sender perceives, in its own frame; None: not in this message."""
 
 
 class ReceivedMessage(msgspec.Struct, frozen=True):

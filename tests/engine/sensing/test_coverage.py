@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.sensing.coverage import ViewSector, view_sectors
+from eidrive_scenario.coverage import ViewSector
+from eidrive_scenario.sensing.coverage import view_sectors
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -21,7 +22,7 @@ def contains(sector: ViewSector, *discs: tuple[float, float, float]) -> list[boo
 
 def test_disc_is_inside_up_to_the_tangent_of_the_edge() -> None:
     # The edge is at 45°: a disc of 1 m on the axis at x touches it at x·sin(45°) = 1.
-    sector = ViewSector(0.0, 0.0, 0.0, math.pi / 4, 50.0)
+    sector = ViewSector(0.0, 0.0, 1.5, 0.0, math.pi / 4, 50.0)
     touching = math.sqrt(2.0)
     assert contains(sector, (touching + 0.01, 0.0, 1.0), (touching - 0.01, 0.0, 1.0)) == [True, False]
     assert contains(sector, (20.0, 0.0, 1.0), (10.0, 9.9, 0.0), (10.0, 10.1, 0.0), (-20.0, 0.0, 0.1)) == [
@@ -33,7 +34,7 @@ def test_disc_is_inside_up_to_the_tangent_of_the_edge() -> None:
 
 
 def test_disc_is_inside_up_to_the_range() -> None:
-    sector = ViewSector(2.0, 0.0, 0.0, math.pi, 50.0)
+    sector = ViewSector(2.0, 0.0, 1.5, 0.0, math.pi, 50.0)
     assert contains(sector, (51.0, 0.0, 1.0), (51.1, 0.0, 1.0), (-47.0, 0.0, 1.0), (-47.1, 0.0, 1.0)) == [
         True,
         False,
@@ -43,7 +44,7 @@ def test_disc_is_inside_up_to_the_range() -> None:
 
 
 def test_sector_to_the_rear_contains_what_is_behind() -> None:
-    sector = ViewSector(-2.0, 0.0, math.pi, math.radians(50.0), math.inf)
+    sector = ViewSector(-2.0, 0.0, 1.5, math.pi, math.radians(50.0), math.inf)
     assert contains(sector, (-12.0, 3.0, 1.0), (-12.0, -3.0, 1.0), (12.0, 0.0, 1.0)) == [True, True, False]
 
 
@@ -56,4 +57,4 @@ def test_sectors_are_those_of_the_settings() -> None:
     assert camera.x == pytest.approx(1.4 + 4.9 / 2 + 0.054)
     assert (camera.half_angle, camera.range) == (math.radians(40.0), math.inf)
     assert (lidar.half_angle, lidar.range) == (math.pi, 60.0)
-    assert truth == (1.0, -0.5, math.pi / 2, math.radians(60.0), 50.0)
+    assert truth == ViewSector(1.0, -0.5, 1.0, math.pi / 2, math.radians(60.0), 50.0)

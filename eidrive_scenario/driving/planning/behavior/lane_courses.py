@@ -78,7 +78,7 @@ class LaneCourses:
         found = self._courses.get(row)
         if found is None:
             chains = self._chains([self._keys[row]], 0.0)[:MOST]
-            found = tuple(course for chain in chains if (course := self._course(chain)) is not None)
+            found = tuple(course for chain in chains if (course := self.course_of(chain)) is not None)
             self._courses[row] = found
         return found
 
@@ -103,7 +103,8 @@ class LaneCourses:
     def _length(self, key: LaneKey) -> float:
         return self._roads.road(key.road).sections[key.section].length
 
-    def _course(self, chain: list[LaneKey]) -> Course | None:
+    def course_of(self, chain: list[LaneKey]) -> Course | None:
+        """Return the course along consecutive lanes; None if it has no length."""
         tables = self._roads.tables
         rows, places = [], []
         for key in chain:

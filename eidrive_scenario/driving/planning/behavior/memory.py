@@ -108,7 +108,8 @@ class ObjectMemory:
         self._note_hidden(lost, now, in_view)
         lost = [known for known in lost if self._is_kept(known, now) and not _is_among(known, found)]
         for known in lost:
-            known.error = min(known.error + SPEED_ERROR * step, LARGEST_ERROR)
+            if known.still_since is None:
+                known.error = min(known.error + SPEED_ERROR * step, LARGEST_ERROR)
         self._objects = found + lost
         for known in self._objects:
             is_still = known.speed < STILL

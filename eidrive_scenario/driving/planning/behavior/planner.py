@@ -10,10 +10,13 @@ import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.coverage import PerceptionRegion
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planner_settings import PlannerSettings
+from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
 from eidrive_scenario.driving.planning.behavior.decision import Decider, Decision
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory, nearest_rows
+from eidrive_scenario.driving.planning.behavior.occlusion import HiddenTraffic, Occluders
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.proposals import Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
@@ -27,6 +30,7 @@ from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.signal_states import ON, lamps
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
@@ -71,11 +75,21 @@ class BehaviorPlanner(RoutePlanner):
         self._passages: tuple[Passage, ...] = ()
         self._decider = Decider(own, spec, self._times, settings.range or VIEW)
         self._line: ReferenceLine | None = None
+        self._conflict_ways: ConflictWays | None = None
+        self._ways: list[ConflictWay] = []
+        self._hidden: HiddenTraffic | None = None
+        self.observes_regions = own.caution and roads is not None
+        self._lights_work = True
+        """Whether the last traffic light in sight was lit."""
+        self._regions: Sequence[PerceptionRegion] = ()
         self._limits: Array = np.empty(0)
         self._decision: Decision | None = None
         self._decided = -math.inf
         self._reasons: Array = np.empty((0, 2))
         """Places of the objects that are the reason of the decision [m]."""
+
+    def observe_regions(self, regions: Sequence[PerceptionRegion]) -> None:
+        self._regions = regions
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
@@ -105,6 +119,8 @@ class BehaviorPlanner(RoutePlanner):
         line = self._line = ReferenceLine(path, self.roads)
         self._passages = self._rules.passages(line.points) if self._rules is not None else ()
         self._limits = speed_limits(line.curvature, path.limits, line.spacing, self.planner_settings)
+        if self.observes_regions and self.roads is not None:
+            self._ways = self._find_ways(self.roads, line)
         shift = None
         if before is not None:
             (s, d), (s_before, d_before) = (some.place(x, y, 0, len(some.points)) for some in (line, before))
@@ -112,6 +128,43 @@ class BehaviorPlanner(RoutePlanner):
         self._decision = None
         self._decider.line_changed(shift)
         return line
+
+    def _find_ways(self, roads: RoadNetwork, line: ReferenceLine) -> list[ConflictWay]:
+        """Return the ways on which unseen traffic may meet the vehicle."""
+        if self._conflict_ways is None:
+            self._conflict_ways = ConflictWays(roads, self._rules or JunctionRules(roads), self.spec.size[:2])
+        return self._conflict_ways.along(line, self._passages)
+
+    def _caution(
+        self, ego: EgoState, objects: Detections, line: ReferenceLine, s: float, wanted: float, now: float
+    ) -> tuple[Array, str]:
+        """Return the speed limits along the line, with those before hidden ways, and the kind of the nearest one."""
+        if not self._ways or self.roads is None:
+            return self._limits, ""
+        if self._hidden is None:
+            self._hidden = HiddenTraffic(
+                self.planner_settings,
+                Occluders.of_map(self.roads),
+                self.spec,
+                self.view or (),
+                self.settings.range or VIEW,
+            )
+        motion = (s, max(ego.speed, 0.0), wanted)
+        place: tuple[float, float, float] = tuple(ego.position.tolist())
+        ways = [way for way in self._ways if not way.has_light] if self._relies_on_lights(s) else self._ways
+        found = self._hidden.limits(ways, line.along, motion, place, self._regions, objects, now)
+        return (self._limits, "") if found is None else (np.minimum(self._limits, found[0]), found[1])
+
+    def _relies_on_lights(self, s: float) -> bool:
+        """Return whether the vehicle obeys traffic lights, and these are lit."""
+        if self._stops is None:
+            return False
+        ahead = self._stops.signals.ahead(s)
+        states = (light.state for light in ahead if light.kind == "light" and light.state is not None)
+        state = next(states, None)
+        if state is not None:
+            self._lights_work = any(mode == ON for _, mode in lamps(state))
+        return self._lights_work
 
     def _place_on(self, line: ReferenceLine, x: float, y: float) -> tuple[float, float]:
         low = max(self._progress - 3, 0)
@@ -135,9 +188,10 @@ class BehaviorPlanner(RoutePlanner):
         rows = [row for row, entry in enumerate(known) if math.hypot(entry.x - x, entry.y - y) < reach]
         near = [known[row] for row in rows]
         stop = self._stop(line.path, ego, x, y, now)
+        limits, hidden = self._caution(ego, objects, line, s, wanted, now)
         situation = Situation(
             line=line,
-            limits=self._limits,
+            limits=limits,
             s=s,
             d=d,
             steered=self._front_axle(ego, line),
@@ -149,6 +203,7 @@ class BehaviorPlanner(RoutePlanner):
             stop=None if stop is None else Wall(stop.place, math.inf, stop.reason),
             now=now,
             gives_way=self._gives_way(s),
+            hidden=hidden,
         )
         return self._decider.decide(situation)
 

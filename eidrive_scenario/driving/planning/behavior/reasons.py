@@ -31,6 +31,8 @@ def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, t
     if proposal.share < 1.0:
         return f"{maneuver}slow down for traffic ahead", ()
     if LIMIT in causes and causes[0] != FREE:
+        if situation.hidden:
+            return f"{maneuver}caution before a hidden {situation.hidden}", ()
         return f"{maneuver}curve or end of route ahead", ()
     return f"{maneuver}keep speed", ()
 

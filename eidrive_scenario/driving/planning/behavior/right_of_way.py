@@ -120,3 +120,17 @@ class JunctionRules:
         if own.has_light or abs(relation) <= ALIKE:
             return False
         return relation > 0.0
+
+    def may_cross(self, own: Passage, other: Passage) -> bool:
+        """Return whether traffic that cannot be seen may cross on another passage of the same junction.
+
+        Lights are not considered. Traffic that a sign or its left turn holds gives way; priority to the right is not
+        relied upon, as it holds back only drivers who see the vehicle.
+        """
+        side = 1.0 if self._keeps_right else -1.0
+        relation = abs(float(wrap_angle(other.heading - own.heading)))
+        if relation <= ALIKE or (other.gives_way and not own.gives_way):
+            return False
+        if relation >= OPPOSITE:
+            return side * own.turn > TURNING and side * other.turn <= TURNING
+        return True

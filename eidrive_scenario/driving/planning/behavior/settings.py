@@ -31,6 +31,8 @@ class BehaviorSettings(PlannerSettings):
                             covers 95 % on one side
     possible_existence      existence probability from which an object reduces the speed comfortably; hard braking
                             needs `min_existence`
+    caution                 whether lanes and crosswalks that neither the own sensors nor those of a sender show are
+                            treated as possibly occupied: the vehicle approaches them so that it can stop
     memory                  time for which a lost object is kept; `lost_detection_timeout` of Autoware
     """
 
@@ -50,4 +52,5 @@ class BehaviorSettings(PlannerSettings):
     lane_changes: bool = True
     uncertainty: Annotated[float, Field(ge=0.0, le=5.0)] = 1.645
     possible_existence: Share = 0.3
+    caution: bool = False
     memory: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0

@@ -38,6 +38,8 @@ class Situation(msgspec.Struct, frozen=True):
     stop: Wall | None
     now: float
     gives_way: Callable[[Passage], bool] | None = None
+    hidden: str = ""
+    """Kind of the way ahead that no sensor shows and that limits the speed; empty without one."""
 
     def kind_of(self, owner: int) -> str:
         """Return the class of an object."""

@@ -1,0 +1,248 @@
+"""Caution before places that no sensor and no message covers: hidden traffic may come from there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+
+import msgspec
+import numpy as np
+
+from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
+from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.road_objects import buildings, road_object_bodies
+
+REACTION = 0.5
+"""Time from the sight of hidden traffic to braking [s]."""
+CREEP = 1.39
+"""Speed at which the vehicle moves on until it has a view [m/s], that of Autoware before occluded junctions."""
+TARGET_HEIGHT = 1.0
+"""Height at which hidden traffic is visible [m]."""
+FAR = 100.0
+"""Distance ahead within which ways are considered [m]."""
+
+
+class Occluders(msgspec.Struct, frozen=True):
+    """Bodies that block the view: N boxes with center, half length, half width and heading; height of the top [m]."""
+
+    x: Array
+    y: Array
+    yaw: Array
+    half_length: Array
+    half_width: Array
+    top: Array
+
+    @classmethod
+    def of_boxes(cls, boxes: Array) -> Occluders:
+        """Return the occluders of boxes (N, 7)."""
+        x, y, z, length, width, height, yaw = boxes.reshape(-1, 7).T
+        return cls(x, y, yaw, length / 2.0, width / 2.0, z + height / 2.0)
+
+    @classmethod
+    def of_map(cls, roads: RoadNetwork) -> Occluders:
+        """Return the buildings and solid objects of a map that are higher than hidden traffic."""
+        boxes = [(*house.center, *house.size, house.yaw) for house in buildings(roads)]
+        for body in road_object_bodies(roads):
+            if body.solid and body.height > TARGET_HEIGHT:
+                length, width = (2.0 * body.radius,) * 2 if body.radius else (body.length, body.width)
+                place = body.pose
+                boxes.append((place.x, place.y, place.z + body.height / 2.0, length, width, body.height, place.h))
+        return cls.of_boxes(np.array(boxes, dtype=float))
+
+    def near(self, x: float, y: float, distance: float) -> Occluders:
+        """Return those whose centers are within a distance of a place [m], plus their own extent."""
+        reach = distance + np.hypot(self.half_length, self.half_width)
+        rows = np.flatnonzero(np.hypot(self.x - x, self.y - y) <= reach)
+        return Occluders(*(getattr(self, name)[rows] for name in self.__struct_fields__))
+
+    def block(self, eye: ViewSector, points: Array, ground: float) -> Bools:
+        """Return whether places (P, 2) are hidden from a sensor. A place inside a box is occupied, not hidden.
+
+        ground  height of the ground at the places [m]
+        """
+        hidden = np.zeros(len(points), dtype=bool)
+        if not len(self.x) or not len(points):
+            return hidden
+        cos, sin = np.cos(self.yaw)[:, None], np.sin(self.yaw)[:, None]
+        ex, ey = eye.x - self.x[:, None], eye.y - self.y[:, None]
+        px, py = points[None, :, 0] - self.x[:, None], points[None, :, 1] - self.y[:, None]
+        entry, leave = np.zeros((len(self.x), len(points))), np.ones((len(self.x), len(points)))
+        axes = (
+            (cos * ex + sin * ey, cos * px + sin * py, self.half_length[:, None]),
+            (cos * ey - sin * ex, cos * py - sin * px, self.half_width[:, None]),
+        )
+        for start, end, half in axes:
+            step = end - start
+            safe = np.where(np.abs(step) < 1e-9, 1e-9, step)
+            one, two = (-half - start) / safe, (half - start) / safe
+            entry, leave = np.maximum(entry, np.minimum(one, two)), np.minimum(leave, np.maximum(one, two))
+        # The line of sight descends or rises from the sensor to the target; it is lowest in a box at one of the ends.
+        height = ground + TARGET_HEIGHT - eye.z
+        lowest = eye.z + height * (leave if height < 0.0 else entry)
+        blocked = (entry < leave) & (leave < 1.0) & (entry > 0.0) & (lowest < self.top[:, None])
+        return np.asarray(blocked.any(axis=0))
+
+
+class PossibleTraffic:
+    """Places of one way at which unseen traffic may be: set-based reachability.
+
+    Traffic moves toward the zone with at most the speed of the way, may stand, and enters at the end of the way. What
+    has been perceived to be free stays free until traffic can have come there.
+    """
+
+    def __init__(self) -> None:
+        self._possible: Bools = np.zeros(0, dtype=bool)
+        self._time = 0.0
+        self._moved = 0.0
+        """Distance of the motion since the last place [m]."""
+
+    def first(self, way: ConflictWay, shown: Bools, now: float) -> float:
+        """Return the least distance from the zone at which traffic may be [m]; inf without a place.
+
+        shown  places (P,) at which traffic would be perceived at `now` [s]
+        """
+        possible = self._possible
+        if len(possible) < len(shown):
+            possible = np.concatenate([possible, np.ones(len(shown) - len(possible), dtype=bool)])
+        self._moved += way.speed * max(now - self._time, 0.0)
+        count = min(int(self._moved / way.spacing), len(shown))
+        self._moved -= int(self._moved / way.spacing) * way.spacing
+        self._time = now
+        advanced = ~_clear_upstream(~possible[: len(shown)], count, beyond=False)
+        needed = max(round(way.body / way.spacing), 1)
+        self._possible = possible = _runs(advanced & ~shown, needed)
+        if not possible.any():
+            return math.inf
+        return max(float(way.distance[int(possible.argmax())]) - self._moved, 0.0)
+
+
+class HiddenTraffic:
+    """Speed limits before the ways on which unseen traffic may come.
+
+    The vehicle approaches such a way so that it can stop before the zone, and creeps on until its sensor is at the
+    zone. Then it drives on, and reacts to what it detects.
+
+    fixed  occluders of the map;  view  sectors of the sensors of the vehicle
+    range  assumed range of sensors without a limit [m]
+    """
+
+    def __init__(
+        self,
+        settings: BehaviorSettings,
+        fixed: Occluders,
+        spec: ActorSpec,
+        view: Sequence[ViewSector],
+        range: float,
+    ) -> None:
+        self._settings = settings
+        self._fixed = fixed
+        center, half = spec.offset[0], spec.size[0] / 2.0
+        self._front, self._rear = center + half, half - center
+        self._sensor = max((sector.x for sector in view), default=center)
+        self._range = range
+        self._traffic: dict[Hashable, PossibleTraffic] = {}
+        self._deceleration = settings.comfortable_deceleration
+
+    def limits(
+        self,
+        ways: Sequence[ConflictWay],
+        along: Array,
+        motion: tuple[float, float, float],
+        place: tuple[float, float, float],
+        regions: Sequence[PerceptionRegion],
+        objects: Detections,
+        now: float,
+    ) -> tuple[Array, str] | None:
+        """Return speed limits (M,) at distances along the line [m/s] and the way that is hidden; None without one.
+
+        motion  distance of the vehicle along the line [m], its speed and its wanted speed [m/s]
+        place   position of the vehicle; its height is that of the ground [m]
+        """
+        s, speed, wanted = motion
+        ahead = [way for way in ways if s + self._sensor < way.hold < s + FAR]
+        if not ahead:
+            return None
+        x, y, ground = place
+        seen = Occluders.of_boxes(objects.boxes)
+        fixed = self._fixed.near(x, y, 2.0 * FAR)
+        occluders = [group for group in (seen, fixed) if len(group.x)]
+        found: Array | None = None
+        nearest = (math.inf, "")
+        for way in ahead:
+            shown = self._shown(way, regions, occluders, ground, now)
+            hidden = self._traffic.setdefault(way.key, PossibleTraffic()).first(way, shown, now)
+            if hidden / way.speed > self._time_to_clear(way, s, speed, wanted):
+                continue
+            stop = way.hold - self._front - BEFORE_ZONE
+            limits = np.where(along > way.hold - self._sensor, math.inf, self.safe_speed(stop - along))
+            found = limits if found is None else np.minimum(found, limits)
+            nearest = min(nearest, (way.start, way.kind))
+        return None if found is None else (found, nearest[1])
+
+    def safe_speed(self, distance: Array) -> Array:
+        """Return the speeds from which the vehicle stops within distances after its reaction [m/s], at least creeping.
+
+        v = -bt + √(b²t² + 2bd)
+        """
+        b, t = self._deceleration, REACTION
+        speed = -b * t + np.sqrt((b * t) ** 2 + 2.0 * b * np.maximum(distance, 0.0))
+        return np.maximum(speed, CREEP)
+
+    def _time_to_clear(self, way: ConflictWay, s: float, speed: float, wanted: float) -> float:
+        """Return the time until the rear of the vehicle has left the zone if it accelerates to the wanted speed [s]."""
+        left = max(way.end + self._rear - s, 0.0)
+        acceleration = self._settings.acceleration
+        top = max(wanted, speed)
+        time = (top - speed) / acceleration
+        gained = (speed + top) / 2.0 * time
+        if gained >= left:
+            return (math.sqrt(speed**2 + 2.0 * acceleration * left) - speed) / acceleration
+        return time + (left - gained) / max(top, 1e-3)
+
+    def _shown(
+        self,
+        way: ConflictWay,
+        regions: Sequence[PerceptionRegion],
+        occluders: Sequence[Occluders],
+        ground: float,
+        now: float,
+    ) -> Bools:
+        """Return the places of a way (P,) at which traffic would be perceived now."""
+        clear = np.zeros(len(way.points), dtype=bool)
+        for region in regions:
+            shown = np.zeros(len(way.points), dtype=bool)
+            for sector in region.sectors:
+                eye = sector if sector.range < self._range else msgspec.structs.replace(sector, range=self._range)
+                inside = eye.contains(way.points[:, 0], way.points[:, 1])
+                for group in occluders:
+                    inside &= ~group.block(eye, way.points, ground)
+                shown |= inside
+            # During the age of the measurement traffic may have come from the places upstream.
+            moved = math.ceil(way.speed * max(now - region.time, 0.0) / way.spacing)
+            clear |= _clear_upstream(shown, moved)
+        return clear
+
+
+def _runs(places: Bools, count: int) -> Bools:
+    """Return the places (P,) that belong to at least `count` consecutive ones."""
+    if count <= 1 or len(places) < count:
+        return places
+    starts = np.convolve(places, np.ones(count), mode="valid") == count
+    return np.asarray(np.convolve(starts, np.ones(count)) > 0.0)
+
+
+def _clear_upstream(clear: Bools, count: int, *, beyond: bool = True) -> Bools:
+    """Return the places (P,) that are clear with the next `count` places upstream.
+
+    beyond  whether the places beyond the last one are clear
+    """
+    if count <= 0:
+        return clear
+    longer = np.concatenate([clear, np.full(count, beyond)])
+    return np.asarray(np.convolve(~longer, np.ones(count + 1), mode="valid") == 0.0)
