@@ -26,6 +26,8 @@ CASES = [
     if entry.name not in WITHOUT_DRIVER
     for channel in (("none", "ideal") if entry.family in WITH_STATIONS else ("none",))
 ]
+CAUTIOUS = ("ncap/crossing_car", "coop/scenario_1", "coop/scenario_2")
+"""Scenarios that are also run with caution before hidden lanes."""
 PARAMETERS = {"corner_cases/wrong_clock": {"ClockOffset": "0"}}
 """Parameters by scenario: a wrong clock moves reported actors by more than `NEAR`, so that they count as unknown."""
 LONGEST = 8.0
@@ -46,8 +48,8 @@ class Decision(NamedTuple):
     places: Mapping[str, bytes]
 
 
-def decisions(path: Path, channel: str) -> Iterator[Decision]:
-    parameters = PARAMETERS.get(f"{path.parent.name}/{path.stem}", {})
+def decisions(path: Path, channel: str, **given: str) -> Iterator[Decision]:
+    parameters = {**PARAMETERS.get(f"{path.parent.name}/{path.stem}", {}), **given}
     settings = RunSettings(channel=channel, planner="behavior", parameters=parameters)
     with Simulation(path, seed=1, settings=settings) as simulation:
         known: frozenset[str] = frozenset()
@@ -106,8 +108,18 @@ def moved(path: Path, actor: str, folder: Path) -> Path | None:
 
 @pytest.mark.parametrize(("name", "channel"), CASES)
 def test_hidden_actor_has_no_influence_before_its_detection(name: str, channel: str, tmp_path: Path) -> None:
+    check_hidden_actors(name, channel, tmp_path)
+
+
+@pytest.mark.parametrize("name", CAUTIOUS)
+def test_hidden_actor_has_no_influence_on_caution(name: str, tmp_path: Path) -> None:
+    check_hidden_actors(name, "none", tmp_path, Caution="true")
+
+
+def check_hidden_actors(name: str, channel: str, tmp_path: Path, **parameters: str) -> None:
+    """Move each hidden actor and compare the decisions up to its first detection."""
     path = library_path() / f"{name}.xosc"
-    original = list(decisions(path, channel))
+    original = list(decisions(path, channel, **parameters))
     tree: Any = etree.parse(path)
     actors = [element.get("name") for element in tree.iterfind(".//Entities/ScenarioObject")]
     hidden = [actor for actor in actors if len(original) > 20 and actor not in original[20].known and actor != EGO]
@@ -115,7 +127,7 @@ def test_hidden_actor_has_no_influence_before_its_detection(name: str, channel: 
         other = moved(path, actor, tmp_path / actor)
         if other is None:
             continue
-        for step, (before, after) in enumerate(zip(original, decisions(other, channel), strict=False)):
+        for step, (before, after) in enumerate(zip(original, decisions(other, channel, **parameters), strict=False)):
             if actor in before.known or actor in after.known or _others_react(before, after, actor):
                 break
             assert before[:3] == after[:3], f"{actor} at step {step}"

@@ -230,11 +230,12 @@ class HiddenTraffic:
 
 
 def _runs(places: Bools, count: int) -> Bools:
-    """Return the places (P,) that belong to at least `count` consecutive ones."""
-    if count <= 1 or len(places) < count:
+    """Return the places (P,) that belong to at least `count` consecutive ones; there are more beyond the last one."""
+    if count <= 1:
         return places
-    starts = np.convolve(places, np.ones(count), mode="valid") == count
-    return np.asarray(np.convolve(starts, np.ones(count)) > 0.0)
+    longer = np.concatenate([places, np.ones(count - 1, dtype=bool)])
+    starts = np.convolve(longer, np.ones(count), mode="valid") == count
+    return np.asarray(np.convolve(starts, np.ones(count)) > 0.0)[: len(places)]
 
 
 def _clear_upstream(clear: Bools, count: int, *, beyond: bool = True) -> Bools:

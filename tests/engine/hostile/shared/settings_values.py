@@ -71,6 +71,7 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
         "period": 0.1,
         "uncertainty": 1.645,
         "possible_existence": 0.3,
+        "caution": True,
         "memory": 1.0,
     },
     "fusion": {

@@ -1,0 +1,251 @@
+"""Caution of the planner: where unseen traffic may be, the speed before it, and the effect of cooperation."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from sample_car import CAR
+
+from eidrive_scenario.api.run import RunResult, RunSettings, run_file
+from eidrive_scenario.coverage import PerceptionRegion, ViewSector
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
+from eidrive_scenario.driving.planning.behavior.occlusion import CREEP, HiddenTraffic, Occluders, PossibleTraffic
+from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.path import PlannedPath
+from eidrive_scenario.library import from_library, library_path
+from eidrive_scenario.roads import RoadNetwork
+
+NOTHING = Occluders.of_boxes(np.empty((0, 7)))
+EVERYWHERE = ViewSector(0.0, 0.0, 1.5, 0.0, math.pi, 200.0)
+
+
+def lane(length: float = 40.0, *, speed: float = 10.0, start: float = 20.0) -> ConflictWay:
+    """Return a lane that comes from the left and meets the line at x = start + 1."""
+    distance = np.arange(0.0, length, 2.0)
+    points = np.column_stack([np.full(len(distance), start + 1.0), 2.0 + distance])
+    return ConflictWay("left", "lane", start, start + 2.0, points, distance, speed, 4.0, has_light=False, hold=start)
+
+
+def hidden_traffic(**settings: float) -> HiddenTraffic:
+    return HiddenTraffic(BehaviorSettings.model_validate(settings), NOTHING, CAR, (), 200.0)
+
+
+@pytest.mark.parametrize(
+    ("braking", "distance", "speed"), [(3.0, 8.6, 5.84), (6.0, 8.6, 7.59), (3.0, 20.0, 9.56), (3.0, 0.0, CREEP)]
+)
+def test_safe_speed_has_the_closed_form(braking: float, distance: float, speed: float) -> None:
+    """v t + v² / 2b is the distance, with t = 0.5 s."""
+    found = float(hidden_traffic(comfortable_deceleration=braking).safe_speed(np.array([distance]))[0])
+    assert found == pytest.approx(speed, abs=0.005)
+    if distance:
+        assert found * 0.5 + found**2 / (2.0 * braking) == pytest.approx(distance)
+
+
+class TestOccluders:
+    BOX = Occluders.of_boxes(np.array([[10.0, 0.0, 1.0, 2.0, 2.0, 2.0, 0.0]]))
+
+    def blocked(self, eye: ViewSector, *places: tuple[float, float]) -> list[bool]:
+        return self.BOX.block(eye, np.array(places), 0.0).tolist()
+
+    def test_place_behind_a_box_is_hidden_and_one_beside_its_shadow_is_not(self) -> None:
+        # The shadow of the edges at x = 9, y = ±1 is bounded by y = x / 9.
+        eye = ViewSector(0.0, 0.0, 1.0, 0.0, math.pi, 100.0)
+        assert self.blocked(eye, (18.0, 1.9), (18.0, 2.1), (18.0, -1.9), (5.0, 0.0), (-18.0, 0.0)) == [
+            True,
+            False,
+            True,
+            False,
+            False,
+        ]
+
+    def test_place_inside_a_box_is_occupied_and_not_hidden(self) -> None:
+        assert self.blocked(ViewSector(0.0, 0.0, 1.0, 0.0, math.pi, 100.0), (10.0, 0.0), (10.9, 0.5)) == [False, False]
+
+    def test_shadow_of_a_high_sensor_ends_behind_the_box(self) -> None:
+        # From 5 m down to 1 m at R, the line is at 2 m above the far edge (x = 11) if 5 - 4 · 11 / R = 2: R = 14.67.
+        mast = ViewSector(0.0, 0.0, 5.0, 0.0, math.pi, 100.0)
+        assert self.blocked(mast, (14.0, 0.0), (15.3, 0.0), (30.0, 0.0)) == [True, False, False]
+
+    def test_turned_box_hides_by_its_turned_outline(self) -> None:
+        turned = Occluders.of_boxes(np.array([[10.0, 0.0, 1.0, 8.0, 0.2, 2.0, math.pi / 2]]))
+        eye = ViewSector(0.0, 0.0, 1.0, 0.0, math.pi, 100.0)
+        assert turned.block(eye, np.array([(20.0, 7.0), (20.0, 9.0)]), 0.0).tolist() == [True, False]
+
+    def test_ground_height_moves_the_target_but_not_the_box(self) -> None:
+        # On a bridge at 10 m the target is at 11 m, and the box with its top at 2 m is far below the line of sight.
+        eye = ViewSector(0.0, 0.0, 11.0, 0.0, math.pi, 100.0)
+        assert self.BOX.block(eye, np.array([(18.0, 0.0)]), 10.0).tolist() == [False]
+
+
+class TestPossibleTraffic:
+    def test_traffic_enters_a_seen_lane_at_its_end_with_the_speed_of_the_lane(self) -> None:
+        way, traffic = lane(40.0, speed=10.0), PossibleTraffic()
+        shown, hidden = np.ones(20, dtype=bool), np.zeros(20, dtype=bool)
+        assert traffic.first(way, shown, 0.0) == math.inf
+        for now, expected in ((1.0, 30.0), (2.0, 20.0), (3.0, 10.0), (4.0, 0.0), (9.0, 0.0)):
+            # The end is 40 m away; places are 2 m apart.
+            assert traffic.first(way, hidden, now) == pytest.approx(expected, abs=2.0), now
+
+    def test_result_does_not_depend_on_the_number_of_steps(self) -> None:
+        way, hidden = lane(40.0, speed=10.0), np.zeros(20, dtype=bool)
+        for steps in (1, 7, 40):
+            traffic = PossibleTraffic()
+            traffic.first(way, ~hidden, 0.0)
+            for step in range(steps):
+                found = traffic.first(way, hidden, 2.0 * (step + 1) / steps)
+            assert found == pytest.approx(20.0, abs=2.0), steps
+
+    def test_gap_that_holds_no_vehicle_is_no_traffic(self) -> None:
+        way, shown = lane(40.0), np.ones(20, dtype=bool)
+        shown[5] = False
+        assert PossibleTraffic().first(way, shown, 0.0) == math.inf
+        shown[6] = False
+        assert PossibleTraffic().first(way, shown, 0.0) == 10.0
+
+    def test_unseen_lane_may_be_occupied_at_the_zone(self) -> None:
+        assert PossibleTraffic().first(lane(), np.zeros(20, dtype=bool), 0.0) == 0.0
+
+    def test_lane_of_another_length_keeps_what_was_seen(self) -> None:
+        traffic = PossibleTraffic()
+        traffic.first(lane(40.0), np.ones(20, dtype=bool), 0.0)
+        assert traffic.first(lane(44.0), np.zeros(22, dtype=bool), 0.0) == 40.0
+
+
+def limit_at(distance: float, regions: list[PerceptionRegion], way: ConflictWay, **settings: float) -> float:
+    """Return the speed limit `distance` before the place at which the vehicle would wait; inf without one."""
+    along = np.arange(0.0, 60.0, 1.0)
+    found = hidden_traffic(**settings).limits(
+        [way], along, (0.0, 8.0, 8.0), (0.0, 0.0, 0.0), regions, Detections(0.0), 0.0
+    )
+    stop = way.hold - CAR.offset[0] - CAR.size[0] / 2.0 - 1.5
+    return math.inf if found is None else float(np.interp(stop - distance, along, found[0]))
+
+
+def test_lane_in_no_region_is_approached_so_that_the_vehicle_can_stop() -> None:
+    # -1 + √(1 + 2 · 2 · 10) m/s 10 m before the place at which it would wait
+    assert limit_at(10.0, [], lane()) == pytest.approx(-1.0 + math.sqrt(41.0), abs=0.05)
+    assert limit_at(10.0, [PerceptionRegion("Ego", 0.0, (EVERYWHERE,))], lane()) == math.inf
+
+
+def test_view_of_a_sender_counts_less_with_its_age() -> None:
+    # The vehicle needs 2.9 s to leave the zone; 40 m of view are 4 s of traffic at 10 m/s, minus the age.
+    ages = [limit_at(10.0, [PerceptionRegion("RSU", -age, (EVERYWHERE,))], lane(40.0)) for age in (0.0, 0.5)]
+    assert ages == [math.inf, math.inf], "traffic beyond the end of the lane is not assumed"
+    near = ViewSector(21.0, 0.0, 5.0, 0.0, math.pi, 38.0)
+    regions = [[PerceptionRegion("RSU", -age, (near,))] for age in (0.0, 1.0)]
+    fresh, old = (limit_at(10.0, region, lane(100.0)) for region in regions)
+    assert fresh == math.inf
+    assert old < 8.0
+
+
+def test_vehicle_whose_sensor_is_at_the_zone_drives_on() -> None:
+    along, place = np.arange(0.0, 60.0, 1.0), (0.0, 0.0, 0.0)
+    at_zone = 20.0 - CAR.offset[0] + 0.1
+    traffic = hidden_traffic()
+    assert traffic.limits([lane()], along, (at_zone, 1.0, 8.0), place, [], Detections(0.0), 0.0) is None
+    assert traffic.limits([lane()], along, (at_zone - 0.2, 1.0, 8.0), place, [], Detections(0.0), 0.0) is not None
+
+
+@cache
+def road_map(name: str) -> RoadNetwork:
+    return RoadNetwork.load(library_path() / "roads" / f"{name}.xodr")
+
+
+def ways_of(roads: RoadNetwork, start: tuple[str, int, float], length: float = 120.0) -> list[ConflictWay]:
+    """Return the ways that meet a drive straight on from a lane position."""
+    here = roads.location(*start)
+    first, last = roads.pose(here), roads.pose(roads.advance(here, length))
+    count = int(math.hypot(last.x - first.x, last.y - first.y)) + 1
+    points = np.column_stack([np.linspace(first.x, last.x, count), np.linspace(first.y, last.y, count)])
+    line = ReferenceLine(PlannedPath(points, ends=True), roads)
+    rules = JunctionRules(roads)
+    return ConflictWays(roads, rules, (4.9, 1.8)).along(line, rules.passages(points))
+
+
+@cache
+def drive(name: str, **parameters: str) -> RunResult:
+    return run_file(from_library(name), settings=RunSettings(planner="behavior", parameters=parameters))
+
+
+def duration(result: RunResult) -> float:
+    return result.simulated_s
+
+
+class TestInClosedLoop:
+    CAR = "ncap/crossing_car"
+
+    def test_caution_avoids_the_collision_that_no_sensor_announces(self) -> None:
+        blind = drive(self.CAR, Participants="none")
+        careful = drive(self.CAR, Participants="none", Caution="true")
+        assert not blind.passed
+        assert blind.metrics["collision.impact_speed"] > 5.0
+        assert careful.passed
+
+    def test_cooperation_shows_as_less_caution(self) -> None:
+        alone = drive(self.CAR, Participants="none", Caution="true")
+        together = drive(self.CAR, Participants="both", Caution="true")
+        without = drive(self.CAR, Participants="both")
+        assert alone.passed
+        assert together.passed
+        assert duration(together) < duration(alone) - 1.5
+        assert duration(together) == pytest.approx(duration(without), abs=0.5)
+
+    def test_old_messages_do_not_reduce_caution(self) -> None:
+        fresh = drive(self.CAR, Participants="both", Caution="true")
+        old = drive(self.CAR, Participants="both", Caution="true", Latency="0.9")
+        assert duration(old) > duration(fresh) + 0.5
+
+    @pytest.mark.parametrize(("name", "participant"), [("coop/scenario_1", "rsu"), ("coop/scenario_2", "vehicle")])
+    def test_caution_passes_the_scenarios_of_the_paper_with_and_without_messages(
+        self, name: str, participant: str
+    ) -> None:
+        assert not drive(name, Participants="none").passed
+        assert drive(name, Participants="none", Caution="true").passed
+        assert drive(name, Participants=participant, Caution="true").passed
+
+
+def incoming_roads(ways: list[ConflictWay]) -> set[str]:
+    return {way.key[0].road for way in ways if way.kind == "lane"}  # type: ignore[index]
+
+
+class TestConflictWays:
+    """Junction at x = 40 m: roads 1 and 2 are along x, 3 and 4 come from the left and from the right."""
+
+    def test_straight_drive_meets_the_lanes_of_the_crossing_road_and_none_of_the_oncoming_one(self) -> None:
+        ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0))
+        assert incoming_roads(ways) == {"3", "4"}
+        straight = {way.key[0].road: way for way in ways if way.kind == "lane" and way.end - way.start < 3.0}  # type: ignore[index]
+        first = road_map("four_way_junction").lane_pose_at("1", -1, 60.0).x
+        middle = first + (straight["3"].start + straight["3"].end) / 2.0
+        assert middle == pytest.approx(40.25, abs=0.3), "the lane is at x = 40.25"
+        assert straight["4"].start - straight["3"].start == pytest.approx(3.5, abs=0.1)
+        assert straight["3"].points[-1][1] > 100.0, "upstream of the lane from the left"
+        assert straight["4"].points[-1][1] < -100.0, "upstream of the lane from the right"
+
+    def test_vehicle_waits_for_all_lanes_before_the_first_one(self) -> None:
+        ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0))
+        lanes = [way for way in ways if way.kind == "lane"]
+        assert {way.hold for way in lanes} == {min(way.start for way in lanes)}
+
+    def test_pedestrians_come_from_both_ends_of_each_crosswalk(self) -> None:
+        ways = [way for way in ways_of(road_map("four_way_junction"), ("1", -1, 60.0)) if way.kind == "crosswalk"]
+        assert len(ways) == 4
+        for way in ways:
+            assert way.points[0][1] * way.points[-1][1] > 0.0
+            assert abs(way.points[-1][1]) > 5.0
+        assert {math.copysign(1.0, way.points[0][1]) for way in ways} == {1.0, -1.0}
+
+    def test_lights_control_the_ways_of_a_junction_with_signals(self) -> None:
+        assert not any(way.has_light for way in ways_of(road_map("four_way_junction"), ("1", -1, 60.0)))
+        ways = ways_of(road_map("four_way_signals"), ("1", -1, 60.0))
+        assert ways
+        assert all(way.has_light for way in ways)
+
+    def test_road_without_junction_and_crosswalk_has_no_ways(self) -> None:
+        assert ways_of(road_map("two_lane_road"), ("1", -1, 20.0)) == []

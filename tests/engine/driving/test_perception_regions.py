@@ -1,0 +1,115 @@
+"""Sensor information of CPMs, and the perception regions that a receiver derives from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.coverage import ViewSector
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.driving.agent_factory import build_agent
+from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
+from eidrive_scenario.v2x.messages.asn1 import cpm_value
+from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.world.actor import ActorSpec
+
+AHEAD = ViewSector(2.0, 0.0, 1.5, 0.0, math.radians(50.0), 60.0)
+MAST = ActorSpec("RSU", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
+
+
+def cpm(time: float, *, sensors: tuple[ViewSector, ...] | None, x: float = 10.0, yaw: float = 0.0) -> Message:
+    state = StationState(time, x, 5.0, 0.0, yaw, 0.0)
+    return Message("Helper", 0, time, state, Detections(time), 100, sensors=sensors)
+
+
+def station(**settings: object) -> Agent:
+    return build_agent(AgentSettings.model_validate({"fusion": "average", **settings}), MAST, None, seed=0, dt=0.05)
+
+
+def sent(agent: Agent, seconds: float) -> list[Message]:
+    """Return the messages of a station with nothing in sight."""
+    messages: list[Message] = []
+    for tick in range(round(seconds / 0.05)):
+        now = tick * 0.05
+        truth = TruthReading((), (), np.zeros((0, 7)), np.zeros((0, 2)), np.ones(0))
+        ego = EgoState(now, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        messages += agent.act(Readings(now, ego, truth), (), now, None).outbox
+    return messages
+
+
+def test_region_is_placed_at_the_pose_of_the_sender() -> None:
+    store = PerceptionRegionStore(1.0)
+    store.add_message(cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0))
+    (region,) = store.newest(2.3)
+    (sector,) = region.sectors
+    assert (region.station, region.time) == ("Helper", 2.0)
+    assert (sector.x, sector.y, sector.z) == pytest.approx((10.0, 7.0, 1.5))
+    assert sector.yaw == pytest.approx(math.pi / 2.0)
+    assert sector.contains(np.array([10.0, 10.0]), np.array([40.0, -40.0])).tolist() == [True, False]
+
+
+def test_sensor_information_applies_to_later_messages_at_their_pose() -> None:
+    store = PerceptionRegionStore(1.0)
+    store.add_message(cpm(1.0, sensors=None))
+    assert store.newest(1.0) == (), "a sender without sensor information has no region"
+    store.add_message(cpm(1.1, sensors=(AHEAD,)))
+    store.add_message(cpm(1.2, sensors=None, x=30.0))
+    (region,) = store.newest(1.2)
+    assert (region.time, region.sectors[0].x) == (1.2, 32.0)
+
+
+def test_region_expires_and_is_not_replaced_by_an_older_one() -> None:
+    store = PerceptionRegionStore(1.0)
+    store.add_message(cpm(2.0, sensors=(AHEAD,)))
+    store.add_message(cpm(1.5, sensors=(AHEAD,), x=90.0))
+    assert [region.sectors[0].x for region in store.newest(3.0)] == [12.0]
+    assert store.newest(3.1) == ()
+
+
+def test_cam_has_no_region() -> None:
+    store = PerceptionRegionStore(1.0)
+    state = StationState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    store.add_message(Message("Helper", 0, 1.0, state, Detections(1.0), 100, "cam", sensors=(AHEAD,)))
+    assert store.newest(1.0) == ()
+
+
+def test_station_without_sensors_covers_nothing() -> None:
+    store = PerceptionRegionStore(1.0)
+    store.add_message(cpm(1.0, sensors=()))
+    assert store.newest(1.0) == ()
+
+
+def test_each_message_without_generation_rules_has_the_sectors_of_the_detector() -> None:
+    messages = sent(station(range=70.0, field_of_view=120.0), 0.5)
+    assert len(messages) == 10
+    for message in messages:
+        assert message.sensors is not None
+        (sector,) = message.sensors
+        assert (sector.range, sector.half_angle) == (70.0, pytest.approx(math.radians(60.0)))
+
+
+def test_sensor_information_is_sent_once_per_second_by_the_rules_of_etsi() -> None:
+    """T_AddSensorInformation of ETSI TS 103 324 is 1 s."""
+    messages = sent(station(generation="etsi"), 3.2)
+    times = [message.generated for message in messages if message.sensors is not None]
+    assert np.diff(times).tolist() == pytest.approx([1.0] * (len(times) - 1), abs=0.05)
+    assert len(times) >= 3
+
+
+def test_encoded_sensor_has_range_and_opening_angles() -> None:
+    """Units of TR 103 562: 0.1 m, and 0.1 degree counter-clockwise from the axis of the station."""
+    value = cpm_value(cpm(1.0, sensors=(AHEAD,)), 2, "car")
+    first, second = value["cpm"]["cpmParameters"]["sensorInformationContainer"]
+    (properties,) = first["detectionArea"][1]["vehicleSensorPropertyList"]
+    assert properties == {
+        "range": 600,
+        "horizontalOpeningAngleStart": 3100,
+        "horizontalOpeningAngleEnd": 500,
+    }
+    (unknown,) = second["detectionArea"][1]["vehicleSensorPropertyList"]
+    assert unknown["horizontalOpeningAngleStart"] == 3601
