@@ -43,7 +43,7 @@ class ConflictWay(NamedTuple):
     key          identity of the way, the same for each line
     kind         lane or crosswalk;  start, end  of the zone along the line [m]
     has_light    whether a traffic light controls the passage of the vehicle
-    hold         start of the first one of the zones between which there is no room for the vehicle [m]
+    hold         start of the first zone of a group in which the vehicle cannot wait between two zones [m]
     points       places (P, 2) on the way from the zone on upstream [m];  distance  (P,) from the zone [m]
     speed        of traffic on it [m/s];  body  length of a vehicle or pedestrian on it [m]
     """
