@@ -4,6 +4,7 @@ Stable: all names but those of driving stacks (`DrivingStack`, `EmptyStack`, `St
 `StackInputs`, `StackSettings`), which may change in a minor version.
 """
 
+from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planner_settings import PlannerSettings
@@ -33,6 +34,7 @@ __all__ = [
     "EgoState",
     "EmptyStack",
     "Goal",
+    "PerceptionRegion",
     "Plan",
     "Planner",
     "PlannerSettings",
@@ -42,4 +44,5 @@ __all__ = [
     "StackInputs",
     "StackSettings",
     "VehicleController",
+    "ViewSector",
 ]
