@@ -123,7 +123,11 @@ def summary(groups: Sequence[tuple[Group, Sequence[DrivenRun]]]) -> str:
 
 def report(groups: Sequence[tuple[Group, Sequence[DrivenRun]]]) -> str:
     """Return the summary and the table of each group."""
-    return "\n".join([summary(groups), *(f"### {group.title}\n\n{table(runs)}" for group, runs in groups)])
+    return "\n".join([summary(groups), *(f"### {group.title}\n\n{_table(group, runs)}" for group, runs in groups)])
+
+
+def _table(group: Group, runs: Sequence[DrivenRun]) -> str:
+    return table(runs, has_reference=group.reference is not None)
 
 
 def folders(environment: dict[str, str] | os._Environ[str]) -> Path:

@@ -3,10 +3,10 @@
 python -m eidrive_scenario.experiments.driven_files FILE… --drive Ego --reference ALKSController=alks --samples 200
 
 Each file is run with a driving stack for the entity. Of a parameter value distribution, `--samples` runs are taken that
-are spread over all values; combinations that violate the constraints of a parameter do not count. With `--reference`
-each run is repeated without the stack and with that controller model, so that collisions which the reference driver
-avoids are counted separately. The output is the table driven_files.md, and driven_files.jsonl with one line per run;
-`--resume` repeats no run of that file.
+are spread over all values; combinations that violate the constraints of a parameter do not count. With `--reference` a
+run with a contact by own fault is repeated without the stack and with that controller model, so that collisions which
+the reference driver avoids are counted separately. The output is the table driven_files.md, and driven_files.jsonl with
+one line per run; `--resume` repeats no run of that file.
 """
 
 from __future__ import annotations
@@ -184,8 +184,11 @@ COLUMNS = (
 )
 
 
-def table(runs: Iterable[DrivenRun]) -> str:
-    """Return the runs as a Markdown table, one line per file in order of appearance; distances are means."""
+def table(runs: Iterable[DrivenRun], *, has_reference: bool) -> str:
+    """Return the runs as a Markdown table, one line per file in order of appearance; distances are means.
+
+    has_reference  whether runs with a contact by own fault are compared with a reference driver
+    """
     lines = [f"| {' | '.join(COLUMNS)} |", "|---" * len(COLUMNS) + "|"]
     evaluated = [run for run in runs if not run.excluded]
     for file in dict.fromkeys(run.file for run in evaluated):
@@ -195,7 +198,7 @@ def table(runs: Iterable[DrivenRun]) -> str:
         if errors:
             lines.append(f"| {file} | {len(stacks)} | {errors[0]} |{' |' * (len(COLUMNS) - 3)}")
             continue
-        worse = str(len(worse_runs(mine))) if any(run.arm == REFERENCE for run in mine) else "-"
+        worse = str(len(worse_runs(mine))) if has_reference else "-"
         failed = sorted({name for run in stacks for name in run.failed})
         criteria = ", ".join(f"`{name}`" for name in failed) or ("none" if any(run.judged for run in stacks) else "-")
         cells = [
@@ -229,8 +232,29 @@ def read_record(record: Path) -> list[DrivenRun]:
 def run_recorded(
     jobs: Sequence[DrivenJob], record: Path, *, workers: int | None, console: Console, title: str
 ) -> list[DrivenRun]:
-    """Return the runs of all jobs. Those of the record are not repeated; new ones are added to it."""
+    """Return the runs of all jobs; those of the reference driver where the stack has a contact by own fault only.
+
+    Runs of the record are not repeated; new ones are added to it.
+    """
     runs = {(*run.case, run.arm): run for run in read_record(record)}
+    stacks = [job for job in jobs if job.arm == STACK]
+    _add_runs(stacks, runs, record, workers=workers, console=console, title=title)
+    compared = {job.case for job in stacks if runs[(*job.case, STACK)].at_fault}
+    references = [job for job in jobs if job.arm == REFERENCE and job.case in compared]
+    _add_runs(references, runs, record, workers=workers, console=console, title=f"{title}, reference")
+    return [run for job in jobs if (run := runs.get((*job.case, job.arm))) is not None]
+
+
+def _add_runs(
+    jobs: Sequence[DrivenJob],
+    runs: dict[tuple[str, str, int, int, str], DrivenRun],
+    record: Path,
+    *,
+    workers: int | None,
+    console: Console,
+    title: str,
+) -> None:
+    """Add the runs of jobs that are missing to `runs` and to the record."""
     left = [job for job in jobs if (*job.case, job.arm) not in runs]
     for start in range(0, len(left), AT_ONCE):
         some = left[start : start + AT_ONCE]
@@ -239,7 +263,6 @@ def run_recorded(
         with record.open("a", encoding="utf-8") as lines:
             lines.writelines(json.dumps(asdict(run), ensure_ascii=False) + "\n" for run in added)
         runs.update({(*run.case, run.arm): run for run in added})
-    return [runs[(*job.case, job.arm)] for job in jobs]
 
 
 def positive(text: str) -> int:
@@ -303,7 +326,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not options.resume:
         record.unlink(missing_ok=True)
     runs = run_recorded(jobs, record, workers=options.workers, console=Console(stderr=True), title="driven files")
-    result = table(runs)
+    result = table(runs, has_reference=reference is not None)
     (options.out / "driven_files.md").write_text(result, encoding="utf-8")
     sys.stdout.write(result)
 

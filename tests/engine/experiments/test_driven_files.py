@@ -15,6 +15,7 @@ from openscenario_xml import (
     scenario_xml,
     values_xml,
 )
+from rich.console import Console
 from storyboard_xml import end_xml, init_xml, lane_position_xml, speed_xml, teleport_xml
 
 from eidrive_scenario.errors import ConstraintError, Diagnostic
@@ -24,13 +25,16 @@ from eidrive_scenario.experiments.driven_files import (
     DRAWS,
     REFERENCE,
     STACK,
+    DrivenJob,
     DrivenRun,
     jobs_of_file,
     read_record,
+    run_recorded,
     table,
     worse_runs,
 )
 from eidrive_scenario.openscenario import load_distribution
+from eidrive_scenario.simulation import RunSettings
 
 
 def run(arm: str = STACK, number: int = 0, *, file: str = "a.xosc", **given: object) -> DrivenRun:
@@ -58,9 +62,9 @@ def test_table_counts_collisions_of_the_stack_only() -> None:
         run(file="b.xosc", failed=("keep_lane",), judged=2),
         run(file="c.xosc", error="c.xosc:3: no road"),
     ]
-    assert table(runs).splitlines()[2:] == [
+    assert table(runs, has_reference=True).splitlines()[2:] == [
         "| a.xosc | 2 | 2 | 2 | 1 | 150 | 8.0 | - |",
-        "| b.xosc | 1 | 0 | 0 | - | 0 | 0.0 | `keep_lane` |",
+        "| b.xosc | 1 | 0 | 0 | 0 | 0 | 0.0 | `keep_lane` |",
         "| c.xosc | 1 | c.xosc:3: no road | | | | | |",
     ]
 
@@ -69,6 +73,30 @@ def test_worse_runs_are_those_that_the_reference_avoids() -> None:
     runs = [run(number=n, at_fault=True, collided=True) for n in range(3)]
     runs += [run(REFERENCE, 0), run(REFERENCE, 1, collided=True), run(REFERENCE, 2, error="none")]
     assert worse_runs(runs) == runs[:1]
+
+
+def test_reference_driver_repeats_runs_with_a_contact_by_own_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[tuple[int, str]] = []
+
+    def run_of(job: DrivenJob) -> DrivenRun:
+        done.append((job.number, job.arm))
+        contact = job.number in (1, 2)
+        return run(job.arm, job.number, collided=contact, at_fault=contact and job.number == 1)
+
+    monkeypatch.setattr(driven_files, "run_of", run_of)
+    jobs = [
+        DrivenJob("a.xosc", arm, 1, RunSettings(), "a.xosc", number, "Ego")
+        for number in range(3)
+        for arm in (STACK, REFERENCE)
+    ]
+    record = tmp_path / "record.jsonl"
+    runs = run_recorded(jobs, record, workers=1, console=Console(quiet=True), title="x")
+    assert done == [(0, STACK), (1, STACK), (2, STACK), (1, REFERENCE)]
+    assert [(one.number, one.arm) for one in runs] == [(0, STACK), (1, STACK), (1, REFERENCE), (2, STACK)]
+    assert run_recorded(jobs, record, workers=1, console=Console(quiet=True), title="x") == runs
+    assert len(done) == 4
 
 
 def test_summary_has_a_line_per_group() -> None:
