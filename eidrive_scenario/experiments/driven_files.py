@@ -42,8 +42,6 @@ TIME_LIMIT = 60.0
 DRAWS = 20
 """Maximum number of combinations that are drawn per requested sample: each is read, and all may violate constraints."""
 REFERENCE_OPTION = "--reference"
-AT_ONCE = 20
-"""Number of runs after which the record is extended."""
 
 
 @dataclass(frozen=True)
@@ -256,13 +254,14 @@ def _add_runs(
 ) -> None:
     """Add the runs of jobs that are missing to `runs` and to the record."""
     left = [job for job in jobs if (*job.case, job.arm) not in runs]
-    for start in range(0, len(left), AT_ONCE):
-        some = left[start : start + AT_ONCE]
-        done = f"{title}, {start + len(some)} of {len(left)}"
-        added = run_jobs(some, run_of, workers=workers, console=console, title=done)
-        with record.open("a", encoding="utf-8") as lines:
-            lines.writelines(json.dumps(asdict(run), ensure_ascii=False) + "\n" for run in added)
-        runs.update({(*run.case, run.arm): run for run in added})
+    with record.open("a", encoding="utf-8") as lines:
+
+        def add(run: DrivenRun) -> None:
+            lines.write(json.dumps(asdict(run), ensure_ascii=False) + "\n")
+            lines.flush()
+            runs[(*run.case, run.arm)] = run
+
+        run_jobs(left, run_of, workers=workers, console=console, title=title, finished=add)
 
 
 def positive(text: str) -> int:

@@ -90,7 +90,8 @@ def test_each_message_without_generation_rules_has_the_sectors_of_the_detector()
     for message in messages:
         assert message.sensors is not None
         (sector,) = message.sensors
-        assert (sector.range, sector.half_angle) == (70.0, pytest.approx(math.radians(60.0)))
+        assert sector.range == 70.0
+        assert sector.half_angle == pytest.approx(math.radians(60.0))
 
 
 def test_sensor_information_is_sent_once_per_second_by_the_rules_of_etsi() -> None:

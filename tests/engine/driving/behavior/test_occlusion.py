@@ -51,7 +51,7 @@ class TestOccluders:
     BOX = Occluders.of_boxes(np.array([[10.0, 0.0, 1.0, 2.0, 2.0, 2.0, 0.0]]))
 
     def blocked(self, eye: ViewSector, *places: tuple[float, float]) -> list[bool]:
-        return self.BOX.block(eye, np.array(places), 0.0).tolist()
+        return [bool(hidden) for hidden in self.BOX.block(eye, np.array(places), 0.0)]
 
     def test_place_behind_a_box_is_hidden_and_one_beside_its_shadow_is_not(self) -> None:
         # The shadow of the edges at x = 9, y = ±1 is bounded by y = x / 9.
@@ -160,7 +160,9 @@ def road_map(name: str) -> RoadNetwork:
 def ways_of(roads: RoadNetwork, start: tuple[str, int, float], length: float = 120.0) -> list[ConflictWay]:
     """Return the ways that meet a drive straight on from a lane position."""
     here = roads.location(*start)
-    first, last = roads.pose(here), roads.pose(roads.advance(here, length))
+    there = roads.advance(here, length)
+    assert there is not None
+    first, last = roads.pose(here), roads.pose(there)
     count = int(math.hypot(last.x - first.x, last.y - first.y)) + 1
     points = np.column_stack([np.linspace(first.x, last.x, count), np.linspace(first.y, last.y, count)])
     line = ReferenceLine(PlannedPath(points, ends=True), roads)
