@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
+from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +22,12 @@ SIMILAR_TURN = 0.6
 """Maximum difference of the turn of a branch to the smallest turn at which it is likely, too [rad]."""
 MOST = 4
 """Maximum number of courses from one lane."""
+
+
+FASTEST_TURN = 7.0
+"""Maximum lateral acceleration of a vehicle that follows a course [m/s²], near the limit of adhesion."""
+FASTEST_STOP = 6.0
+"""Maximum deceleration before a curve [m/s²]."""
 
 
 class Course:
@@ -55,6 +63,29 @@ class Course:
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
         ahead = (x - x0) * ux + (y - y0) * uy
         return float(self.along[index]) + ahead, (y - y0) * ux - (x - x0) * uy, math.atan2(uy, ux)
+
+    def can_follow(self, along: float, speed: float) -> bool:
+        """Return whether a vehicle with a speed [m/s] at a distance along the course can pass the curves ahead."""
+        return speed <= self._fastest[max(bisect_right(self._places, along) - 1, 0)]
+
+    @cached_property
+    def _places(self) -> list[float]:
+        found: list[float] = self.along.tolist()
+        return found
+
+    @cached_property
+    def _fastest(self) -> list[float]:
+        """Maximum speed at each point from which a vehicle can pass the curves ahead [m/s]."""
+        turn = np.abs(np.diff(np.unwrap(self._heading)))
+        length = (self.along[2:] - self.along[:-2]) / 2.0
+        curvature = np.concatenate([[0.0], turn / np.maximum(length, 1e-9), [0.0]])
+        # The mean of neighbors: the course has an angle at each of its points, and a lane may begin with one.
+        curvature = np.convolve(curvature, np.ones(3) / 3.0, mode="same") if len(curvature) > 3 else curvature
+        speeds: list[float] = np.sqrt(FASTEST_TURN / np.maximum(curvature, 1e-6)).tolist()
+        steps: list[float] = np.diff(self.along).tolist()
+        for index in range(len(steps) - 1, -1, -1):
+            speeds[index] = min(speeds[index], math.sqrt(speeds[index + 1] ** 2 + 2.0 * FASTEST_STOP * steps[index]))
+        return speeds
 
     def poses(self, along: Array, left: Array | float) -> tuple[Array, Array, Array]:
         """Return x, y and heading (K,) at distances along the course and offsets to the left; straight beyond it."""

@@ -119,8 +119,11 @@ class Predictor:
             x, y, yaw = (np.full(len(times), value) for value in (known.x, known.y, known.yaw))
             return [Hypothesis((x, y, yaw), speed)]
         found: list[Hypothesis] = []
+        too_fast: list[Hypothesis] = []
+        """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         direction = math.atan2(known.vy, known.vx)
-        is_unknown = known.speed < SPEED_ERROR * known.error
+        noise = SPEED_ERROR * known.error
+        is_unknown = known.speed < noise
         for course in courses:
             along, left, heading = course.place(known.x, known.y)
             turn = float(wrap_angle(direction - heading))
@@ -135,9 +138,11 @@ class Predictor:
             way, speeds = _held_by_sign(known, course, along, times) or (travelled, speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
-            found.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead))
+            fits = known.speed <= noise or course.can_follow(along, known.speed - noise)
+            (found if fits else too_fast).append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead))
             if len(found) == MOST_HYPOTHESES:
                 break
+        found = found or too_fast
         if not found:
             x, y = known.x + math.cos(direction) * travelled, known.y + math.sin(direction) * travelled
             found.append(Hypothesis((x, y, np.full(len(times), direction)), speed))

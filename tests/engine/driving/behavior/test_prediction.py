@@ -11,9 +11,11 @@ from planned_drive import KnownBox, detections
 from signal_street import stop_sign
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.behavior.lane_courses import Course
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor, longitudinal_motion, stopping_motion
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 
 TIMES = np.arange(0.0, 8.01, 0.25)
@@ -152,3 +154,39 @@ def test_stopping_motion_ends_at_its_place() -> None:
     np.testing.assert_allclose(way[TIMES <= 1.75], 8.0 * TIMES[TIMES <= 1.75])
     assert speed[TIMES == 3.75] == pytest.approx(4.0)
     assert (way[-1], speed[-1]) == pytest.approx((30.0, 0.0))
+
+
+def test_vehicle_follows_a_curve_up_to_the_limit_of_adhesion_and_of_its_brakes() -> None:
+    """In a curve of radius R up to √(7 R) m/s, and s meters before it up to √(7 R + 2 · 6 s) m/s."""
+    radius, straight = 20.0, 40.0
+    angle = np.linspace(0.0, math.pi / 2.0, 16)
+    bend = np.column_stack([straight + radius * np.sin(angle), radius * (1.0 - np.cos(angle))])
+    points = np.concatenate([np.column_stack([np.arange(0.0, straight, 2.0), np.zeros(20)]), bend])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    course = Course(points, along, 1.75)
+    for place, limit in ((50.0, math.sqrt(7.0 * radius)), (20.0, math.sqrt(7.0 * radius + 2.0 * 6.0 * 20.0))):
+        assert course.can_follow(place, 0.95 * limit)
+        assert not course.can_follow(place, 1.08 * limit)
+    assert course.can_follow(-5.0, 5.0)
+
+
+@pytest.mark.parametrize(("speed", "turns"), [(5.0, True), (14.0, False)])
+def test_fast_vehicle_in_a_junction_is_not_predicted_to_turn(speed: float, turns: bool) -> None:
+    """The connecting lanes of the junction overlap at its entry; the right turn has a radius of about 9 m."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    pose = roads.lane_pose_at("101", -1, 1.0)
+    box = KnownBox(pose.x, pose.y, speed * math.cos(pose.h), speed * math.sin(pose.h), yaw=pose.h)
+    found = Predictor(roads, TIMES).predict(known(box))
+    change = np.abs(np.angle(np.exp(1j * (found.yaw[:, -1] - pose.h))))
+    assert (change < 0.1).any(), "straight on"
+    assert bool((change > 1.0).any()) == turns
+
+
+def test_vehicle_that_is_too_fast_for_its_only_lane_is_predicted_along_it() -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml(length=250.0, curvature=1.0 / 50.0)))
+    pose = roads.lane_pose_at("1", -1, 10.0)
+    box = KnownBox(pose.x, pose.y, 30.0 * math.cos(pose.h), 30.0 * math.sin(pose.h), yaw=pose.h)
+    found = Predictor(roads, TIMES).predict(known(box))
+    assert found.objects == (0,)
+    turned = np.unwrap(found.yaw[0])[-1] - pose.h
+    assert turned == pytest.approx(30.0 * 8.0 / 51.75, rel=0.1), "along the curve, not straight on"
