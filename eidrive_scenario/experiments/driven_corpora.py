@@ -19,15 +19,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from eidrive_scenario.experiments.driven_files import (
-    STACK,
-    DrivenRun,
-    jobs_of_file,
-    positive,
-    run_recorded,
-    table,
-    worse_runs,
-)
+from eidrive_scenario.experiments.driven_files import positive, table, worse_runs
+from eidrive_scenario.experiments.driven_runs import STACK, DrivenRun, jobs_of_file, run_recorded
 
 CORPORA, MAPS = "EIDRIVE_CORPORA", "EIDRIVE_MAPS"
 """Environment variables with the folders of the corpora and of the maps."""

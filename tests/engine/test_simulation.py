@@ -228,7 +228,7 @@ def test_observers_are_closed_even_if_one_raises() -> None:
 
 
 @pytest.mark.parametrize(("x", "touches"), [(4.4, True), (4.6, False)])
-def test_actor_that_an_action_adds_inside_of_a_standing_one_is_a_collision(x: float, touches: bool) -> None:
+def test_actor_added_inside_of_a_standing_one_is_a_collision(x: float, touches: bool) -> None:
     """The bodies are 4.5 m long; the event of 0.5 s adds Other, which the next view shows."""
     place = f"<AddEntityAction><Position>{world_position_xml(x)}</Position></AddEntityAction>"
     action = global_xml(f'<EntityAction entityRef="Other">{place}</EntityAction>')

@@ -19,9 +19,10 @@ from rich.console import Console
 from storyboard_xml import end_xml, init_xml, lane_position_xml, speed_xml, teleport_xml
 
 from eidrive_scenario.errors import ConstraintError, Diagnostic
-from eidrive_scenario.experiments import driven_corpora, driven_files
+from eidrive_scenario.experiments import driven_corpora, driven_files, driven_runs
 from eidrive_scenario.experiments.driven_corpora import GROUPS, Group, summary
-from eidrive_scenario.experiments.driven_files import (
+from eidrive_scenario.experiments.driven_files import table, worse_runs
+from eidrive_scenario.experiments.driven_runs import (
     DRAWS,
     REFERENCE,
     STACK,
@@ -30,8 +31,6 @@ from eidrive_scenario.experiments.driven_files import (
     jobs_of_file,
     read_record,
     run_recorded,
-    table,
-    worse_runs,
 )
 from eidrive_scenario.openscenario import load_distribution
 from eidrive_scenario.simulation import RunSettings
@@ -85,7 +84,7 @@ def test_reference_driver_repeats_runs_with_a_contact_by_own_fault(
         contact = job.number in (1, 2)
         return run(job.arm, job.number, collided=contact, at_fault=contact and job.number == 1)
 
-    monkeypatch.setattr(driven_files, "run_of", run_of)
+    monkeypatch.setattr(driven_runs, "run_of", run_of)
     jobs = [
         DrivenJob("a.xosc", arm, 1, RunSettings(), "a.xosc", number, "Ego")
         for number in range(3)
@@ -222,7 +221,7 @@ def test_number_of_combinations_without_a_valid_one_is_limited(tmp_path: Path, m
         raise ConstraintError(Diagnostic("outside its constraints"))
 
     path = write_variation(tmp_path, 20)
-    monkeypatch.setattr(driven_files, "load_scenario", violating)
+    monkeypatch.setattr(driven_runs, "load_scenario", violating)
     assert not numbers(path, 2)
     assert len(read) == 2 * DRAWS
 

@@ -181,7 +181,7 @@ def test_contact_of_an_actor_that_is_added_inside_of_a_standing_one(
     assert not [one for one in world.view().contacts if {one.first, one.second} == {"A", "B"}], "reported once"
 
 
-def test_contact_of_an_actor_that_is_added_before_the_view_is_part_of_it(world: World, car: CarFactory) -> None:
+def test_view_has_the_contacts_of_actors_added_before_it(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0))
     world.add(car("B"), Placement(1.0, 0.0))
     assert len(world.view().contacts) == 1

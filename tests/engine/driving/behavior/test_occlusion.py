@@ -53,7 +53,7 @@ class TestOccluders:
     def blocked(self, eye: ViewSector, *places: tuple[float, float]) -> list[bool]:
         return [bool(hidden) for hidden in self.BOX.block(eye, np.array(places), 0.0)]
 
-    def test_place_behind_a_box_is_hidden_and_one_beside_its_shadow_is_not(self) -> None:
+    def test_place_behind_a_box_is_hidden(self) -> None:
         # The shadow of the edges at x = 9, y = ±1 is bounded by y = x / 9.
         eye = ViewSector(0.0, 0.0, 1.0, 0.0, math.pi, 100.0)
         assert self.blocked(eye, (18.0, 1.9), (18.0, 2.1), (18.0, -1.9), (5.0, 0.0), (-18.0, 0.0)) == [
@@ -84,7 +84,7 @@ class TestOccluders:
 
 
 class TestPossibleTraffic:
-    def test_traffic_enters_a_seen_lane_at_its_end_with_the_speed_of_the_lane(self) -> None:
+    def test_traffic_enters_a_seen_lane_at_its_end(self) -> None:
         way, traffic = lane(40.0, speed=10.0), PossibleTraffic()
         shown, hidden = np.ones(20, dtype=bool), np.zeros(20, dtype=bool)
         assert traffic.first(way, shown, 0.0) == math.inf
@@ -219,7 +219,7 @@ def incoming_roads(ways: list[ConflictWay]) -> set[str]:
 class TestConflictWays:
     """Junction at x = 40 m: roads 1 and 2 are along x, 3 and 4 come from the left and from the right."""
 
-    def test_straight_drive_meets_the_lanes_of_the_crossing_road_and_none_of_the_oncoming_one(self) -> None:
+    def test_straight_drive_meets_the_lanes_of_the_crossing_road_only(self) -> None:
         ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0))
         assert incoming_roads(ways) == {"3", "4"}
         straight = {way.key[0].road: way for way in ways if way.kind == "lane" and way.end - way.start < 3.0}  # type: ignore[index]

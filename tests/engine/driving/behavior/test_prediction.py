@@ -156,7 +156,7 @@ def test_stopping_motion_ends_at_its_place() -> None:
     assert (way[-1], speed[-1]) == pytest.approx((30.0, 0.0))
 
 
-def test_vehicle_follows_a_curve_up_to_the_limit_of_adhesion_and_of_its_brakes() -> None:
+def test_vehicle_follows_curves_up_to_the_limits_of_grip_and_brakes() -> None:
     """In a curve of radius R up to √(7 R) m/s, and s meters before it up to √(7 R + 2 · 6 s) m/s."""
     radius, straight = 20.0, 40.0
     angle = np.linspace(0.0, math.pi / 2.0, 16)
@@ -182,7 +182,7 @@ def test_fast_vehicle_in_a_junction_is_not_predicted_to_turn(speed: float, turns
     assert bool((change > 1.0).any()) == turns
 
 
-def test_vehicle_that_is_too_fast_for_its_only_lane_is_predicted_along_it() -> None:
+def test_vehicle_too_fast_for_its_only_lane_follows_it() -> None:
     roads = RoadNetwork.parse(map_xml(road_xml(length=250.0, curvature=1.0 / 50.0)))
     pose = roads.lane_pose_at("1", -1, 10.0)
     box = KnownBox(pose.x, pose.y, 30.0 * math.cos(pose.h), 30.0 * math.sin(pose.h), yaw=pose.h)
