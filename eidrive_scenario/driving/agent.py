@@ -190,11 +190,11 @@ class Agent:
             sender = message.sender
             if sender == self.name and (not own_perception or message.kind == "cam"):
                 continue
+            if self._regions is not None:
+                self._regions.add_message(message)
             if self.points is not None and message.points is not None and sender != self.name:
                 self.points.add_points(sender, message.points, self._own_body(message.points.time))
                 continue
-            if self._regions is not None:
-                self._regions.add_message(message)
             detections = _numbered(message)
             if sender != self.name:
                 detections = self._without_own_body(detections)

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
+from planned_drive import two_lane_road
+from sample_car import CAR
 
-from eidrive_scenario.coverage import ViewSector
+from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 from eidrive_scenario.v2x.messages.asn1 import cpm_value
-from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.point_cloud import compress
 from eidrive_scenario.world.actor import ActorSpec
 
 AHEAD = ViewSector(2.0, 0.0, 1.5, 0.0, math.radians(50.0), 60.0)
@@ -114,3 +120,22 @@ def test_encoded_sensor_has_range_and_opening_angles() -> None:
     }
     (unknown,) = second["detectionArea"][1]["vehicleSensorPropertyList"]
     assert unknown["horizontalOpeningAngleStart"] == 3601
+
+
+def test_message_with_shared_points_has_a_region(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the first message of a second lists the sensors, and may be the one with the points."""
+    settings = AgentSettings.model_validate({"fusion": "average", "planner": "behavior", "target_speed": 5.0})
+    settings = settings.model_copy(update={"planner_settings": BehaviorSettings(caution=True)})
+    agent = build_agent(settings, CAR, two_lane_road(), seed=0, dt=0.05)
+    seen: list[PerceptionRegion] = []
+    assert agent.planner is not None
+    monkeypatch.setattr(agent.planner, "observe_regions", seen.extend)
+    monkeypatch.setattr(
+        agent, "points", SimpleNamespace(add_points=lambda *_: None, perceive=lambda *_: None, own=None)
+    )
+    points = compress(np.zeros((1, 3)), 0.0, 0.1)
+    message = replace(cpm(0.0, sensors=(AHEAD,)), points=points)
+    truth = TruthReading((), (), np.zeros((0, 7)), np.zeros((0, 2)), np.ones(0))
+    ego = EgoState(0.0, np.array([20.0, -1.75, 0.0]), 0.0, 0.0, 0.0, 5.0, 0.0, 0.0)
+    agent.act(Readings(0.0, ego, truth), (ReceivedMessage(message, 0.0),), 0.0, None)
+    assert [region.station for region in seen] == ["Helper"]
