@@ -15,6 +15,9 @@ NOT_ESTIMATED.flags.writeable = False
 
 CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
 
+VULNERABLE = frozenset({"pedestrian", "bicycle", "motorbike"})
+"""Classes of vulnerable road users."""
+
 
 class Detections(msgspec.Struct, frozen=True):
     """Perceived objects at one instant.

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 
-import numpy as np
 from msgspec.structs import replace
 
-from eidrive_scenario.arrays import Array
 from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
+from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
 from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
 from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
@@ -30,10 +28,6 @@ from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
-
-EGO_BODY_MARGIN = 0.9
-"""Maximum distance of a reported box center from the ego outline at which the box is the ego body [m]. It is half the
-width of a car: the center of another car is closer only after a collision."""
 
 REGION_LIFETIME = 1.0
 """Time for which a perception region counts as perceived [s]."""
@@ -88,10 +82,7 @@ class Agent:
             self._regions = PerceptionRegionStore(REGION_LIFETIME)
             everywhere = ViewSector(*spec.offset, 0.0, math.pi, math.inf)
             self._view = (everywhere,) if planner.view is None else planner.view
-        self._own_places: deque[tuple[float, float, float, float, float]] = deque(
-            maxlen=math.ceil(settings.lifetime(complete=False) / dt) + 2
-        )
-        """Time [s], center of the body and height of its reference point [m], heading [rad]."""
+        self._own_body = OwnBody(spec, duration=settings.lifetime(complete=False), dt=dt)
 
     @property
     def error_subject(self) -> str:
@@ -129,7 +120,7 @@ class Agent:
         own_perception = own_perception and self.receives_messages
         readings = self.perception.locate(readings)
         ego = readings.ego
-        self._record_ego_pose(ego)
+        self._own_body.record(ego)
         fresh = self.perception.perceive(readings)
         if fresh is not None:
             self._detections = fresh
@@ -168,20 +159,10 @@ class Agent:
             estimate=None if self.perception.has_exact_pose else ego,
         )
 
-    def _record_ego_pose(self, ego: EgoState) -> None:
-        x, y, z = ego.position.tolist()
-        cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-        ahead, aside, _ = self.spec.offset
-        self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
-
     def _add_own_region(self, time: float) -> None:
         """Store the region that the own sensors perceived at `time` [s]."""
         if self._regions is not None:
-            x, y, z, yaw = self._own_place(time)
-            cos, sin = math.cos(yaw), math.sin(yaw)
-            ahead, aside, _ = self.spec.offset
-            pose = (x - cos * ahead + sin * aside, y - sin * ahead - cos * aside, z, yaw)
-            self._regions.add(self.name, time, pose, self._view)
+            self._regions.add(self.name, time, self._own_body.reference_pose(time), self._view)
 
     def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float, own_perception: bool) -> None:
         """Store the newest report of each sender, and delete reports that exceed their lifetime."""
@@ -193,11 +174,11 @@ class Agent:
             if self._regions is not None:
                 self._regions.add_message(message)
             if self.points is not None and message.points is not None and sender != self.name:
-                self.points.add_points(sender, message.points, self._own_body(message.points.time))
+                self.points.add_points(sender, message.points, self._own_body.box(message.points.time))
                 continue
             detections = _numbered(message)
             if sender != self.name:
-                detections = self._without_own_body(detections)
+                detections = self._without_own_body(message, detections)
             station = sender if message.kind == "cpm" else sender + SENDER_REPORT_SUFFIX
             report = Report(station, detections, received.arrived, message.state, complete=message.objects is None)
             self._lifetimes[station] = self.settings.lifetime(complete=report.complete and message.kind == "cpm")
@@ -211,7 +192,7 @@ class Agent:
         memory = self._partial.get(message.sender)
         if memory is None:
             memory = self._partial[message.sender] = PartialReportAssembler(self.settings.lifetime(complete=False))
-        return self._without_own_body(memory.update(message))
+        return self._without_own_body(message, memory.update(message))
 
     def _accept_report(self, report: Report, completed: Detections | None = None) -> None:
         """Pass a report to the fusion method, and store it unless a newer one of its station is stored.
@@ -225,35 +206,18 @@ class Agent:
         if held is None or report.detections.time >= held.detections.time:
             self._reports[report.station] = report
 
-    def _without_own_body(self, detections: Detections) -> Detections:
-        """Return received detections without the box of the ego body, for which the vehicle must not brake.
-
-        The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
-        """
-        if not len(detections):
-            return detections
-        x, y, _, yaw = self._own_place(detections.time)
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        half_length, half_width = self.spec.size[0] / 2.0 + EGO_BODY_MARGIN, self.spec.size[1] / 2.0 + EGO_BODY_MARGIN
-        others = [
-            row
-            for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist())
-            if abs(cos * (bx - x) + sin * (by - y)) > half_length or abs(cos * (by - y) - sin * (bx - x)) > half_width
-        ]
-        return detections if len(others) == len(detections) else detections.subset(others)
-
-    def _own_place(self, time: float) -> tuple[float, float, float, float]:
-        """Return center, height and heading of the ego body at the last instant up to `time`, or at the first one."""
-        for held in reversed(self._own_places):
-            if held[0] <= time + TIME_TOLERANCE:
-                return held[1:]
-        return self._own_places[0][1:]
-
-    def _own_body(self, time: float) -> Array:
-        """Return the box (7,) of the ego outline at that time, with a margin that covers objects on the body."""
-        x, y, z, yaw = self._own_place(time)
-        length, width, height = self.spec.size
-        return np.array([x, y, z, length + EGO_BODY_MARGIN, width + EGO_BODY_MARGIN, 4.0 * height, yaw])
+    def _without_own_body(self, message: Message, detections: Detections) -> Detections:
+        """Return detections of a message without the ego body."""
+        if message.kind != "cpm" or message.sender == self.name:
+            return self._own_body.without(detections)
+        own = self._reports.get(self.name)
+        return self._own_body.without_perceived(
+            detections,
+            message.sender,
+            message.state,
+            None if own is None else own.detections,
+            self.perception.pose_covariance,
+        )
 
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:

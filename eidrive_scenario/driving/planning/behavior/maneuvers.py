@@ -7,11 +7,12 @@ import math
 import msgspec
 import numpy as np
 
+from eidrive_scenario.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, passing, towards
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
-from eidrive_scenario.driving.planning.behavior.surroundings import VULNERABLE, Surroundings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
 SLOWER = 2.0
 """Difference to the wanted speed from which on a slower vehicle is passed [m/s]."""

@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 
-VULNERABLE = frozenset({"pedestrian", "bicycle", "motorbike"})
 LARGEST_LATERAL_ERROR = 0.75
 """Maximum enlargement of an object to the side [m]: half of what a lane leaves beside a car, else neighbors block."""
 LARGEST_ERROR_ALONG = 3.0

@@ -1,0 +1,178 @@
+"""Identification of the ego body among received objects."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import VULNERABLE, Detections
+from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate
+from eidrive_scenario.fusion.tracks import pose_part
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.v2x.messages.message import StationState
+from eidrive_scenario.world.actor import ActorSpec
+
+BODY_MARGIN = 0.9
+"""Maximum distance of a reported box center from the ego outline at which the box is the ego body [m]. It is half the
+width of a car: the center of another car is closer only after a collision."""
+
+GATE = AssociationGate.of(0.99, 0.0)
+"""Gate of the offset between a reported object and the ego body, given the covariances of both."""
+
+
+class OwnBody:
+    """Ego body in the recent past, and the objects of other stations that are this body."""
+
+    def __init__(self, spec: ActorSpec, *, duration: float, dt: float) -> None:
+        """Store the places of the last `duration` seconds.
+
+        dt  time between two places [s]
+        """
+        self._spec = spec
+        self._vulnerable = spec.category in VULNERABLE
+        self._places: deque[tuple[float, float, float, float, float]] = deque(maxlen=math.ceil(duration / dt) + 2)
+        """Time [s], center of the body and height of its reference point [m], heading [rad]."""
+        self._tracks: dict[str, int] = {}
+        """Object id of the ego body at each station."""
+
+    def record(self, ego: EgoState) -> None:
+        """Store the place of the body."""
+        x, y, z = ego.position.tolist()
+        cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+        ahead, aside, _ = self._spec.offset
+        self._places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
+
+    def place(self, time: float) -> tuple[float, float, float, float]:
+        """Return center, height [m] and heading [rad] of the body at the last instant up to `time`, or the first."""
+        for held in reversed(self._places):
+            if held[0] <= time + TIME_TOLERANCE:
+                return held[1:]
+        return self._places[0][1:]
+
+    def reference_pose(self, time: float) -> tuple[float, float, float, float]:
+        """Return position [m] and heading [rad] of the reference point at that time."""
+        x, y, z, yaw = self.place(time)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        ahead, aside, _ = self._spec.offset
+        return x - cos * ahead + sin * aside, y - sin * ahead - cos * aside, z, yaw
+
+    def box(self, time: float) -> Array:
+        """Return the box (7,) of the outline at that time, with a margin that covers objects on the body."""
+        x, y, z, yaw = self.place(time)
+        length, width, height = self._spec.size
+        return np.array([x, y, z, length + BODY_MARGIN, width + BODY_MARGIN, 4.0 * height, yaw])
+
+    def without(self, detections: Detections) -> Detections:
+        """Return received detections without the boxes on the ego outline, for which the vehicle must not brake.
+
+        The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
+        """
+        inside = self._rows_on_outline(detections)
+        return _without_rows(detections, inside) if inside else detections
+
+    def without_perceived(
+        self,
+        detections: Detections,
+        station: str,
+        state: StationState | None,
+        own: Detections | None,
+        pose_covariance: Array | None,
+    ) -> Detections:
+        """Return detections of another station without the ego body as that station perceives it.
+
+        A camera measures the distance of a far vehicle with an error of several meters, so that the body can be
+        reported beside the outline. If no box is on the outline, the likeliest vehicle within the gate is the body,
+        unless an own detection explains it better: a station reports each object once. It remains the body for as
+        long as the station tracks it.
+
+        state            pose of the station, whose covariance adds to that of its objects
+        own              newest own detections
+        pose_covariance  (3, 3) of the own x, y and yaw; None: the pose is exact
+        """
+        inside = self._rows_on_outline(detections)
+        if inside:
+            if len(inside) == 1 and detections.tracks:
+                self._tracks[station] = detections.tracks[inside[0]]
+            return _without_rows(detections, inside)
+        row = self._likeliest_row(detections, self._tracks.get(station), state, own, pose_covariance)
+        if row is None:
+            return detections
+        if detections.tracks:
+            self._tracks[station] = detections.tracks[row]
+        return _without_rows(detections, [row])
+
+    def _rows_on_outline(self, detections: Detections) -> list[int]:
+        if not len(detections):
+            return []
+        x, y, _, yaw = self.place(detections.time)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        half_length, half_width = self._spec.size[0] / 2.0 + BODY_MARGIN, self._spec.size[1] / 2.0 + BODY_MARGIN
+        return [
+            row
+            for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist())
+            if abs(cos * (bx - x) + sin * (by - y)) <= half_length
+            and abs(cos * (by - y) - sin * (bx - x)) <= half_width
+        ]
+
+    def _likeliest_row(
+        self,
+        detections: Detections,
+        track: int | None,
+        state: StationState | None,
+        own: Detections | None,
+        pose_covariance: Array | None,
+    ) -> int | None:
+        """Return the row of the likeliest object within the gate, or None."""
+        body: Array | None = None
+        best: tuple[float, int] | None = None
+        for row, kind in enumerate(detections.classes):
+            if (kind in VULNERABLE) is not self._vulnerable:
+                continue
+            covariance = detections.covariance[row]
+            if not math.isfinite(covariance[0, 0]):
+                continue
+            if body is None:
+                body = np.array(self.place(detections.time)[:2])
+            if state is not None and state.pose_covariance is not None:
+                point = detections.boxes[row : row + 1, :2]
+                covariance = covariance + pose_part(point, state.x, state.y, state.pose_covariance)[0]
+            position = detections.boxes[row, :2]
+            spread = covariance if pose_covariance is None else covariance + pose_covariance[:2, :2]
+            distance, cost = _squared_mahalanobis(position - body, spread)
+            known = track is not None and bool(detections.tracks) and detections.tracks[row] == track
+            if distance > (UNASSIGNED_GATE if known else GATE.chi_square) or (best is not None and cost >= best[0]):
+                continue
+            if not _explained(position, covariance, detections.time, cost, own):
+                best = cost, row
+        return None if best is None else best[1]
+
+
+def _explained(position: Array, covariance: Array, time: float, cost: float, own: Detections | None) -> bool:
+    """Return whether an own detection is likelier than this cost to be the object."""
+    if own is None or not len(own):
+        return False
+    places = own.boxes[:, :2] + np.nan_to_num(own.velocity) * (time - own.time)
+    for place, other in zip(places, own.covariance, strict=True):
+        if math.isfinite(other[0, 0]) and _squared_mahalanobis(position - place, covariance + other)[1] <= cost:
+            return True
+    return False
+
+
+def _squared_mahalanobis(offset: Array, covariance: Array) -> tuple[float, float]:
+    """Return the squared Mahalanobis distance, and the negative log-likelihood of the offset without constants."""
+    (xx, xy), (_, yy) = covariance.tolist()
+    x, y = offset.tolist()
+    determinant = xx * yy - xy * xy
+    if determinant <= 0.0:
+        return math.inf, math.inf
+    distance = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
+    return distance, distance + math.log(determinant)
+
+
+def _without_rows(detections: Detections, rows: Sequence[int]) -> Detections:
+    return detections.subset([row for row in range(len(detections)) if row not in rows])

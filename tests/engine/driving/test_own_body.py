@@ -1,0 +1,115 @@
+"""Identification of the ego body among received objects, by the covariances of both."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.communication.own_body import OwnBody
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.v2x.messages.message import StationState
+from eidrive_scenario.world.actor import ActorSpec
+
+Place = tuple[float, float]
+FAR_CAMERA = np.diag([3.7**2, 0.4**2])
+"""Covariance of a vehicle 40 m ahead of a camera that looks along x [m²]."""
+
+
+def body(car: ActorSpec, yaw: float = 0.0) -> OwnBody:
+    """Ego whose body center is at the origin at time 0."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    ahead = car.offset[0]
+    own = OwnBody(car, duration=1.0, dt=0.05)
+    own.record(EgoState(0.0, np.array([-ahead * cos, -ahead * sin, 0.0]), yaw, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return own
+
+
+def seen(
+    *places: Place, kind: str = "car", covariance: Array = FAR_CAMERA, tracks: tuple[int, ...] = (), time: float = 0.0
+) -> Detections:
+    count = len(places)
+    return Detections(
+        time,
+        np.array([(x, y, 0.8, 4.6, 1.8, 1.5, 0.0) for x, y in places]).reshape(count, 7),
+        np.ones(count),
+        (kind,) * count,
+        np.zeros((count, 2)),
+        np.repeat(covariance[None], count, axis=0),
+        tracks,
+    )
+
+
+def kept(
+    own: OwnBody,
+    found: Detections,
+    *,
+    state: StationState | None = None,
+    perceived: Detections | None = None,
+    pose_covariance: Array | None = None,
+) -> list[Place]:
+    left = own.without_perceived(found, "RSU", state, perceived, pose_covariance)
+    return [(x, y) for x, y in left.boxes[:, :2].tolist()]
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0, -2.5])
+def test_body_is_found_within_the_gate_only(car: ActorSpec, yaw: float) -> None:
+    """99 % of errors with 3.7 m standard deviation in one of two directions are below 3.7 √9.21 = 11.23 m."""
+    assert kept(body(car, yaw), seen((11.2, 0.0))) == []
+    assert kept(body(car, yaw), seen((-11.2, 0.0))) == []
+    assert kept(body(car, yaw), seen((11.3, 0.0))) == [(11.3, 0.0)]
+    assert kept(body(car, yaw), seen((8.0, 3.0))) == [(8.0, 3.0)]
+
+
+def test_station_reports_the_body_once(car: ActorSpec) -> None:
+    assert kept(body(car), seen((9.0, 0.0), (6.0, 0.2), (-8.0, 0.0))) == [(9.0, 0.0), (-8.0, 0.0)]
+    assert kept(body(car), seen((9.0, 0.0), (0.5, 0.2))) == [(9.0, 0.0)]
+
+
+@pytest.mark.parametrize("kind", ["pedestrian", "bicycle", "motorbike"])
+def test_vulnerable_road_users_are_not_the_body_of_a_car(car: ActorSpec, kind: str) -> None:
+    assert kept(body(car), seen((6.0, 0.0), kind=kind)) == [(6.0, 0.0)]
+
+
+def test_object_that_own_sensors_perceive_is_kept(car: ActorSpec) -> None:
+    """The vehicle ahead moved 2 m since it was perceived."""
+    lead = seen((6.0, 0.0), covariance=np.diag([0.04, 0.04]), time=-0.2)
+    lead.velocity[:] = 10.0, 0.0
+    assert kept(body(car), seen((8.0, 0.0)), perceived=lead) == [(8.0, 0.0)]
+    assert kept(body(car), seen((8.0, 0.0)), perceived=seen((30.0, 0.0))) == []
+    assert kept(body(car), seen((8.0, 0.0), (3.8, 0.0)), perceived=lead) == [(8.0, 0.0)]
+
+
+def test_precise_report_beside_the_body_is_kept(car: ActorSpec) -> None:
+    for covariance in (np.diag([0.1, 0.1]), np.zeros((2, 2)), np.full((2, 2), np.nan)):
+        assert kept(body(car), seen((6.0, 0.0), covariance=covariance)) == [(6.0, 0.0)]
+
+
+def test_errors_of_both_poses_widen_the_gate(car: ActorSpec) -> None:
+    """1 ° at 100 m is 1.75 m aside, and 2 m of position error reach √9.21 times as far."""
+    exact = np.diag([0.01, 0.01])
+    aside = seen((0.0, 4.0), covariance=exact)
+    turned = StationState(0.0, -100.0, 0.0, 0.0, 0.0, 0.0, np.diag([1e-6, 1e-6, math.radians(1.0) ** 2]))
+    assert kept(body(car), aside) == [(0.0, 4.0)]
+    assert kept(body(car), aside, state=turned) == []
+    vague = np.diag([4.0, 4.0, 0.01])
+    assert kept(body(car), aside, pose_covariance=vague) == []
+    assert kept(body(car), seen((0.0, 6.2), covariance=exact), pose_covariance=vague) == [(0.0, 6.2)]
+
+
+def test_body_stays_the_same_track_of_a_station(car: ActorSpec) -> None:
+    own = body(car)
+    assert kept(own, seen((16.0, 0.0), tracks=(5,))) == [(16.0, 0.0)]
+    assert kept(own, seen((8.0, 0.0), tracks=(5,))) == []
+    assert kept(own, seen((16.0, 0.0), tracks=(5,))) == []
+    assert kept(own, seen((16.0, 0.0), tracks=(6,))) == [(16.0, 0.0)]
+    assert kept(own, seen((20.0, 0.0), tracks=(5,))) == [(20.0, 0.0)]
+
+
+def test_empty_reports_and_those_older_than_the_history_are_read(car: ActorSpec) -> None:
+    assert kept(body(car), seen()) == []
+    assert kept(body(car), seen((5.0, 0.0), time=-30.0)) == []
+    assert kept(body(car), seen((40.0, 0.0), time=60.0)) == [(40.0, 0.0)]
