@@ -127,15 +127,16 @@ class Predictor:
         for course in courses:
             along, left, heading = course.place(known.x, known.y)
             turn = float(wrap_angle(direction - heading))
+            along_lane = travelled
             if is_unknown:
-                travelled, turn = travelled * max(math.cos(turn), 0.0), 0.0
+                along_lane, turn = travelled * max(math.cos(turn), 0.0), 0.0
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
             aside = known.speed * math.sin(turn)
             offset: float | Array = left
             if abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error):
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
-            way, speeds = _held_by_sign(known, course, along, times) or (travelled, speed)
+            way, speeds = _held_by_sign(known, course, along, times) or (along_lane, speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             fits = known.speed <= noise or course.can_follow(along, known.speed - noise)

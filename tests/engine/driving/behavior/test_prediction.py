@@ -136,6 +136,16 @@ def test_slow_vehicle_with_an_uncertain_position_moves_along_its_lane() -> None:
     np.testing.assert_allclose(Predictor(roads, TIMES).predict(known(fast)).x[0], 200.0 - 8.0 * TIMES)
 
 
+def test_slow_vehicle_of_unknown_direction_moves_equally_far_along_each_course() -> None:
+    """At 60° to three alternatives along x, with 2 m/s and a deviation of 2 m."""
+    roads = RoadNetwork.parse(map_xml(road_xml(length=400.0)))
+    predictor = Predictor(roads, TIMES)
+    objects = known(KnownBox(200.0, -1.75, 1.0, math.sqrt(3.0), deviation=2.0))
+    (courses,) = predictor.lanes(objects)
+    found = predictor.predict(objects, [courses[:1] * 3])
+    np.testing.assert_allclose(found.x, np.tile(200.0 + 2.0 * 0.5 * TIMES, (3, 1)))
+
+
 def test_vehicle_stops_at_its_stop_sign_if_it_can() -> None:
     # The front is 20 m before the sign: a stop from 8 m/s takes 16 m at 2 m/s², one from 12 m/s needs 3.6 m/s².
     sign = f"<signals>{stop_sign('stop', 100.0)}</signals>"
