@@ -34,7 +34,6 @@ class OwnBody:
         dt  time between two places [s]
         """
         self._spec = spec
-        self._vulnerable = spec.category in VULNERABLE
         self._places: deque[tuple[float, float, float, float, float]] = deque(maxlen=math.ceil(duration / dt) + 2)
         """Time [s], center of the body and height of its reference point [m], heading [rad]."""
         self._tracks: dict[str, int] = {}
@@ -119,6 +118,12 @@ class OwnBody:
             and abs(cos * (by - y) - sin * (bx - x)) <= half_width
         ]
 
+    def _may_be_body(self, kind: str) -> bool:
+        """Return whether the body may be reported with this class. A roadside unit is no road user."""
+        if self._spec.category == "misc":
+            return kind == "misc"
+        return (kind in VULNERABLE) is (self._spec.category in VULNERABLE)
+
     def _likeliest_row(
         self,
         detections: Detections,
@@ -131,7 +136,7 @@ class OwnBody:
         body: Array | None = None
         best: tuple[float, int] | None = None
         for row, kind in enumerate(detections.classes):
-            if (kind in VULNERABLE) is not self._vulnerable:
+            if not self._may_be_body(kind):
                 continue
             covariance = detections.covariance[row]
             if not math.isfinite(covariance[0, 0]):

@@ -74,6 +74,12 @@ def test_vulnerable_road_users_are_not_the_body_of_a_car(car: ActorSpec, kind: s
     assert kept(body(car), seen((6.0, 0.0), kind=kind)) == [(6.0, 0.0)]
 
 
+def test_vehicle_beside_a_roadside_unit_is_not_its_body() -> None:
+    mast = ActorSpec("RSU", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
+    assert kept(body(mast), seen((6.0, 0.0))) == [(6.0, 0.0)]
+    assert kept(body(mast), seen((6.0, 0.0), kind="misc")) == []
+
+
 def test_object_that_own_sensors_perceive_is_kept(car: ActorSpec) -> None:
     """The vehicle ahead moved 2 m since it was perceived."""
     lead = seen((6.0, 0.0), covariance=np.diag([0.04, 0.04]), time=-0.2)
