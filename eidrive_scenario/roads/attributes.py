@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from eidrive_scenario.roads.geometry import poses
-from eidrive_scenario.roads.model.location import LaneLocation, Pose
+from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import (
     Header,
     Junction,
@@ -18,6 +18,7 @@ from eidrive_scenario.roads.model.road_map import (
     SignalController,
     SignalPlace,
 )
+from eidrive_scenario.roads.routing.costs import assumed_speed
 from eidrive_scenario.roads.routing.movement import driving_direction
 
 
@@ -75,6 +76,11 @@ class RoadAttributes:
                 return own[-1]
         kinds = [kind for kind in road.types if kind.s <= s + 1e-9]
         return kinds[-1].speed if kinds else None
+
+    def usual_speed(self, key: LaneKey) -> float:
+        """Return the speed of traffic that is assumed in the middle of a lane by its speed limit [m/s]."""
+        section = self.road(key.road).sections[key.section]
+        return assumed_speed(self.speed_limit(key.road, 0.5 * (section.s + section.end), key.lane))
 
     def on_road(self, location: LaneLocation) -> bool:
         """Return True if the location is within the width of its lane."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.network import RoadNetwork
-from eidrive_scenario.roads.routing.costs import JUNCTION_COST, Cost, assumed_speed
+from eidrive_scenario.roads.routing.costs import JUNCTION_COST, Cost
 
 MAX_FACTOR = 10.0
 """Maximum factor by which a random cost exceeds the length."""
@@ -23,8 +23,7 @@ def fastest(network: RoadNetwork) -> Cost:
     def cost(one: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
         key = LaneKey(*one[:3])
         if key not in known:
-            section = network.road(key.road).sections[key.section]
-            known[key] = assumed_speed(network.speed_limit(key.road, 0.5 * (section.s + section.end), key.lane))
+            known[key] = network.usual_speed(key)
         return float(data["weight"]) / known[key]
 
     return cost

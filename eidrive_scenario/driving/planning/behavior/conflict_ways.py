@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,6 @@ from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.roads import RoadNetwork, outlines
 from eidrive_scenario.roads.model.location import LaneKey
-from eidrive_scenario.roads.routing.costs import assumed_speed
 
 UPSTREAM = 150.0
 """Length of a lane before a junction on which hidden traffic is considered [m]."""
@@ -40,7 +40,7 @@ LONGEST_CROSSING = 40.0
 class ConflictWay(NamedTuple):
     """Way that meets the line of the vehicle in a zone.
 
-    key          identity of the way, the same for each line
+    key          identity of the way, the same for each line and each of its passages
     kind         lane or crosswalk;  start, end  of the zone along the line [m]
     has_light    whether a traffic light controls the passage of the vehicle
     hold         start of the first zone of a group in which the vehicle cannot wait between two zones [m]
@@ -113,11 +113,10 @@ class ConflictWays:
                 road = roads.road(key.road)
                 last = len(road.sections) - 1 if roads.driving_direction(key.road, key.lane) > 0 else 0
                 if road.junction_id == junction and key.section == last and roads.tables.lane_drivable[row]:
-                    limit = roads.speed_limit(key.road, 0.0, key.lane)
                     for chain in self._upstream([key], 0.0):
                         course = self._courses.course_of(chain)
                         if course is not None:
-                            found.append((tuple(chain), course, assumed_speed(limit)))
+                            found.append((tuple(chain), course, max(map(roads.usual_speed, chain))))
         return found
 
     def _upstream(self, chain: list[LaneKey], length: float) -> list[list[LaneKey]]:
@@ -133,10 +132,10 @@ class ConflictWays:
             if not before:
                 break
             if len(before) > 1:
-                longer = [[key, *chain] for key in before]
-                return [more for one in longer for more in self._upstream(one, length + self._lane_length(one[0]))][
-                    :MOST
-                ]
+                longer = ([key, *chain] for key in before)
+                chains = [self._upstream(one, length + self._lane_length(one[0])) for one in longer]
+                # In turn, so that each of the preceding lanes is among the first ones.
+                return [more for turn in zip_longest(*chains) for more in turn if more is not None][:MOST]
             chain = [before[0], *chain]
             length += self._lane_length(before[0])
         return [chain]
@@ -170,13 +169,19 @@ class ConflictWays:
 
 
 def _beside_crosswalk(line: ReferenceLine, number: int, outline: Array, half_width: float) -> Iterator[ConflictWay]:
-    """Yield the ways of pedestrians from both ends of a crosswalk (M, 2) to the line."""
+    """Yield the ways of pedestrians from both ends of a crosswalk (M, 2) to each place where the line crosses it."""
     center = outline.mean(axis=0)
     reach = float(np.hypot(*(outline - center).T).max()) + line.spacing
     near = np.flatnonzero(np.hypot(*(line.points - center).T) <= reach)
-    if not len(near):
-        return
-    window = max(int(near[0]) - 2, 0), min(int(near[-1]) + 3, len(line.points))
+    for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else ():
+        window = max(int(run[0]) - 2, 0), min(int(run[-1]) + 3, len(line.points))
+        yield from _across_line(line, number, outline, half_width, window)
+
+
+def _across_line(
+    line: ReferenceLine, number: int, outline: Array, half_width: float, window: tuple[int, int]
+) -> Iterator[ConflictWay]:
+    """Yield the ways of pedestrians to the points of the line in `window`, if the crosswalk reaches to both sides."""
     s, d, _ = line.project(outline[:, 0], outline[:, 1], *window)
     left, right = float(d.max()), float(d.min())
     if left <= half_width or right >= -half_width or left - right > 2.0 * LONGEST_CROSSING:

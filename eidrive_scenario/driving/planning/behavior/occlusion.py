@@ -98,6 +98,8 @@ class PossibleTraffic:
 
     def __init__(self) -> None:
         self._possible: Bools = np.zeros(0, dtype=bool)
+        self._zone: Array | None = None
+        """First place of the way, at the zone [m]."""
         self._time = 0.0
         self._moved = 0.0
         """Distance of the motion since the last place [m]."""
@@ -107,7 +109,7 @@ class PossibleTraffic:
 
         shown  places (P,) at which traffic would be perceived at `now` [s]
         """
-        possible = self._possible
+        possible = self._from_zone(way)
         if len(possible) < len(shown):
             possible = np.concatenate([possible, np.ones(len(shown) - len(possible), dtype=bool)])
         self._moved += way.speed * max(now - self._time, 0.0)
@@ -120,6 +122,15 @@ class PossibleTraffic:
         if not possible.any():
             return math.inf
         return max(float(way.distance[int(possible.argmax())]) - self._moved, 0.0)
+
+    def _from_zone(self, way: ConflictWay) -> Bools:
+        """Return the places (P,) from the zone on: another line may meet the way at another place."""
+        before, self._zone = self._zone, way.points[0]
+        if before is None or len(way.points) < 2:
+            return self._possible
+        upstream = (way.points[1] - way.points[0]) / way.spacing
+        moved = round(float((way.points[0] - before) @ upstream) / way.spacing)
+        return self._possible[moved:] if moved >= 0 else np.concatenate([np.ones(-moved, dtype=bool), self._possible])
 
 
 class HiddenTraffic:
@@ -165,7 +176,8 @@ class HiddenTraffic:
         place   position of the vehicle; its height is that of the ground [m]
         """
         s, speed, wanted = motion
-        ahead = [way for way in ways if s + self._sensor < way.hold < s + FAR]
+        # Of a way that the line meets several times only the first meeting ahead.
+        ahead = {way.key: way for way in reversed(ways) if s + self._sensor < way.hold < s + FAR}
         if not ahead:
             return None
         x, y, ground = place
@@ -174,7 +186,7 @@ class HiddenTraffic:
         occluders = [group for group in (seen, fixed) if len(group.x)]
         found: Array | None = None
         nearest = (math.inf, "")
-        for way in ahead:
+        for way in ahead.values():
             shown = self._shown(way, regions, occluders, ground, now)
             hidden = self._traffic.setdefault(way.key, PossibleTraffic()).first(way, shown, now)
             if hidden / way.speed > self._time_to_clear(way, s, speed, wanted):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -56,7 +57,7 @@ class JunctionRules:
         return tuple(sorted(place for place, line in places_along(lines, points) if line.kind == "stop sign"))
 
     def passages(self, points: Array) -> tuple[Passage, ...]:
-        """Return the junctions that a way (M, 2) passes, in their order."""
+        """Return the passages of junctions by a way (M, 2), in their order; a way may pass a junction several times."""
         step = np.diff(points, axis=0)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
         heading = np.arctan2(step[:, 1], step[:, 0])
@@ -67,14 +68,7 @@ class JunctionRules:
             if junction is not None:
                 inside[owner].add(junction)
         signs = list(places_along(self._lines_near(points), points))
-        found = []
-        for junction in dict.fromkeys(name for names in inside for name in sorted(names)):
-            first = next(index for index, names in enumerate(inside) if junction in names)
-            last = first
-            while last + 1 < len(points) and junction in inside[last + 1]:
-                last += 1
-            found.append(self._passage(junction, along, heading, first, last, signs))
-        return tuple(found)
+        return tuple([self._passage(*run, along, heading, signs) for run in _runs(inside)])
 
     def _lines_near(self, points: Array) -> list[StopLine]:
         """Return the stop lines in the extent of a way (M, 2)."""
@@ -84,10 +78,10 @@ class JunctionRules:
     def _passage(
         self,
         junction: str,
-        along: Array,
-        heading: Array,
         first: int,
         last: int,
+        along: Array,
+        heading: Array,
         signs: list[tuple[float, StopLine]],
     ) -> Passage:
         start, end = float(along[first]), float(along[last])
@@ -134,3 +128,16 @@ class JunctionRules:
         if relation >= OPPOSITE:
             return side * own.turn > TURNING and side * other.turn <= TURNING
         return True
+
+
+def _runs(inside: list[set[str]]) -> Iterator[tuple[str, int, int]]:
+    """Yield each junction with the first and the last point of each stay in it, in the order of the first points.
+
+    inside  junctions at each point of a way
+    """
+    for first, names in enumerate(inside):
+        for name in sorted(names - inside[first - 1] if first else names):
+            last = first
+            while last + 1 < len(inside) and name in inside[last + 1]:
+                last += 1
+            yield name, first, last

@@ -12,14 +12,10 @@ from sample_car import CAR
 from eidrive_scenario.api.run import RunResult, RunSettings, run_file
 from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay, ConflictWays
+from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
 from eidrive_scenario.driving.planning.behavior.occlusion import CREEP, HiddenTraffic, Occluders, PossibleTraffic
-from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
-from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.path import PlannedPath
-from eidrive_scenario.library import from_library, library_path
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.library import from_library
 
 NOTHING = Occluders.of_boxes(np.empty((0, 7)))
 EVERYWHERE = ViewSector(0.0, 0.0, 1.5, 0.0, math.pi, 200.0)
@@ -116,6 +112,14 @@ class TestPossibleTraffic:
         traffic.first(lane(40.0), np.ones(20, dtype=bool), 0.0)
         assert traffic.first(lane(44.0), np.zeros(22, dtype=bool), 0.0) == 40.0
 
+    @pytest.mark.parametrize(("moved", "expected"), [(4.0, 16.0), (-4.0, 0.0)])
+    def test_what_was_seen_stays_where_it_was_if_the_zone_moves(self, moved: float, expected: float) -> None:
+        """The first 20 m were free. A zone 4 m upstream has 16 m of them, one 4 m downstream begins with 4 m unseen."""
+        traffic, way = PossibleTraffic(), lane(40.0)
+        traffic.first(way, way.distance < 20.0, 0.0)
+        other = way._replace(points=way.points + np.array([0.0, moved]))
+        assert traffic.first(other, np.zeros(20, dtype=bool), 0.0) == expected
+
 
 def limit_at(distance: float, regions: list[PerceptionRegion], way: ConflictWay, **settings: float) -> float:
     """Return the speed limit `distance` before the place at which the vehicle would wait; inf without one."""
@@ -152,22 +156,16 @@ def test_vehicle_whose_sensor_is_at_the_zone_drives_on() -> None:
     assert traffic.limits([lane()], along, (at_zone - 0.2, 1.0, 8.0), place, [], Detections(0.0), 0.0) is not None
 
 
-@cache
-def road_map(name: str) -> RoadNetwork:
-    return RoadNetwork.load(library_path() / "roads" / f"{name}.xodr")
-
-
-def ways_of(roads: RoadNetwork, start: tuple[str, int, float], length: float = 120.0) -> list[ConflictWay]:
-    """Return the ways that meet a drive straight on from a lane position."""
-    here = roads.location(*start)
-    there = roads.advance(here, length)
-    assert there is not None
-    first, last = roads.pose(here), roads.pose(there)
-    count = int(math.hypot(last.x - first.x, last.y - first.y)) + 1
-    points = np.column_stack([np.linspace(first.x, last.x, count), np.linspace(first.y, last.y, count)])
-    line = ReferenceLine(PlannedPath(points, ends=True), roads)
-    rules = JunctionRules(roads)
-    return ConflictWays(roads, rules, (4.9, 1.8)).along(line, rules.passages(points))
+def test_way_that_the_line_meets_twice_counts_where_it_is_next() -> None:
+    along, motion, place = np.arange(0.0, 90.0, 1.0), (0.0, 8.0, 8.0), (0.0, 0.0, 0.0)
+    near = lane()
+    later = near._replace(start=60.0, end=62.0, hold=60.0, points=near.points + np.array([40.0, 0.0]))
+    limits, traffic = [], hidden_traffic()
+    for ways in ([near], [near, later]):
+        found = traffic.limits(ways, along, motion, place, [], Detections(0.0), 0.0)
+        assert found is not None
+        limits.append(found[0])
+    np.testing.assert_array_equal(limits[0], limits[1])
 
 
 @cache
@@ -210,44 +208,3 @@ class TestInClosedLoop:
         assert not drive(name, Participants="none").passed
         assert drive(name, Participants="none", Caution="true").passed
         assert drive(name, Participants=participant, Caution="true").passed
-
-
-def incoming_roads(ways: list[ConflictWay]) -> set[str]:
-    return {way.key[0].road for way in ways if way.kind == "lane"}  # type: ignore[index]
-
-
-class TestConflictWays:
-    """Junction at x = 40 m: roads 1 and 2 are along x, 3 and 4 come from the left and from the right."""
-
-    def test_straight_drive_meets_the_lanes_of_the_crossing_road_only(self) -> None:
-        ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0))
-        assert incoming_roads(ways) == {"3", "4"}
-        straight = {way.key[0].road: way for way in ways if way.kind == "lane" and way.end - way.start < 3.0}  # type: ignore[index]
-        first = road_map("four_way_junction").lane_pose_at("1", -1, 60.0).x
-        middle = first + (straight["3"].start + straight["3"].end) / 2.0
-        assert middle == pytest.approx(40.25, abs=0.3), "the lane is at x = 40.25"
-        assert straight["4"].start - straight["3"].start == pytest.approx(3.5, abs=0.1)
-        assert straight["3"].points[-1][1] > 100.0, "upstream of the lane from the left"
-        assert straight["4"].points[-1][1] < -100.0, "upstream of the lane from the right"
-
-    def test_vehicle_waits_for_all_lanes_before_the_first_one(self) -> None:
-        ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0))
-        lanes = [way for way in ways if way.kind == "lane"]
-        assert {way.hold for way in lanes} == {min(way.start for way in lanes)}
-
-    def test_pedestrians_come_from_both_ends_of_each_crosswalk(self) -> None:
-        ways = [way for way in ways_of(road_map("four_way_junction"), ("1", -1, 60.0)) if way.kind == "crosswalk"]
-        assert len(ways) == 4
-        for way in ways:
-            assert way.points[0][1] * way.points[-1][1] > 0.0
-            assert abs(way.points[-1][1]) > 5.0
-        assert {math.copysign(1.0, way.points[0][1]) for way in ways} == {1.0, -1.0}
-
-    def test_lights_control_the_ways_of_a_junction_with_signals(self) -> None:
-        assert not any(way.has_light for way in ways_of(road_map("four_way_junction"), ("1", -1, 60.0)))
-        ways = ways_of(road_map("four_way_signals"), ("1", -1, 60.0))
-        assert ways
-        assert all(way.has_light for way in ways)
-
-    def test_road_without_junction_and_crosswalk_has_no_ways(self) -> None:
-        assert ways_of(road_map("two_lane_road"), ("1", -1, 20.0)) == []
