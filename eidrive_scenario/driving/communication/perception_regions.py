@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message
@@ -31,15 +33,20 @@ class PerceptionRegionStore:
             self._regions[station] = PerceptionRegion(station, time, tuple([one.placed(*pose) for one in sectors]))
 
     def add_message(self, message: Message) -> None:
-        """Store the region of a CPM. Without information about the sensors of its sender it has none."""
+        """Store the region of a CPM. Without information about the sensors of its sender it has none.
+
+        The message has the pose of the sender at its generation; since the measurement it drove straight on.
+        """
         if message.kind != "cpm":
             return
         if message.sensors is not None:
             self._sensors[message.sender] = message.sensors
         sectors = self._sensors.get(message.sender, ())
         if sectors:
-            state = message.state
-            self.add(message.sender, message.detections.time, (state.x, state.y, state.z, state.yaw), sectors)
+            state, time = message.state, message.detections.time
+            driven = state.speed * (state.time - time)
+            x, y = state.x - driven * math.cos(state.yaw), state.y - driven * math.sin(state.yaw)
+            self.add(message.sender, time, (x, y, state.z, state.yaw), sectors)
 
     def newest(self, now: float) -> tuple[PerceptionRegion, ...]:
         """Return the regions that do not exceed the lifetime at `now` [s], one for each station."""

@@ -77,6 +77,15 @@ def test_region_expires_and_is_not_replaced_by_an_older_one() -> None:
     assert store.newest(3.1) == ()
 
 
+def test_region_is_where_the_sender_was_at_its_measurement() -> None:
+    """At 20 m/s along y it was 10 m back 0.5 s before."""
+    store, message = PerceptionRegionStore(1.0), cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0)
+    store.add_message(replace(message, state=replace(message.state, speed=20.0), detections=Detections(1.5)))
+    (region,) = store.newest(2.0)
+    assert region.time == 1.5
+    assert (region.sectors[0].x, region.sectors[0].y) == pytest.approx((10.0, 7.0 - 10.0))
+
+
 def test_cam_has_no_region() -> None:
     store = PerceptionRegionStore(1.0)
     state = StationState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -44,6 +44,7 @@ class ConflictWay(NamedTuple):
     kind         lane or crosswalk;  start, end  of the zone along the line [m]
     has_light    whether a traffic light controls the passage of the vehicle
     hold         start of the first zone of a group in which the vehicle cannot wait between two zones [m]
+    look         place of the sensor from which on the vehicle does not expect unseen traffic on it any more [m]
     points       places (P, 2) on the way from the zone on upstream [m];  distance  (P,) from the zone [m]
     speed        of traffic on it [m/s];  body  length of a vehicle or pedestrian on it [m]
     """
@@ -58,6 +59,7 @@ class ConflictWay(NamedTuple):
     body: float
     has_light: bool
     hold: float = 0.0
+    look: float = 0.0
 
     @property
     def spacing(self) -> float:
@@ -196,17 +198,20 @@ def _across_line(
 
 
 def _grouped(ways: list[ConflictWay], room: float) -> list[ConflictWay]:
-    """Return the ways (sorted) with the place before which the vehicle waits for each of them.
+    """Return the ways (sorted) with the place before which the vehicle waits for each of them, and from which it looks.
+
+    It looks into the lanes of a group from the first of them, as a crosswalk may be several meters before.
 
     room  length of a place between two zones at which the vehicle can wait [m]
     """
     found: list[ConflictWay] = []
-    hold = end = -np.inf
+    hold = end = lane = -np.inf
     for way in ways:
         if way.start - end > room:
-            hold = way.start
+            hold, lane = way.start, np.inf
         end = max(end, way.end)
-        found.append(way._replace(hold=hold))
+        lane = min(lane, way.start) if way.kind == "lane" else lane
+        found.append(way._replace(hold=hold, look=lane if way.kind == "lane" else hold))
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
+from eidrive_scenario.driving.planning.behavior.conflict_ways import UPSTREAM, ConflictWay
 from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
@@ -177,12 +177,12 @@ class HiddenTraffic:
         """
         s, speed, wanted = motion
         # Of a way that the line meets several times only the first meeting ahead.
-        ahead = {way.key: way for way in reversed(ways) if s + self._sensor < way.hold < s + FAR}
+        ahead = {way.key: way for way in reversed(ways) if s + self._sensor < way.look and way.hold < s + FAR}
         if not ahead:
             return None
         x, y, ground = place
         seen = Occluders.of_boxes(objects.boxes)
-        fixed = self._fixed.near(x, y, 2.0 * FAR)
+        fixed = self._fixed.near(x, y, FAR + UPSTREAM)
         occluders = [group for group in (seen, fixed) if len(group.x)]
         found: Array | None = None
         nearest = (math.inf, "")
@@ -192,7 +192,7 @@ class HiddenTraffic:
             if hidden / way.speed > self._time_to_clear(way, s, speed, wanted):
                 continue
             stop = way.hold - self._front - BEFORE_ZONE
-            limits = np.where(along > way.hold - self._sensor, math.inf, self.safe_speed(stop - along))
+            limits = np.where(along > way.look - self._sensor, math.inf, self.safe_speed(stop - along))
             found = limits if found is None else np.minimum(found, limits)
             nearest = min(nearest, (way.start, way.kind))
         return None if found is None else (found, nearest[1])

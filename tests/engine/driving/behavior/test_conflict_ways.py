@@ -15,13 +15,19 @@ from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 
+Size = tuple[float, float]
+CAR: Size = (4.9, 1.8)
+"""Length and width [m]."""
+
 
 @cache
 def road_map(name: str) -> RoadNetwork:
     return RoadNetwork.load(library_path() / "roads" / f"{name}.xodr")
 
 
-def ways_of(roads: RoadNetwork, start: tuple[str, int, float], length: float = 120.0) -> list[ConflictWay]:
+def ways_of(
+    roads: RoadNetwork, start: tuple[str, int, float], size: Size = CAR, *, length: float = 120.0
+) -> list[ConflictWay]:
     """Return the ways that meet a drive straight on from a lane position."""
     here = roads.location(*start)
     there = roads.advance(here, length)
@@ -29,12 +35,12 @@ def ways_of(roads: RoadNetwork, start: tuple[str, int, float], length: float = 1
     first, last = roads.pose(here), roads.pose(there)
     count = int(math.hypot(last.x - first.x, last.y - first.y)) + 1
     points = np.column_stack([np.linspace(first.x, last.x, count), np.linspace(first.y, last.y, count)])
-    return ways_along(roads, ReferenceLine(PlannedPath(points, ends=True), roads))
+    return ways_along(roads, ReferenceLine(PlannedPath(points, ends=True), roads), size)
 
 
-def ways_along(roads: RoadNetwork, line: ReferenceLine) -> list[ConflictWay]:
+def ways_along(roads: RoadNetwork, line: ReferenceLine, size: Size = CAR) -> list[ConflictWay]:
     rules = JunctionRules(roads)
-    return ConflictWays(roads, rules, (4.9, 1.8)).along(line, rules.passages(line.points))
+    return ConflictWays(roads, rules, size).along(line, rules.passages(line.points))
 
 
 def incoming_roads(ways: list[ConflictWay]) -> set[str]:
@@ -59,6 +65,15 @@ class TestFourWayJunction:
         ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0))
         lanes = [way for way in ways if way.kind == "lane"]
         assert {way.hold for way in lanes} == {min(way.start for way in lanes)}
+
+    def test_long_vehicle_waits_before_the_crosswalk_and_looks_from_the_first_lane(self) -> None:
+        """Between the crosswalk, which ends at x = 28.2 m, and the lanes a bus of 12 m has no room."""
+        ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0), size=(12.0, 2.5))
+        crosswalks, lanes = ([way for way in ways if way.kind == kind] for kind in ("crosswalk", "lane"))
+        first = min(way.start for way in crosswalks)
+        assert {way.hold for way in ways} == {first}
+        assert {way.look for way in crosswalks} == {first}
+        assert {way.look for way in lanes} == {min(way.start for way in lanes)}
 
     def test_pedestrians_come_from_both_ends_of_each_crosswalk(self) -> None:
         ways = [way for way in ways_of(road_map("four_way_junction"), ("1", -1, 60.0)) if way.kind == "crosswalk"]

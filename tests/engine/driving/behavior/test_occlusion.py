@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import cache
 
+import msgspec
 import numpy as np
 import pytest
 from sample_car import CAR
@@ -25,7 +26,9 @@ def lane(length: float = 40.0, *, speed: float = 10.0, start: float = 20.0) -> C
     """Return a lane that comes from the left and meets the line at x = start + 1."""
     distance = np.arange(0.0, length, 2.0)
     points = np.column_stack([np.full(len(distance), start + 1.0), 2.0 + distance])
-    return ConflictWay("left", "lane", start, start + 2.0, points, distance, speed, 4.0, has_light=False, hold=start)
+    return ConflictWay(
+        "left", "lane", start, start + 2.0, points, distance, speed, 4.0, has_light=False, hold=start, look=start
+    )
 
 
 def hidden_traffic(**settings: float) -> HiddenTraffic:
@@ -159,13 +162,28 @@ def test_vehicle_whose_sensor_is_at_the_zone_drives_on() -> None:
 def test_way_that_the_line_meets_twice_counts_where_it_is_next() -> None:
     along, motion, place = np.arange(0.0, 90.0, 1.0), (0.0, 8.0, 8.0), (0.0, 0.0, 0.0)
     near = lane()
-    later = near._replace(start=60.0, end=62.0, hold=60.0, points=near.points + np.array([40.0, 0.0]))
+    later = near._replace(start=60.0, end=62.0, hold=60.0, look=60.0, points=near.points + np.array([40.0, 0.0]))
     limits, traffic = [], hidden_traffic()
     for ways in ([near], [near, later]):
         found = traffic.limits(ways, along, motion, place, [], Detections(0.0), 0.0)
         assert found is not None
         limits.append(found[0])
     np.testing.assert_array_equal(limits[0], limits[1])
+
+
+def test_house_hides_the_far_end_of_a_lane() -> None:
+    """From the zone 95 m ahead the lane leads on for 150 m; the house is 215 m ahead, at its first 120 m."""
+    house = Occluders.of_boxes(np.array([[216.0, 0.0, 5.0, 2.0, 10.0, 10.0, 0.0]]))
+    distance = np.arange(0.0, 150.0, 2.0)
+    points = np.column_stack([96.0 + distance, np.zeros(len(distance))])
+    way = lane(speed=30.0, start=95.0)._replace(points=points, distance=distance)
+    region = PerceptionRegion("Ego", 0.0, (msgspec.structs.replace(EVERYWHERE, range=400.0),))
+    for fixed, is_hidden in ((NOTHING, False), (house, True)):
+        traffic = HiddenTraffic(BehaviorSettings(), fixed, CAR, (), 400.0)
+        found = traffic.limits(
+            [way], np.arange(0.0, 110.0), (0.0, 8.0, 8.0), (0.0, 0.0, 0.0), [region], Detections(0.0), 0.0
+        )
+        assert (found is not None) is is_hidden
 
 
 @cache
