@@ -12,6 +12,7 @@ from eidrive_scenario.experiments.published import COUNTS, TABLE_2
 from eidrive_scenario.experiments.reproduction.layout import PartReport, Row
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
+from eidrive_scenario.reporting.reproduction.rows import number, scenario_title
 
 COLORS = ("#0b6e99", "#c2410c")
 PAPER = "#111827"
@@ -33,7 +34,7 @@ def table_2_figure(data: PaperRows) -> Figure:
                 some = _select(mine, channel=rule)
                 _points(axes, [arms.index(str(row["arm"])) - 0.2 + 0.2 * shift for row in some], some, color, rule)
             _paper_points(axes, arms, scenario, detector)
-            axes.set_title(f"{_place(scenario)}, {detector}\n{planner}", fontsize=9)
+            axes.set_title(f"{scenario_title(scenario)}, {detector}\n{planner}", fontsize=9)
             axes.set_xticks(range(len(arms)), labels=arms, fontsize=8, rotation=20)
         line[0].set_ylabel("minimum distance of centers [m]", fontsize=8)
     panels[0][0].legend(fontsize=7)
@@ -46,10 +47,15 @@ def _paper_points(axes: Axes, arms: Sequence[str], scenario: str, detector: str)
         published = TABLE_2[scenario, detector, arm]
         at = place + 0.25
         label = "paper: mean ± sd, episodes" if place == 0 else None
-        axes.errorbar(
-            at, published.mean, yerr=published.sd, fmt="D", ms=5, mfc="none", color=PAPER, capsize=2, lw=1, label=label
-        )
+        _paper_values(axes, [at], [published.mean], [published.sd], label)
         axes.plot([at + 0.12] * len(published.episodes), published.episodes, "_", ms=5, color=PAPER, alpha=0.5)
+
+
+def _paper_values(
+    axes: Axes, at: Sequence[float], values: Sequence[float], spread: Sequence[float], label: str | None
+) -> None:
+    """Draw values of the paper with their standard deviations."""
+    axes.errorbar(at, values, yerr=spread, fmt="D", ms=5, mfc="none", color=PAPER, capsize=2, lw=1, label=label)
 
 
 def table_3_figure(data: PaperRows) -> Figure:
@@ -62,22 +68,11 @@ def table_3_figure(data: PaperRows) -> Figure:
         for scenario, axes in zip(scenarios, line, strict=True):
             mine = _select(rows, scenario=scenario, detector=detector)
             at = [senders.index(str(row["senders"])) for row in mine]
-            low, rate, high = ([_number(row, name) for row in mine] for name in ("rate_low", "rate", "rate_high"))
+            low, rate, high = ([number(row, name) for row in mine] for name in ("rate_low", "rate", "rate_high"))
             _interval(axes, [place - 0.1 for place in at], low, rate, high, COLORS[0], "measured, 95 %")
-            paper, spread = ([_number(row, name) for row in mine] for name in ("paper_rate", "paper_rate_sd"))
-            axes.errorbar(
-                [place + 0.1 for place in at],
-                paper,
-                yerr=spread,
-                fmt="D",
-                ms=5,
-                mfc="none",
-                color=PAPER,
-                capsize=2,
-                lw=1,
-                label="paper ± sd",
-            )
-            axes.set_title(f"{_place(scenario)}, {detector}", fontsize=9)
+            paper, spread = ([number(row, name) for row in mine] for name in ("paper_rate", "paper_rate_sd"))
+            _paper_values(axes, [place + 0.1 for place in at], paper, spread, "paper ± sd")
+            axes.set_title(f"{scenario_title(scenario)}, {detector}", fontsize=9)
             axes.set_xticks(range(len(senders)), labels=senders, fontsize=8)
             axes.set_xlim(-0.5, len(senders) - 0.5)
             axes.set_ylim(-0.05, 1.05)
@@ -96,14 +91,14 @@ def detection_figure(data: PaperRows) -> Figure:
         for detector, axes in zip(detectors, line, strict=True):
             for arm, color in zip(arms, COLORS, strict=False):
                 mine = _select(rows, scenario=scenario, detector=detector, arm=arm)
-                time, mean, sd = ([_number(row, name) for row in mine] for name in ("time", "mean", "sd"))
+                time, mean, sd = ([number(row, name) for row in mine] for name in ("time", "mean", "sd"))
                 axes.plot(time, mean, color=color, lw=1.2, label=arm)
                 band = [value - spread for value, spread in zip(mean, sd, strict=True)]
                 top = [value + spread for value, spread in zip(mean, sd, strict=True)]
                 axes.fill_between(time, band, top, color=color, alpha=0.2, lw=0)
                 paper = COUNTS[scenario, detector, arm].mean
                 axes.axhline(paper, color=color, lw=1, ls="--", label=f"{arm}, mean of the paper")
-            axes.set_title(f"{_place(scenario)}, {detector}", fontsize=9)
+            axes.set_title(f"{scenario_title(scenario)}, {detector}", fontsize=9)
             axes.set_ylim(0, 20)
         line[0].set_ylabel("objects", fontsize=8)
     for axes in panels[-1]:
@@ -136,7 +131,7 @@ def draw(part: str, report: PartReport, out: Path) -> Path | None:
 
 
 def _points(axes: Axes, at: Sequence[float], rows: Sequence[Row], color: str, label: str) -> None:
-    low, mean, high = ([_number(row, name) for row in rows] for name in ("low", "mean", "high"))
+    low, mean, high = ([number(row, name) for row in rows] for name in ("low", "mean", "high"))
     _interval(axes, at, low, mean, high, color, f"{label}, 95 %")
 
 
@@ -161,11 +156,3 @@ def _values(rows: Sequence[Row], name: str) -> list[str]:
 
 def _select(rows: Sequence[Row], **fields: str) -> list[Row]:
     return [row for row in rows if all(row[name] == value for name, value in fields.items())]
-
-
-def _number(row: Row, name: str) -> float:
-    return float(row[name] or 0.0)
-
-
-def _place(scenario: str) -> str:
-    return scenario.removeprefix("coop/").replace("_", " ")

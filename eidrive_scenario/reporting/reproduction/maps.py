@@ -11,11 +11,14 @@ from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.reproduction.layout import Row
 from eidrive_scenario.experiments.reproduction.sensitivity_text import LIBRARY, ORIGINAL
+from eidrive_scenario.reporting.reproduction.rows import number, scenario_title
 
 COLORS = "RdYlGn_r"
 """Color map of the probability of a collision, from 0 (green) to 1 (red)."""
 MARKS = (("s", "start of EI-Drive", ORIGINAL), ("o", "start of the library", LIBRARY))
 """Marks on the maps: symbol, label and places."""
+PAPER_LATENCY = 0.3
+"""Latency of the arm `latency` of the paper [s]."""
 
 
 def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
@@ -30,11 +33,11 @@ def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
             mine = [row for row in cells if (row["planner"], row["scenario"], row["arm"]) == (planner, scenario, arm)]
             image = _map(axes, mine)
             _marks(axes, scenario)
-            axes.set_title(f"{_place(scenario)}, {arm}", fontsize=8)
+            axes.set_title(f"{scenario_title(scenario)}, {arm}", fontsize=8)
             axes.tick_params(labelsize=7, labelleft=arm == arms[0])
         line[0].set_ylabel(f"{planner}\nspeed of the ego [m/s]", fontsize=8)
         _curve(line[-1], [row for row in curve if (row["planner"], row["scenario"]) == (planner, scenario)])
-        line[-1].set_title(f"{_place(scenario)}, start of the library", fontsize=8)
+        line[-1].set_title(f"{scenario_title(scenario)}, start of the library", fontsize=8)
     for axes in panels[-1][:-1]:
         axes.set_xlabel("start of the hidden car [m]", fontsize=7)
     panels[-1][-1].set_xlabel("latency [s]", fontsize=8)
@@ -46,11 +49,11 @@ def sensitivity_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
 
 
 def _map(axes: Axes, rows: Sequence[Row]) -> QuadMesh:
-    starts, speeds = (sorted({_number(row, name) for row in rows}) for name in ("start", "speed"))
+    starts, speeds = (sorted({number(row, name) for row in rows}) for name in ("start", "speed"))
     shares = np.full((len(speeds), len(starts)), np.nan)
     for row in rows:
-        place = speeds.index(_number(row, "speed")), starts.index(_number(row, "start"))
-        shares[place] = _number(row, "collisions") / _number(row, "episodes")
+        place = speeds.index(number(row, "speed")), starts.index(number(row, "start"))
+        shares[place] = number(row, "collisions") / number(row, "episodes")
     return axes.pcolormesh(starts, speeds, shares, cmap=COLORS, vmin=0.0, vmax=1.0, shading="nearest")
 
 
@@ -61,17 +64,9 @@ def _marks(axes: Axes, scenario: str) -> None:
 
 
 def _curve(axes: Axes, rows: Sequence[Row]) -> None:
-    latency, low, share, high = ([_number(row, name) for row in rows] for name in ("latency", "low", "share", "high"))
+    latency, low, share, high = ([number(row, name) for row in rows] for name in ("latency", "low", "share", "high"))
     axes.fill_between(latency, low, high, color="#0b6e99", alpha=0.2, lw=0)
     axes.plot(latency, share, "o-", color="#0b6e99", ms=3, lw=1)
-    axes.axvline(0.3, color="black", lw=0.8, ls="--")
+    axes.axvline(PAPER_LATENCY, color="black", lw=0.8, ls="--")
     axes.set_ylim(-0.03, 1.03)
     axes.tick_params(labelsize=7)
-
-
-def _number(row: Row, name: str) -> float:
-    return float(row[name] or 0.0)
-
-
-def _place(scenario: str) -> str:
-    return scenario.removeprefix("coop/").replace("_", " ")
