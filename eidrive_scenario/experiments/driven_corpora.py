@@ -19,8 +19,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.driven_files import positive, table, worse_runs
-from eidrive_scenario.experiments.driven_runs import STACK, DrivenRun, jobs_of_file, run_recorded
+from eidrive_scenario.experiments.driven_runs import DEFAULT, STACK, DrivenRun, jobs_of_file, run_recorded
 
 CORPORA, MAPS = "EIDRIVE_CORPORA", "EIDRIVE_MAPS"
 """Environment variables with the folders of the corpora and of the maps."""
@@ -147,7 +148,7 @@ def selected(names: Iterable[str]) -> list[Group]:
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("groups", nargs="*", help=f"groups, all by default: {', '.join(one.name for one in GROUPS)}")
-    parser.add_argument("--planner", default="behavior")
+    parser.add_argument("--planner", default=DEFAULT)
     parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
@@ -170,7 +171,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for path in group.files(corpora)
             for job in jobs_of_file(path, group.drive, options.planner, options.samples, reference, group=group.name)
         ]
-        runs = run_recorded(jobs, record, workers=options.workers, console=console, title=group.name)
+        try:
+            runs = run_recorded(jobs, record, workers=options.workers, console=console, title=group.name)
+        except SettingError as error:
+            parser.error(str(error))
         found.append((group, runs))
         (options.out / "driven_corpora.md").write_text(report(found), encoding="utf-8")
     sys.stdout.write(report(found))

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from eidrive_scenario.errors import Diagnostic, InputError, quoted, suggestion
-from eidrive_scenario.experiments.driven_runs import REFERENCE, STACK, DrivenRun, jobs_of_file, run_recorded
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted, suggestion
+from eidrive_scenario.experiments.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, jobs_of_file, run_recorded
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.model import Controller
@@ -117,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", type=Path, nargs="+", help="scenarios and parameter value distributions")
     parser.add_argument("--drive", default="Ego", help="entity that gets the driving stack")
-    parser.add_argument("--planner", default="behavior")
+    parser.add_argument("--planner", default=DEFAULT)
     parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
     parser.add_argument(REFERENCE_OPTION, metavar="CONTROLLER=MODEL", help="controller model of the reference driver")
     parser.add_argument("--out", type=Path, default=Path("reports"))
@@ -127,6 +127,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     name, separator, model = (options.reference or "").partition("=")
     if options.reference and not (name and separator and model):
         parser.error("--reference: expected CONTROLLER=MODEL, for example ALKSController=alks")
+    names = [path.name for path in options.files]
+    if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
+        parser.error(f"two files have the name {twice}: the table and the record have one entry per name")
     if options.reference and (wrong := wrong_reference(options.files, name, model)) is not None:
         parser.error(str(wrong))
     reference = {name: model} if options.reference else None
@@ -139,7 +142,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     record = options.out / "driven_files.jsonl"
     if not options.resume:
         record.unlink(missing_ok=True)
-    runs = run_recorded(jobs, record, workers=options.workers, console=Console(stderr=True), title="driven files")
+    console = Console(stderr=True)
+    try:
+        runs = run_recorded(jobs, record, workers=options.workers, console=console, title="driven files")
+    except SettingError as error:
+        parser.error(str(error))
     result = table(runs, has_reference=reference is not None)
     (options.out / "driven_files.md").write_text(result, encoding="utf-8")
     sys.stdout.write(result)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from eidrive_scenario.errors import ConstraintError, EidriveError, InputError
+from eidrive_scenario.errors import ConstraintError, Diagnostic, EidriveError, InputError, SettingError
 from eidrive_scenario.experiments.driven_motion import CONTACT, observed_run
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.library import definition
@@ -19,7 +19,11 @@ from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, lo
 from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.simulation import RunSettings
 
+Case = tuple[str, str, int, int, str]
+"""Group, file, number of the run in its distribution, seed and planner."""
 STACK, REFERENCE = "stack", "reference"
+DEFAULT = "behavior"
+"""Planner of the stack if none is given."""
 ORACLE = {"detector": "oracle", "mount": "roof", "range": 150}
 """Perception of the driven vehicle."""
 TIME_LIMIT = 60.0
@@ -36,11 +40,12 @@ class DrivenJob(Job):
     number: int
     drive: str
     group: str = ""
+    planner: str = DEFAULT
 
     @property
-    def case(self) -> tuple[str, str, int, int]:
+    def case(self) -> Case:
         """Identity of the run except for its arm."""
-        return self.group, self.file, self.number, self.seed
+        return self.group, self.file, self.number, self.seed, self.planner
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,7 @@ class DrivenRun:
     stop          longest standstill [s];  braking  maximum deceleration before a contact [m/s²]
     unstarted     warnings about acts and events that never started
     error         message of a run without a result, else ""
+    planner       planner of the stack, also of that with which the reference driver is compared
     excluded      whether the values violate the constraints of a parameter, so that the run is not evaluated
     """
 
@@ -74,11 +80,12 @@ class DrivenRun:
     error: str = ""
     excluded: bool = False
     group: str = ""
+    planner: str = DEFAULT
 
     @property
-    def case(self) -> tuple[str, str, int, int]:
+    def case(self) -> Case:
         """Identity of the run except for its arm."""
-        return self.group, self.file, self.number, self.seed
+        return self.group, self.file, self.number, self.seed, self.planner
 
 
 def jobs_of_file(
@@ -95,7 +102,7 @@ def jobs_of_file(
         if reference is not None:
             arms[REFERENCE] = RunSettings(controllers=reference, **common)  # type: ignore[arg-type]
         for arm, settings in arms.items():
-            yield DrivenJob(str(scenario), arm, 1, settings, path.name, number, drive, group)
+            yield DrivenJob(str(scenario), arm, 1, settings, path.name, number, drive, group, planner)
 
 
 def _runs(path: Path, samples: int) -> Iterator[tuple[int, Path, dict[str, str | Assignment]]]:
@@ -132,7 +139,7 @@ def run_of(job: DrivenJob) -> DrivenRun:
     values = {
         name: value.text if isinstance(value, Assignment) else value for name, value in job.settings.parameters.items()
     }
-    run = DrivenRun(job.file, job.number, job.arm, job.seed, values, group=job.group)
+    run = DrivenRun(job.file, job.number, job.arm, job.seed, values, group=job.group, planner=job.planner)
     try:
         result, motion = observed_run(job.scenario, job.drive, seed=job.seed, settings=job.settings)
     except ConstraintError:
@@ -155,10 +162,24 @@ def run_of(job: DrivenJob) -> DrivenRun:
 
 
 def read_record(record: Path) -> list[DrivenRun]:
-    """Return the runs of a record; none if it does not exist."""
-    text = record.read_text(encoding="utf-8") if record.is_file() else ""
-    rows = map(json.loads, text.splitlines())
-    return [DrivenRun(**{**row, **{key: tuple(row[key]) for key in ("failed", "unstarted")}}) for row in rows]
+    """Return the runs of a record; none if it does not exist.
+
+    An incomplete last line, as a killed process leaves it, is none. Raise SettingError if any other line is invalid.
+    """
+    runs = []
+    for number, line in enumerate(_complete_lines(record).splitlines(), 1):
+        try:
+            row = json.loads(line)
+            runs.append(DrivenRun(**{**row, **{key: tuple(row[key]) for key in ("failed", "unstarted")}}))
+        except (ValueError, TypeError, KeyError) as error:
+            hint = "remove the line, or start again without --resume"
+            raise SettingError(Diagnostic(f"the record is damaged: {error}", hint, str(record), number)) from error
+    return runs
+
+
+def _complete_lines(record: Path) -> bytes:
+    content = record.read_bytes() if record.is_file() else b""
+    return content[: content.rfind(b"\n") + 1]
 
 
 def run_recorded(
@@ -166,7 +187,7 @@ def run_recorded(
 ) -> list[DrivenRun]:
     """Return the runs of all jobs; those of the reference driver where the stack has a contact by own fault only.
 
-    Runs of the record are not repeated; new ones are added to it.
+    Runs of the record are not repeated; new ones are added to it. Raise SettingError if the record is damaged.
     """
     runs = {(*run.case, run.arm): run for run in read_record(record)}
     stacks = [job for job in jobs if job.arm == STACK]
@@ -179,7 +200,7 @@ def run_recorded(
 
 def _add_runs(
     jobs: Sequence[DrivenJob],
-    runs: dict[tuple[str, str, int, int, str], DrivenRun],
+    runs: dict[tuple[*Case, str], DrivenRun],
     record: Path,
     *,
     workers: int | None,
@@ -188,10 +209,11 @@ def _add_runs(
 ) -> None:
     """Add the runs of jobs that are missing to `runs` and to the record."""
     left = [job for job in jobs if (*job.case, job.arm) not in runs]
-    with record.open("a", encoding="utf-8") as lines:
+    with record.open("ab") as lines:
+        lines.truncate(len(_complete_lines(record)))
 
         def add(run: DrivenRun) -> None:
-            lines.write(json.dumps(asdict(run), ensure_ascii=False) + "\n")
+            lines.write(json.dumps(asdict(run), ensure_ascii=False).encode() + b"\n")
             lines.flush()
             runs[(*run.case, run.arm)] = run
 
