@@ -204,6 +204,7 @@ class BehaviorPlanner(RoutePlanner):
             now=now,
             gives_way=self._gives_way(s),
             hidden=hidden,
+            road_limits=self._limits if hidden else None,
         )
         return self._decider.decide(situation)
 

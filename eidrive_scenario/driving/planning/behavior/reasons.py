@@ -31,8 +31,9 @@ def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, t
     if proposal.share < 1.0:
         return f"{maneuver}slow down for traffic ahead", ()
     if LIMIT in causes and causes[0] != FREE:
-        if situation.hidden:
-            return f"{maneuver}caution before a hidden {situation.hidden}", ()
+        hidden = situation.hidden_at(float(options.rolled.s[best, causes.index(LIMIT) + 1]))
+        if hidden:
+            return f"{maneuver}caution before a hidden {hidden}", ()
         return f"{maneuver}curve or end of route ahead", ()
     return f"{maneuver}keep speed", ()
 

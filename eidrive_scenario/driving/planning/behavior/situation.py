@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 import msgspec
+import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
@@ -39,7 +40,9 @@ class Situation(msgspec.Struct, frozen=True):
     now: float
     gives_way: Callable[[Passage], bool] | None = None
     hidden: str = ""
-    """Kind of the way ahead that no sensor shows and that limits the speed; empty without one."""
+    """Kind of the nearest way ahead that no sensor shows and that limits the speed; empty without one."""
+    road_limits: Array | None = None
+    """Speed limits (M,) by curves and the end of the route only [m/s]; None if `limits` has no others."""
 
     def kind_of(self, owner: int) -> str:
         """Return the class of an object."""
@@ -51,6 +54,14 @@ class Situation(msgspec.Struct, frozen=True):
         x, y = self.line.points[self.line.index_at(self.s)].tolist()
         distance = math.hypot(known.x - x, known.y - y)
         return f"{known.kind} {distance:.0f} m ahead at {known.speed:.1f} m/s"
+
+    def hidden_at(self, s: float) -> str:
+        """Return the kind of the hidden way if such ways limit the speed at a distance along the line more than curves
+        and the end of the route; else an empty text."""
+        if self.road_limits is None:
+            return ""
+        limit, by_road = (float(np.interp(s, self.line.along, limits)) for limits in (self.limits, self.road_limits))
+        return self.hidden if limit < by_road else ""
 
     def rows_of(self, owner: int | None) -> tuple[int, ...]:
         """Return the row of an object among the fused objects; none if it is lost."""

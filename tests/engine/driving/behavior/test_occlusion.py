@@ -15,7 +15,11 @@ from eidrive_scenario.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.behavior.conflict_ways import ConflictWay
 from eidrive_scenario.driving.planning.behavior.occlusion import CREEP, HiddenTraffic, Occluders, PossibleTraffic
+from eidrive_scenario.driving.planning.behavior.prediction import Predictor
+from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.situation import Situation
+from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.library import from_library
 
 NOTHING = Occluders.of_boxes(np.empty((0, 7)))
@@ -184,6 +188,32 @@ def test_house_hides_the_far_end_of_a_lane() -> None:
             [way], np.arange(0.0, 110.0), (0.0, 8.0, 8.0), (0.0, 0.0, 0.0), [region], Detections(0.0), 0.0
         )
         assert (found is not None) is is_hidden
+
+
+def test_reason_is_what_limits_the_speed() -> None:
+    """A curve with 3 m/s is 50 m ahead, a hidden lane with 5 m/s until it is in sight 30 m ahead."""
+    line = ReferenceLine(PlannedPath(np.array([[0.0, 0.0], [100.0, 0.0]]), ends=False), None)
+    curve = np.sqrt(3.0**2 + 2.0 * 2.0 * np.maximum(50.0 - line.along, 0.0))
+    caution = np.where(line.along < 30.0, np.sqrt(5.0**2 + 2.0 * 2.0 * (30.0 - np.minimum(line.along, 30.0))), math.inf)
+    situation = Situation(
+        line=line,
+        limits=np.minimum(curve, caution),
+        s=0.0,
+        d=0.0,
+        steered=(0.0, 0.0, 0.0),
+        speed=8.0,
+        wanted=15.0,
+        objects=[],
+        prediction=Predictor(None, np.arange(0.0, 8.01, 0.25)).predict([]),
+        window=(0, len(line.along)),
+        stop=None,
+        now=0.0,
+        hidden="lane",
+        road_limits=curve,
+    )
+    # At 20 m the curve allows √(9 + 4 · 30) = 11.4 m/s, the lane √(25 + 4 · 10) = 8.1 m/s.
+    assert [situation.hidden_at(s) for s in (0.0, 20.0, 31.0, 60.0)] == ["lane", "lane", "", ""]
+    assert msgspec.structs.replace(situation, road_limits=None).hidden_at(20.0) == ""
 
 
 @cache
