@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
+from functools import cached_property
 from itertools import zip_longest
 from typing import NamedTuple
 
@@ -110,15 +111,22 @@ class ConflictWays:
         found = self._lanes.get(junction)
         if found is None:
             found = self._lanes[junction] = []
-            roads = self._roads
-            for key, row in roads.tables.lane_keys():
-                road = roads.road(key.road)
-                last = len(road.sections) - 1 if roads.driving_direction(key.road, key.lane) > 0 else 0
-                if road.junction_id == junction and key.section == last and roads.tables.lane_drivable[row]:
-                    for chain in self._upstream([key], 0.0):
-                        course = self._courses.course_of(chain)
-                        if course is not None:
-                            found.append((tuple(chain), course, max(map(roads.usual_speed, chain))))
+            for key in self._last_lanes.get(junction, ()):
+                for chain in self._upstream([key], 0.0):
+                    course = self._courses.course_of(chain)
+                    if course is not None:
+                        found.append((tuple(chain), course, max(map(self._roads.usual_speed, chain))))
+        return found
+
+    @cached_property
+    def _last_lanes(self) -> dict[str, list[LaneKey]]:
+        """Last lanes of the ways through each junction. Traffic does not use center lanes, which the graph lacks."""
+        found: dict[str, list[LaneKey]] = {}
+        for key, drivable in self._roads.graph.nodes(data="drivable"):
+            road = self._roads.road(key.road)
+            last = len(road.sections) - 1 if self._roads.driving_direction(key.road, key.lane) > 0 else 0
+            if drivable and road.junction_id is not None and key.section == last:
+                found.setdefault(road.junction_id, []).append(key)
         return found
 
     def _upstream(self, chain: list[LaneKey], length: float) -> list[list[LaneKey]]:

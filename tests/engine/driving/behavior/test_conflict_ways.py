@@ -117,6 +117,14 @@ class TestFourWayJunction:
         ways = ways_of(roads, ("1", -1, 60.0))
         assert ("107", 1, -2) in {way.key[-1] for way in ways if way.kind == "lane"}  # type: ignore[index]
 
+    def test_center_lane_of_a_driving_type_is_no_way(self) -> None:
+        """As in the map `multi_intersections` of esmini."""
+        text = (library_path() / "roads" / "four_way_junction.xodr").read_text(encoding="utf-8")
+        center = '<lane id="0" type="{}" level="false">'
+        text = text.replace(center.format("none"), center.format("driving"))
+        expected = ways_of(road_map("four_way_junction"), ("1", -1, 60.0))
+        assert [way.key for way in ways_of(RoadNetwork.parse(text), ("1", -1, 60.0))] == [way.key for way in expected]
+
     def test_closed_route_meets_the_ways_on_each_lap(self) -> None:
         """Laps through the junction along x, and back at y = -30 m."""
         roads = road_map("four_way_junction")
