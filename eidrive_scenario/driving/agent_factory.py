@@ -137,7 +137,7 @@ def build_agent(
         if planner == NO_PLANNER
         else _planner(planner, settings, installation, view or None, dt=dt, seed=seed),
         controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
-        message_generator=MessageGenerator(spec, settings, sensors=len(sensors), view=view, encoder=encoder),
+        message_generator=MessageGenerator(spec, settings, sensors=len(sensors), view=view, encoder=encoder, seed=seed),
         dt=dt,
         receives_messages=listens,
         points=points,

@@ -102,6 +102,8 @@ class AgentSettings(Settings):
     cooperates_with senders whose messages are received; None: all. A station that does not drive receives messages
                     only with this property
     message_rate    rate of CPMs; None: one in each tick
+    message_phase   time from the entry of the station to its first message or, with `etsi`, its first evaluation of the
+                    rules; None: random, because stations are not synchronized. Not used with a message in each tick
     report_timeout  lifetime of a report. Default: 1 s for a complete list of objects; 1.5 s for CAMs and CPMs by the
                     ETSI rules, which repeat stationary objects once per second (T_GenCamMax, T_GenCpmMax), so that a
                     message may be delayed by 0.5 s
@@ -141,6 +143,7 @@ class AgentSettings(Settings):
     mount: MountSetting = None
     cooperates_with: Annotated[tuple[str, ...] | None, BeforeValidator(_names)] = None
     message_rate: Annotated[float, Field(ge=1e-3, le=10_000.0)] | None = None
+    message_phase: Annotated[float, Field(ge=0.0, le=MAX_TIME)] | None = None
     report_timeout: Annotated[float, Field(gt=0.0, le=MAX_TIME)] = 1.0
     antenna_height: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     messages: Annotated[tuple[Literal["cpm", "cam"], ...], BeforeValidator(_names)] = ("cpm",)
@@ -166,6 +169,8 @@ class AgentSettings(Settings):
             raise ValueError("generation 'rate' needs a message_rate")
         if self.generation in ("each_tick", "etsi") and self.message_rate is not None:
             raise ValueError(f"generation {self.generation!r} and a message_rate exclude each other")
+        if self.message_phase is not None and self.generation != "etsi" and self.message_rate is None:
+            raise ValueError("message_phase needs a message_rate or generation 'etsi'")
         return self
 
     @model_validator(mode="after")

@@ -217,10 +217,17 @@ class Stations(DrivingStack):
         """
         if self._channel is None:
             return ()
+        listening = {name: agent for name, agent in self._agents.items() if agent.receives_messages}
+        own_perception = self._own_perception
         outbox = []
         for sender, step in steps.items():
-            receivers = self._receivers(sender)
-            outbox += [(message, receivers) for message in step.outbox]
+            if step.outbox:
+                receivers = [
+                    name
+                    for name, agent in listening.items()
+                    if agent.receives_from(sender, own_perception=own_perception)
+                ]
+                outbox += [(message, receivers) for message in step.outbox]
         events = self._channel.transmit(outbox, now)
         if self._checked_channel is not None:
             check_events(self._checked_channel, events)
@@ -279,12 +286,6 @@ class Stations(DrivingStack):
         if self._checked_channel is not None:
             check_delivered(self._checked_channel, delivered, now)
         return delivered
-
-    def _receivers(self, sender: str) -> list[str]:
-        own_perception = self._own_perception
-        return [
-            name for name, agent in self._agents.items() if agent.receives_from(sender, own_perception=own_perception)
-        ]
 
     @property
     def _own_perception(self) -> bool:

@@ -64,7 +64,7 @@ def test_run_with_cam_only_reports_the_sender(tmp_path: Path) -> None:
     assert {message.kind for message in messages} == {"cam"}
     assert set(np.round(np.diff([message.generated for message in messages]), 9)) == {1.0}
     assert {message.size for message in messages} == {300}
-    places = collector.frames[5].steps["Ego"].fused.boxes[:, :2]
+    places = collector.frames[22].steps["Ego"].fused.boxes[:, :2]
     assert np.min(np.linalg.norm(places - np.array([42.2, -6.0]), axis=1)) < 0.5
 
 

@@ -11,8 +11,9 @@ from msgspec.structs import replace
 from eidrive_scenario.coverage import ViewSector
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
-from eidrive_scenario.v2x.messages.generation.cam import EQUAL, LONGEST, SHORTEST, CamGenerationRules
+from eidrive_scenario.v2x.messages.generation.cam import CHECK, EQUAL, LONGEST, SHORTEST, CamGenerationRules
 from eidrive_scenario.v2x.messages.generation.cpm import CpmGenerationRules
 from eidrive_scenario.v2x.messages.generation.object_ids import ObjectIdAssigner
 from eidrive_scenario.v2x.messages.message import Message, StationState
@@ -27,6 +28,7 @@ class MessageGenerator:
     sensors  number of sensors of the station
     view     sectors that they cover, for the sensor information of its CPMs
     encoder  encodes messages to measure their size; None uses the size model
+    seed     of the phase of the messages. Stations are not synchronized, so that their phases are random and uniform
     """
 
     def __init__(
@@ -37,6 +39,7 @@ class MessageGenerator:
         sensors: int,
         view: tuple[ViewSector, ...] = (),
         encoder: Asn1Encoder | None = None,
+        seed: int = 0,
     ) -> None:
         self._spec = spec
         self._settings = settings
@@ -46,7 +49,15 @@ class MessageGenerator:
         self._clock = settings.clock
         self._number = 0
         self._periods = -1
-        self._cam_rules = CamGenerationRules()
+        start, elapsed = generator(seed, "message phase", spec.name).uniform(size=2).tolist()
+        self._phase, fixed = 0.0, settings.message_phase
+        if settings.message_rate is not None:
+            self._phase = start / settings.message_rate if fixed is None else fixed
+        elif settings.generation == "etsi":
+            self._phase = start * CHECK if fixed is None else fixed
+        self._first = math.inf
+        """Time of the first evaluation [s]."""
+        self._cam_rules = CamGenerationRules(elapsed if fixed is None else None)
         self._cpm_rules = CpmGenerationRules()
         self._numbering = ObjectIdAssigner()
         self._last_generated = dict.fromkeys(settings.messages, -math.inf)
@@ -66,6 +77,10 @@ class MessageGenerator:
         interval  minimum time between two messages under congestion control [s], respected by the ETSI rules. With two
                   kinds of messages only the less recent kind is generated in a tick
         """
+        if self._first == math.inf:
+            self._first = now + self._phase
+        if now < self._first - EQUAL:
+            return ()
         etsi = self._settings.generation == "etsi"
         if not etsi and not self._is_due_by_rate(now):
             return ()
@@ -101,7 +116,7 @@ class MessageGenerator:
         rate = self._settings.message_rate
         if rate is None:
             return True
-        period = math.floor(now * rate + 1e-6)
+        period = math.floor((now - self._first) * rate + 1e-6)
         if period <= self._periods:
             return False
         self._periods = period

@@ -217,7 +217,7 @@ def test_last_detections_are_used_between_readings_until_timeout(car: ActorSpec)
 
 
 def test_message_rate_sets_the_interval_of_messages(car: ActorSpec) -> None:
-    ego = agent(car, message_rate=10)
+    ego = agent(car, message_rate=10, message_phase=0)
     said = [ego.act(readings(tick * DT, (0.0, 0.0)), (), tick * DT, None).outbox for tick in range(10)]
     assert [len(outbox) for outbox in said] == [1, 0] * 5
     assert [outbox[0].number for outbox in said if outbox] == [0, 1, 2, 3, 4]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from msgspec.structs import replace
+
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.v2x.messages.message import StationState
 
@@ -29,7 +31,12 @@ class CamGenerationRules:
     last one. The next `REPEATS` messages keep its interval; later ones use the longest interval.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, elapsed: float | None = None) -> None:
+        """Start without an earlier message, or in the steady state of the speed at the first evaluation.
+
+        elapsed  share of the interval between two messages that has passed then, in [0, 1); None: no earlier message
+        """
+        self._elapsed = elapsed
         self._checked = -math.inf
         self._sent = -math.inf
         self._low_frequency = -math.inf
@@ -41,6 +48,8 @@ class CamGenerationRules:
         """Return True if a message is due now; congestion control may require a longer `shortest` interval [s]."""
         if now - self._checked < CHECK - EQUAL:
             return False
+        if self._checked == -math.inf and self._elapsed is not None:
+            self._start_in_steady_state(state, now, self._elapsed)
         self._checked = now
         passed = now - self._sent
         if passed < shortest - EQUAL:
@@ -56,6 +65,13 @@ class CamGenerationRules:
             return False
         self._sent, self._last = now, state
         return True
+
+    def _start_in_steady_state(self, state: StationState, now: float, elapsed: float) -> None:
+        interval = DISTANCE / state.speed if state.speed * LONGEST > DISTANCE else LONGEST
+        age = elapsed * max(interval, SHORTEST)
+        back = state.speed * age
+        x, y = state.x - back * math.cos(state.yaw), state.y - back * math.sin(state.yaw)
+        self._sent, self._last = now - age, replace(state, x=x, y=y)
 
     def low_frequency(self, now: float) -> bool:
         """Return True if the message that is sent now carries the low-frequency container."""

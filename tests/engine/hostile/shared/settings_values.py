@@ -31,6 +31,7 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
         "clock_drift": 10.0,
         "target_speed": 10.0,
         "message_rate": 10.0,
+        "message_phase": 0.05,
         "planner": "conflict_area",
         "conflict_area": [[100.0, 120.0, -10.0, 10.0]],
         "conflict_deceleration": 5.0,

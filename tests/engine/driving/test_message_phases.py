@@ -1,0 +1,81 @@
+"""Phases of messages: stations are not synchronized."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.communication.message_generator import MessageGenerator
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.v2x.messages.message import StationState
+from eidrive_scenario.world.actor import ActorSpec
+
+DT = 0.01
+
+
+def sent(
+    name: str, seconds: float, *, speed: float = 0.0, seed: int = 1, begin: float = 0.0, **properties: object
+) -> list[float]:
+    """Times of the messages of a station that drives straight on."""
+    spec = ActorSpec(name, "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
+    generator = MessageGenerator(spec, AgentSettings.model_validate(properties), sensors=1, seed=seed)
+    times = [begin + tick * DT for tick in range(round(seconds / DT))]
+    found = []
+    for now in times:
+        state = StationState(now, speed * now, 0.0, 0.0, 0.0, speed)
+        found += [message.generated for message in generator.generate(state, Detections(now), now)]
+    return found
+
+
+def is_uniform(values: Sequence[float], span: float) -> bool:
+    """Whether values are uniform in [0, span): Kolmogorov-Smirnov, with a chance of 0.1 % of a false alarm."""
+    ordered = np.sort(values) / span
+    steps = np.arange(len(ordered) + 1) / len(ordered)
+    apart = max(np.max(np.abs(ordered - steps[1:])), np.max(np.abs(ordered - steps[:-1])))
+    return bool(apart <= 1.95 / math.sqrt(len(ordered)) + DT / span)
+
+
+def test_stations_with_a_rate_start_at_random_times_within_the_interval() -> None:
+    first = [sent(f"Car{number}", 0.6, message_rate=2)[0] for number in range(100)]
+    assert is_uniform(first, 0.5)
+    assert np.diff(sent("Car3", 5.0, message_rate=2)).tolist() == pytest.approx([0.5] * 9)
+
+
+def test_standing_stations_with_etsi_rules_are_spread_over_a_second() -> None:
+    """T_GenCamMax of EN 302 637-2 is 1 s."""
+    runs = [sent(f"Car{number}", 3.0, messages="cam", generation="etsi") for number in range(100)]
+    assert is_uniform([run[0] for run in runs], 1.0)
+    assert all(np.diff(run).tolist() == pytest.approx([1.0] * (len(run) - 1)) for run in runs)
+
+
+@pytest.mark.parametrize("speed", [8.0, 20.0])
+def test_first_cam_of_a_moving_station_is_due_after_a_part_of_four_meters(speed: float) -> None:
+    """The rules are evaluated every 0.1 s, from a time in [0, 0.1 s) on, and require more than 4 m."""
+    runs = [sent(f"Car{number}", 2.0, speed=speed, messages="cam", generation="etsi") for number in range(60)]
+    assert max(run[0] for run in runs) <= 4.0 / speed + 0.1 + DT
+    assert np.mean([run[0] for run in runs]) == pytest.approx(2.0 / speed + 0.1, abs=0.05)
+
+
+def test_phase_depends_on_seed_and_name_only() -> None:
+    assert sent("Car", 1.0, message_rate=3) == sent("Car", 1.0, message_rate=3)
+    assert sent("Car", 1.0, message_rate=3) != sent("Car", 1.0, message_rate=3, seed=2)
+    assert sent("Car", 1.0, message_rate=3) != sent("Van", 1.0, message_rate=3)
+
+
+def test_given_phase_counts_from_the_entry_of_the_station() -> None:
+    assert sent("Car", 0.5, message_rate=5, message_phase=0)[:2] == pytest.approx([0.0, 0.2])
+    late = sent("Car", 1.0, begin=7.0, message_rate=5, message_phase=0.13)
+    assert late == pytest.approx([7.13, 7.33, 7.53, 7.73, 7.93])
+    assert sent("Car", 1.5, messages="cam", generation="etsi", message_phase=0.25) == pytest.approx([0.25, 1.25])
+    assert sent("Car", 1.0, message_rate=5, message_phase=3) == []
+
+
+def test_messages_in_each_tick_have_no_phase() -> None:
+    assert len(sent("Car", 0.1)) == 10
+    with pytest.raises(ValidationError, match="message_phase needs a message_rate or generation 'etsi'"):
+        AgentSettings.model_validate({"message_phase": 0.1})
