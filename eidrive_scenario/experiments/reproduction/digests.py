@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
-from eidrive_scenario.experiments.reproduction import episodes
+from eidrive_scenario.experiments.reproduction import channel_load, episodes
 from eidrive_scenario.library import library_path, resolve_scenario
 from eidrive_scenario.resolved_settings import canonical_json, sha256_of
 from eidrive_scenario.simulation import RunSettings
@@ -27,10 +27,15 @@ _LENGTH = 16
 """Number of hexadecimal digits of a digest."""
 
 
-def job_digest(scenario: str, settings: RunSettings) -> str:
-    """Return the digest of a job: equal digests and seeds give equal outcomes."""
+def job_digest(scenario: str, settings: RunSettings, *, load: int = 0) -> str:
+    """Return the digest of a job: equal digests and seeds give equal outcomes.
+
+    load  number of stations that are added to the scenario
+    """
     given = {name: str(value) for name, value in asdict(settings).items()}
-    text = canonical_json({"code": code_digest(), "scenario": _scenario_digest(scenario), "settings": given})
+    text = canonical_json(
+        {"code": code_digest(), "scenario": _scenario_digest(scenario), "settings": given, "load": load}
+    )
     return sha256_of(text.encode())[:_LENGTH]
 
 
@@ -55,7 +60,8 @@ def _code_files() -> Iterator[tuple[Path, Path]]:
             for path in sorted(root.rglob("*")):
                 if path.is_file() and not NOT_EXECUTED.intersection(path.relative_to(root).parts):
                     yield root, path
-    yield Path(episodes.__file__).parent, Path(episodes.__file__)
+    for file in (channel_load.__file__, episodes.__file__):
+        yield Path(file).parent, Path(file)
     for folder in LIBRARY_FOLDERS:
         for path in sorted((library_path() / folder).rglob("*")):
             if path.is_file():

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import msgspec
 
 from eidrive_scenario.experiments.repetitions import Job
+from eidrive_scenario.experiments.reproduction.channel_load import with_load
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import run_file
@@ -47,10 +48,12 @@ class EpisodeJob(Job):
 
     digest   digest of the settings and of the code
     counted  station whose known objects are counted at each time step; "" for none
+    load     number of stations that are added to the scenario
     """
 
     digest: str = ""
     counted: str = ""
+    load: int = 0
 
     @property
     def key(self) -> tuple[str, str, int, str]:
@@ -82,7 +85,9 @@ def run_episode(job: EpisodeJob) -> Episode:
     """Run a job and return its outcome."""
     counter = ObjectCounter(job.counted)
     observers = (counter,) if job.counted else ()
-    result = run_file(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings, observers=observers)
+    path = resolve_scenario(job.scenario)
+    source = with_load(path, job.load) if job.load else path
+    result = run_file(source, seed=job.seed, settings=job.settings, observers=observers)
     return Episode(
         scenario=job.scenario,
         arm=job.arm,

@@ -18,6 +18,8 @@ class Case:
     arm      name of the settings, without the scenario
     counted  station whose known objects are counted; "" for none
     varied   function that returns the parameters of a seed, if the part draws them instead of the scenario
+    load     number of stations that are added to the scenario and send CAM; see `with_load`
+    shift    number that is added to the seed, so that an arm can have several runs per episode
     """
 
     scenario: str
@@ -25,14 +27,17 @@ class Case:
     settings: RunSettings
     counted: str = ""
     varied: Callable[[int], Mapping[str, str]] | None = None
+    load: int = 0
+    shift: int = 0
 
     def job(self, seed: int) -> EpisodeJob:
         """Return the run of a seed."""
+        seed += self.shift
         settings = self.settings
         if self.varied is not None:
             settings = replace(settings, parameters={**settings.parameters, **self.varied(seed)})
-        digest = job_digest(self.scenario, settings)
-        return EpisodeJob(self.scenario, self.arm, seed, settings, digest, self.counted)
+        digest = job_digest(self.scenario, settings, load=self.load)
+        return EpisodeJob(self.scenario, self.arm, seed, settings, digest, self.counted, self.load)
 
 
 @dataclass(frozen=True)

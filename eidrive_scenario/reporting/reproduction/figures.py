@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from eidrive_scenario.experiments.published import COUNTS, TABLE_2
 from eidrive_scenario.experiments.reproduction.layout import PartReport, Row
 from eidrive_scenario.files.atomic import create
+from eidrive_scenario.reporting.reproduction.channel_curves import channels_figure
 from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
 from eidrive_scenario.reporting.reproduction.rows import number, scenario_title
 
@@ -112,6 +113,7 @@ FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
     "table3": table_3_figure,
     "detection": detection_figure,
     "sensitivity": sensitivity_figure,
+    "channels": channels_figure,
 }
 """Figure of a part, by the name of the part. The others have none."""
 

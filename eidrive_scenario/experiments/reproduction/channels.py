@@ -1,0 +1,211 @@
+"""Success over latency, loss and load of the channel in scenarios 1 and 5, which the paper lacks.
+
+The channel acts on links only. Success is a run without a collision, as in Table III. Starts and speeds vary between
+seeds as in the tables of the paper.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from statistics import median
+from typing import Any
+
+from eidrive_scenario.experiments.paper import EGO
+from eidrive_scenario.experiments.reproduction.channels_text import conclusions, setup
+from eidrive_scenario.experiments.reproduction.encounters import collided
+from eidrive_scenario.experiments.reproduction.episodes import Episode
+from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
+from eidrive_scenario.experiments.reproduction.part import Case, Part, by_case
+from eidrive_scenario.experiments.reproduction.sensitivity import delay
+from eidrive_scenario.experiments.statistics import wilson
+from eidrive_scenario.simulation import RunSettings
+
+BLOCKS: Mapping[tuple[str, str], int] = {
+    ("coop/scenario_1", "conflict_area"): 2,
+    ("coop/scenario_1", "behavior"): 2,
+    ("coop/scenario_5", "conflict_area"): 1,
+}
+"""Runs per episode by scenario and planner; scenario 5 has heavy traffic and takes longer."""
+LOADED = ("coop/scenario_1", "conflict_area")
+"""Scenario and planner of the runs with added stations."""
+LATENCIES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
+"""Constant latencies [s]."""
+LOSSES = (0.1, 0.3, 0.5, 0.7, 0.8, 0.9)
+"""Shares of lost messages."""
+BURST = 10
+"""Mean length of loss bursts [messages], as in the profile `bursty`: half a second at 20 Hz."""
+POWERS = (23.0, 0.0, -4.0, -7.0, -10.0, -13.0, -16.0)
+"""Transmission powers of the radio by geometry [dBm]. The least ones are far below those of products, and stand for any
+loss of signal that depends on the places of the stations."""
+STATIONS = (2, 25, 50, 100, 200)
+"""Numbers of stations on the loaded channel, with the ego and the roadside unit."""
+ACCESS: Mapping[str, Mapping[str, Any]] = {
+    "802.11p": {"technology": "80211p"},
+    "C-V2X Mode 4": {"technology": "cv2x_mode4", "sidelink": {"interval": 0.1, "subchannels": 4}},
+}
+"""Medium access of the loaded channel."""
+URBAN = {"model": "radio", "path_loss": {"kind": "tr37885", "environment": "urban"}, "queue": {"discipline": "lcfs"}}
+"""Settings of all radio channels."""
+DURATIONS = {"coop/scenario_1": 9.0, "coop/scenario_5": 18.0}
+"""End of a run by scenario [s]; the cars are nearest before 7 s and 14 s."""
+DETECTORS = ("oracle",)
+
+
+def losses(kind: str, share: float) -> Mapping[str, Any]:
+    """Return the channel profile of a share of lost messages, `independent` or `bursty`."""
+    if kind == "bursty":
+        return {"model": "composed", "loss": {"kind": "gilbert_elliott", "probability": share, "burst": BURST}}
+    return {"model": "composed", "loss": {"kind": "bernoulli", "probability": share}}
+
+
+def radio(power: float) -> Mapping[str, Any]:
+    """Return the profile of 802.11p with rays between the antennas and a transmission power [dBm]."""
+    return {**URBAN, "tx_power_dbm": power}
+
+
+def loaded(access: str) -> Mapping[str, Any]:
+    """Return the profile of the loaded channel.
+
+    All lines of sight are clear, so that losses are caused by medium access. Messages are ready at random times of the
+    tick, because stations are not synchronized.
+    """
+    return {**URBAN, **ACCESS[access], "line_of_sight": "clear", "jitter": 0.05}
+
+
+def cases(detectors: Sequence[str]) -> list[Case]:
+    """Return the runs of all arms."""
+    found = []
+    for detector, ((scenario, planner), blocks) in product(detectors, BLOCKS.items()):
+        arms: dict[str, str | Mapping[str, Any]] = {"none": "none"}
+        arms |= {f"latency {latency}": delay(latency) for latency in LATENCIES}
+        arms |= {f"{kind} {share}": losses(kind, share) for kind in ("independent", "bursty") for share in LOSSES}
+        arms |= {f"radio {power}": radio(power) for power in POWERS}
+        for (arm, channel), block in product(arms.items(), range(blocks)):
+            name = f"{detector} {planner} {arm} {block}"
+            found.append(Case(scenario, name, _settings(scenario, detector, planner, channel), shift=1000 * block))
+    for detector, access, stations in product(detectors, ACCESS, STATIONS):
+        settings = _settings(LOADED[0], detector, LOADED[1], loaded(access), sender="RSU")
+        found.append(Case(LOADED[0], f"{detector} {access} {stations}", settings, load=stations - 2))
+    return found
+
+
+def _settings(
+    scenario: str, detector: str, planner: str, channel: str | Mapping[str, Any], sender: str | None = None
+) -> RunSettings:
+    """Return the settings of a run, which measures the links to the ego; those of one sender also the busy ratio."""
+    links = {"receiver": EGO} if sender is None else {"receiver": EGO, "sender": sender}
+    criteria: dict[str, Any] = {}
+    if channel != "none":
+        criteria = {"age_of_information": links, "packet_reception_ratio": links}
+    if sender is not None:
+        criteria["channel_busy_ratio"] = {"of": EGO}
+    return RunSettings(
+        detector=detector,
+        planner=planner,
+        channel=channel,
+        criteria=criteria or None,
+        time_limit=DURATIONS[scenario],
+    )
+
+
+def outcome(episodes: Sequence[Episode]) -> dict[str, Value]:
+    """Return the measured values of an arm.
+
+    free, share, low, high   runs without a collision, their share and its Wilson interval
+    reception                mean share of messages to the ego that arrive; None without messages
+    age                      median of the mean age of information of the runs [s]; None if infinite or without messages
+    """
+    free = sum(not collided(episode) for episode in episodes)
+    found = wilson(free, len(episodes))
+    received = [episode.metrics["packet_reception_ratio"] for episode in episodes if _has_links(episode)]
+    age = _median(episodes, "age_of_information.mean")
+    return {
+        "episodes": len(episodes),
+        "free": free,
+        "share": found.share,
+        "low": found.low,
+        "high": found.high,
+        "reception": sum(received) / len(received) if received else None,
+        "age": age,
+    }
+
+
+def _has_links(episode: Episode) -> bool:
+    return "packet_reception_ratio" in episode.metrics
+
+
+def _median(episodes: Sequence[Episode], name: str) -> float | None:
+    """Return the median of a metric; runs in which it is infinite lack it."""
+    value = median(episode.metrics.get(name, math.inf) for episode in episodes)
+    return value if math.isfinite(value) else None
+
+
+def fault_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
+    """Yield the arms of fixed latencies, fixed losses and radio by geometry."""
+    found = by_case(episodes)
+    arms: list[tuple[str, float | None]] = [("none", None)]
+    arms += [("latency", latency) for latency in LATENCIES]
+    arms += [(kind, share) for kind in ("independent", "bursty") for share in LOSSES]
+    arms += [("radio", power) for power in POWERS]
+    for detector, (scenario, planner) in product(detectors, BLOCKS):
+        for fault, value in arms:
+            arm = fault if value is None else f"{fault} {value}"
+            blocks = range(BLOCKS[scenario, planner])
+            mine = [one for block in blocks for one in found[scenario, f"{detector} {planner} {arm} {block}"]]
+            place: dict[str, Value] = {"detector": detector, "scenario": scenario, "planner": planner}
+            yield {**place, "fault": fault, "value": value, **outcome(mine)}
+
+
+def load_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
+    """Yield the arms with added stations."""
+    found = by_case(episodes)
+    for detector, access, stations in product(detectors, ACCESS, STATIONS):
+        mine = found[LOADED[0], f"{detector} {access} {stations}"]
+        yield {
+            "detector": detector,
+            "access": access,
+            "stations": stations,
+            **outcome(mine),
+            "p95_age": _median(mine, "age_of_information.p95"),
+            "busy": _median(mine, f"channel_busy_ratio.{EGO}"),
+        }
+
+
+SUCCESS = (
+    Column("success", "{free} of {episodes} = {share:.0%}", ("free", "episodes", "share")),
+    Column("95 %", "{low:.0%} to {high:.0%}", ("low", "high")),
+    plain("received", "reception", ".0%"),
+    plain("mean age [s]", "age", ".3f"),
+)
+FAULT_COLUMNS = (
+    plain("scenario", "scenario"),
+    plain("planner", "planner"),
+    plain("fault", "fault"),
+    plain("value", "value", "g"),
+    *SUCCESS,
+)
+LOAD_COLUMNS = (
+    plain("medium access", "access"),
+    plain("stations", "stations"),
+    plain("busy", "busy", ".0%"),
+    *SUCCESS,
+    plain("95 % of the time below [s]", "p95_age", ".3f"),
+)
+
+
+def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
+    """Return the report: success over latency, loss and load."""
+    faults, loads = tuple(fault_rows(episodes, detectors)), tuple(load_rows(episodes, detectors))
+    runs = {(str(row["scenario"]), str(row["planner"])): int(row["episodes"] or 0) for row in faults}
+    sections = (
+        Section("Set-up", setup(runs, int(loads[0]["episodes"] or 0))),
+        Section("Result", conclusions(faults, loads)),
+        Section("Latency, loss and radio", (), DataTable("channels", FAULT_COLUMNS, faults)),
+        Section("Load", (), DataTable("channels_load", LOAD_COLUMNS, loads)),
+    )
+    return PartReport(PART.title, sections)
+
+
+PART = Part("channels", "Latency, loss and load of the channel", 10, DETECTORS, DETECTORS, cases, report)
