@@ -29,7 +29,7 @@ from eidrive_scenario.simulation import RunSettings
 PLANNERS = ("conflict_area", "behavior")
 """The rule of the paper, and the default planner of this project."""
 DETECTORS = ("oracle", "yolov5")
-DURATION = 7.0
+DURATION = 5.5
 """End of an episode [s]. The cars are nearest before 5 s; afterwards they move away from each other."""
 
 

@@ -19,7 +19,7 @@ def setup(episodes: int) -> tuple[str, ...]:
         "the ego are those of EI-Drive; the latency is 0.3 s, the loss 30 %. The metric of the paper is the minimum "
         "distance between the centers of the two cars, which remains above 0 in a crash: 3.4 m for a square hit. "
         "The gap between the bodies, the speed of impact and the minimum time to collision stand beside it. An episode "
-        "ends after 7 s, more than 2 s after the cars were nearest, because nothing that is measured changes later.",
+        "ends after 5.5 s, half a second after the cars were nearest, because nothing that is measured changes later.",
         "Free were the acceleration of both cars (3.5 m/s²; the paper does not specify that of CARLA's cars) and, one "
         "per scenario, the start of the hidden car: the largest distance in steps of half a meter from which "
         "cooperation avoids the crash with the oracle in seeds 1 to 20. They are equal in all cells; none was chosen "

@@ -13,8 +13,8 @@ from eidrive_scenario.experiments.reproduction.layout import Row
 from eidrive_scenario.experiments.reproduction.sensitivity_text import LIBRARY, ORIGINAL
 from eidrive_scenario.reporting.reproduction.rows import number, scenario_title
 
-COLORS = "RdYlGn_r"
-"""Color map of the probability of a collision, from 0 (green) to 1 (red)."""
+COLORS = "YlOrBr"
+"""Color map of the probability of a collision, from 0 (light) to 1 (dark); color-blind readers can distinguish it."""
 MARKS = (("s", "start of EI-Drive", ORIGINAL), ("o", "start of the library", LIBRARY))
 """Marks on the maps: symbol, label and places."""
 PAPER_LATENCY = 0.3
