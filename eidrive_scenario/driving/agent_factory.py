@@ -19,6 +19,7 @@ from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
+from eidrive_scenario.perception.pose_noise import PoseNoiseProcess
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerSettings
 from eidrive_scenario.registry import construct, registry
@@ -130,6 +131,7 @@ def build_agent(
             localizer=_localizer(spec.name, seed, sensors) if settings.localization == "ekf" else None,
             latency=settings.detector_latency,
             pose_error=settings.pose_error,
+            pose_noise=settings.pose_noise and PoseNoiseProcess(settings.pose_noise, spec.name, seed),
             false_objects=settings.false_objects,
         ),
         fusion=fusion,

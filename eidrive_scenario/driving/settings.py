@@ -19,6 +19,7 @@ from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.openscenario.values.references import resolve_references
 from eidrive_scenario.perception.faults import MAX_FALSE_OBJECTS, FalseObject, PoseError
+from eidrive_scenario.perception.pose_noise import PoseNoise
 from eidrive_scenario.perception.tracking.settings import TrackerKind, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.sensor import check_unique, default_sensor, parse_sensor
@@ -95,6 +96,7 @@ class AgentSettings(Settings):
     tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks detections without velocities
     localization    `oracle`, or `ekf`: pose estimation by GNSS and IMU
     pose_error      constant error of the assumed pose, as by wrong calibration
+    pose_noise      random error of the assumed pose, whose covariance the station states in its messages
     false_objects   objects that its detector reports, and that do not exist
     obey_signals    whether the vehicle stops at red traffic lights and stop signs
     sensors         kinds (`truth, camera`), or a mapping from names to settings; None uses the defaults of the detector
@@ -129,6 +131,7 @@ class AgentSettings(Settings):
     tracker: Annotated[SerializeAsAny[TrackerKind] | None, BeforeValidator(tracker_setting)] = None
     localization: Literal["oracle", "ekf"] = "oracle"
     pose_error: PoseError | None = None
+    pose_noise: PoseNoise | None = None
     false_objects: Annotated[tuple[FalseObject, ...], Field(max_length=MAX_FALSE_OBJECTS)] = ()
     obey_signals: bool = False
     fusion: str = "covariance_intersection"

@@ -11,6 +11,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
 from eidrive_scenario.perception.localization import PLANE, Localizer
+from eidrive_scenario.perception.pose_noise import PoseNoiseProcess
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.registry import is_built_in
@@ -25,7 +26,8 @@ class Perception:
                arrive meanwhile are processed concurrently, each with the same latency
     tracker    None if detections are passed on unchanged
     localizer  None if the station has its true pose
-    pose_error     error of the pose, in addition to that of the localizer
+    pose_error     constant error of the pose, in addition to that of the localizer
+    pose_noise     random error of the pose, in addition to both
     false_objects  objects that the detector reports, and that do not exist
     """
 
@@ -37,6 +39,7 @@ class Perception:
         localizer: Localizer | None = None,
         latency: float = 0.0,
         pose_error: PoseError | None = None,
+        pose_noise: PoseNoiseProcess | None = None,
         false_objects: Sequence[FalseObject] = (),
     ) -> None:
         self.detector = detector
@@ -46,6 +49,7 @@ class Perception:
         self._localizer = localizer
         self._latency = latency
         self._pose_error = pose_error
+        self._pose_noise = pose_noise
         self._false_objects = false_objects
         self._computing: deque[tuple[float, Detections, Readings]] = deque()
 
@@ -55,18 +59,24 @@ class Perception:
 
         The covariances of its objects do not contain it: it is common to all objects, and tracking does not reduce it.
         """
-        return None if self._localizer is None else self._localizer.estimate.covariance[PLANE]
+        estimated = None if self._localizer is None else self._localizer.estimate.covariance[PLANE]
+        if self._pose_noise is None:
+            return estimated
+        noise = self._pose_noise.covariance
+        return noise if estimated is None else estimated + noise
 
     def locate(self, readings: Readings) -> Readings:
         """Return the readings with the pose that the station assumes: estimated by its localizer, with its error."""
         if self._localizer is not None:
             readings = self._localizer.with_estimated_pose(readings)
-        return readings if self._pose_error is None else with_pose_error(readings, self._pose_error)
+        if self._pose_error is not None:
+            readings = with_pose_error(readings, self._pose_error)
+        return readings if self._pose_noise is None else self._pose_noise.displaced(readings)
 
     @property
     def has_exact_pose(self) -> bool:
         """Whether the assumed pose is the true one."""
-        return self._localizer is None and self._pose_error is None
+        return self._localizer is None and self._pose_error is None and self._pose_noise is None
 
     def signals(self, readings: Readings) -> Sequence[SignalReading]:
         """Return the signals in sight: those that the detector reads, and those of the signal sensor."""

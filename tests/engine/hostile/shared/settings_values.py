@@ -38,6 +38,7 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
         "conflict_hold_time": 1.0,
         "min_existence": 0.4,
         "pose_error": {"x": 0.5, "y": -0.5, "yaw": 1.0},
+        "pose_noise": {"position": 0.2, "yaw": 0.2, "correlation_time": 1.0},
         "false_objects": [
             {
                 "x": 40.0,
