@@ -131,7 +131,7 @@ def build_agent(
             localizer=_localizer(spec.name, seed, sensors) if settings.localization == "ekf" else None,
             latency=settings.detector_latency,
             pose_error=settings.pose_error,
-            pose_noise=settings.pose_noise and PoseNoiseProcess(settings.pose_noise, spec.name, seed),
+            pose_noise=_pose_noise(settings, spec.name, seed),
             false_objects=settings.false_objects,
         ),
         fusion=fusion,
@@ -182,6 +182,10 @@ def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | No
     if chosen.kind == NO_TRACKER:
         return None
     return construct(registry("trackers").load(chosen.kind, TrackingMethod), chosen)  # type: ignore[no-any-return]
+
+
+def _pose_noise(settings: AgentSettings, name: str, seed: int) -> PoseNoiseProcess | None:
+    return None if settings.pose_noise is None else PoseNoiseProcess(settings.pose_noise, name, seed)
 
 
 def _localizer(name: str, seed: int, sensors: Mapping[str, SensorSettings]) -> Localizer:

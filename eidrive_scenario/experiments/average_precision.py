@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.perception.learned.networks.suppression import covered, overlap
 
 LEAST_OVERLAP = 0.5
@@ -19,13 +19,15 @@ class Matches:
     """Result of matching the detections of one image with its objects, of one class or of all.
 
     scores (N,); correct (N,) whether the detection matches an object; counted (N,) False for detections of ignored
-    objects; found (M,) whether each object of the image, including ignored ones, is matched
+    objects; found (M,) whether each object of the image, including ignored ones, is matched; taken (N,) row of the
+    object that a detection matches, including ignored ones, or -1; empty if it is unknown
     """
 
     scores: Array
     correct: Bools
     counted: Bools
     found: Bools
+    taken: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 def match(boxes: Array, scores: Array, objects: Array, ignored: Bools, least: float = LEAST_OVERLAP) -> Matches:
@@ -54,20 +56,23 @@ def match_by_share(
     order = np.argsort(-scores, kind="stable")
     correct, counted = np.zeros(len(order), dtype=bool), np.ones(len(order), dtype=bool)
     found = np.zeros(len(ignored), dtype=bool)
+    taken = np.full(len(order), -1)
     for rank, row in enumerate(order.tolist()):
         free = np.where(found, -1.0, shares[row])
         wanted = np.where(ignored, -1.0, free)
         best = int(np.argmax(wanted)) if len(wanted) else -1
         if best >= 0 and wanted[best] >= least:
             found[best] = correct[rank] = True
+            taken[rank] = best
             continue
         other = int(np.argmax(free)) if len(free) else -1
         if other >= 0 and free[other] >= least:
             found[other] = True
+            taken[rank] = other
             counted[rank] = False
         elif harmless is not None and harmless[row]:
             counted[rank] = False
-    return Matches(scores[order], correct, counted, found)
+    return Matches(scores[order], correct, counted, found, taken)
 
 
 def average_precision(matches: Sequence[Matches], objects: int) -> float:
@@ -79,9 +84,27 @@ def average_precision(matches: Sequence[Matches], objects: int) -> float:
     recall, precision = precision_recall(matches, objects)
     if objects == 0:
         return float("nan")
+    return _area(recall, precision)
+
+
+def area_in_order(correct: Bools, objects: int) -> float:
+    """Return the area under precision over recall of detections in the given order; NaN without objects.
+
+    OpenCOOD evaluates detections in the order of the frames, sorted by score within a frame only, unless a global sort
+    is selected.
+    """
+    return _area(*_precision_recall(correct, objects)) if objects else float("nan")
+
+
+def _area(recall: Array, precision: Array) -> float:
     envelope = np.maximum.accumulate(precision[::-1])[::-1]
     steps = np.diff(recall, prepend=0.0)
     return float((steps * envelope).sum())
+
+
+def _precision_recall(correct: Bools, objects: int) -> tuple[Array, Array]:
+    right = np.cumsum(correct)
+    return right / max(objects, 1), right / np.arange(1, len(correct) + 1)
 
 
 def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, Array]:
@@ -91,9 +114,7 @@ def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, A
     counted = np.concatenate([entry.counted for entry in matches])
     scores = np.concatenate([entry.scores for entry in matches])[counted]
     correct = np.concatenate([entry.correct for entry in matches])[counted]
-    order = np.argsort(-scores, kind="stable")
-    right = np.cumsum(correct[order])
-    return right / max(objects, 1), right / np.arange(1, len(order) + 1)
+    return _precision_recall(correct[np.argsort(-scores, kind="stable")], objects)
 
 
 def best_confidence(matches: Sequence[Matches], objects: int) -> float:

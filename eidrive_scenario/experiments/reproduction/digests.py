@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
+from eidrive_scenario.experiments import average_precision, cooperative_perception
+from eidrive_scenario.experiments.cooperative_perception.conditions import Condition
 from eidrive_scenario.experiments.reproduction import channel_load, episodes
 from eidrive_scenario.library import library_path, resolve_scenario
 from eidrive_scenario.resolved_settings import canonical_json, sha256_of
@@ -27,16 +29,19 @@ _LENGTH = 16
 """Number of hexadecimal digits of a digest."""
 
 
-def job_digest(scenario: str, settings: RunSettings, *, load: int = 0) -> str:
+def job_digest(
+    scenario: str, settings: RunSettings, *, load: int = 0, conditions: Sequence[Condition] = ()
+) -> str:
     """Return the digest of a job: equal digests and seeds give equal outcomes.
 
-    load  number of stations that are added to the scenario
+    load        number of stations that are added to the scenario
+    conditions  conditions under which the perception of the ego is measured
     """
     given = {name: str(value) for name, value in asdict(settings).items()}
-    text = canonical_json(
-        {"code": code_digest(), "scenario": _scenario_digest(scenario), "settings": given, "load": load}
-    )
-    return sha256_of(text.encode())[:_LENGTH]
+    content = {"code": code_digest(), "scenario": _scenario_digest(scenario), "settings": given, "load": load}
+    if conditions:
+        content |= {"conditions": [one.name for one in conditions], "measurement": _measurement_digest()}
+    return sha256_of(canonical_json(content).encode())[:_LENGTH]
 
 
 @cache
@@ -66,6 +71,14 @@ def _code_files() -> Iterator[tuple[Path, Path]]:
         for path in sorted((library_path() / folder).rglob("*")):
             if path.is_file():
                 yield library_path(), path
+
+
+@cache
+def _measurement_digest() -> str:
+    """Return the digest of the code that measures perception, which runs of other parts do not execute."""
+    folder = Path(cooperative_perception.__file__).parent
+    paths = [Path(average_precision.__file__), *sorted(folder.glob("*.py"))]
+    return sha256_of(b"".join(path.read_bytes() for path in paths))[:_LENGTH]
 
 
 @cache

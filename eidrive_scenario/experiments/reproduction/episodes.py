@@ -7,6 +7,10 @@ from dataclasses import dataclass
 
 import msgspec
 
+from eidrive_scenario.experiments.cooperative_perception.conditions import Condition
+from eidrive_scenario.experiments.cooperative_perception.samples import PerceptionRecord
+from eidrive_scenario.experiments.cooperative_perception.trial import run_trial
+from eidrive_scenario.experiments.paper import EGO
 from eidrive_scenario.experiments.repetitions import Job
 from eidrive_scenario.experiments.reproduction.channel_load import with_load
 from eidrive_scenario.library import resolve_scenario
@@ -23,6 +27,7 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     failed   names of the criteria that failed
     counts   number of objects that the counted station knew at each time step, after fusion
     wall_s   duration of the run [s]
+    perception  detections of the ego by condition, of a run that measures them
     """
 
     scenario: str
@@ -35,6 +40,7 @@ class Episode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     metrics: dict[str, float]
     failed: tuple[str, ...] = ()
     counts: tuple[int, ...] = ()
+    perception: PerceptionRecord | None = None
 
     @property
     def key(self) -> tuple[str, str, int, str]:
@@ -49,11 +55,13 @@ class EpisodeJob(Job):
     digest   digest of the settings and of the code
     counted  station whose known objects are counted at each time step; "" for none
     load     number of stations that are added to the scenario
+    conditions  conditions under which the perception of the ego is measured
     """
 
     digest: str = ""
     counted: str = ""
     load: int = 0
+    conditions: tuple[Condition, ...] = ()
 
     @property
     def key(self) -> tuple[str, str, int, str]:
@@ -85,9 +93,13 @@ def run_episode(job: EpisodeJob) -> Episode:
     """Run a job and return its outcome."""
     counter = ObjectCounter(job.counted)
     observers = (counter,) if job.counted else ()
-    path = resolve_scenario(job.scenario)
-    source = with_load(path, job.load) if job.load else path
-    result = run_file(source, seed=job.seed, settings=job.settings, observers=observers)
+    perception = None
+    if job.conditions:
+        result, perception = run_trial(job.scenario, job.seed, job.settings, EGO, job.conditions)
+    else:
+        path = resolve_scenario(job.scenario)
+        source = with_load(path, job.load) if job.load else path
+        result = run_file(source, seed=job.seed, settings=job.settings, observers=observers)
     return Episode(
         scenario=job.scenario,
         arm=job.arm,
@@ -99,4 +111,5 @@ def run_episode(job: EpisodeJob) -> Episode:
         metrics={name: float(value) for name, value in result.metrics.items() if math.isfinite(value)},
         failed=tuple(verdict.name for verdict in result.criteria if not verdict.passed),
         counts=tuple(counter.counts),
+        perception=perception,
     )

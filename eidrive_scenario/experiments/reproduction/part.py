@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from eidrive_scenario.experiments.cooperative_perception.conditions import Condition
 from eidrive_scenario.experiments.reproduction.digests import job_digest
 from eidrive_scenario.experiments.reproduction.episodes import Episode, EpisodeJob
 from eidrive_scenario.experiments.reproduction.layout import PartReport
@@ -20,6 +21,7 @@ class Case:
     varied   function that returns the parameters of a seed, if the part draws them instead of the scenario
     load     number of stations that are added to the scenario and send CAM; see `with_load`
     shift    number that is added to the seed, so that an arm can have several runs per episode
+    conditions  conditions under which the perception of the ego is measured in the same run
     """
 
     scenario: str
@@ -29,6 +31,7 @@ class Case:
     varied: Callable[[int], Mapping[str, str]] | None = None
     load: int = 0
     shift: int = 0
+    conditions: tuple[Condition, ...] = ()
 
     def job(self, seed: int) -> EpisodeJob:
         """Return the run of a seed."""
@@ -36,8 +39,10 @@ class Case:
         settings = self.settings
         if self.varied is not None:
             settings = replace(settings, parameters={**settings.parameters, **self.varied(seed)})
-        digest = job_digest(self.scenario, settings, load=self.load)
-        return EpisodeJob(self.scenario, self.arm, seed, settings, digest, self.counted, self.load)
+        digest = job_digest(self.scenario, settings, load=self.load, conditions=self.conditions)
+        return EpisodeJob(
+            self.scenario, self.arm, seed, settings, digest, self.counted, self.load, self.conditions
+        )
 
 
 @dataclass(frozen=True)

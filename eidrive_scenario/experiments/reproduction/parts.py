@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.experiments.reproduction import channels, detection, ei, pipeline, sensitivity, table_2, table_3
+from eidrive_scenario.experiments.reproduction import (
+    channels,
+    detection,
+    ei,
+    perception,
+    pipeline,
+    sensitivity,
+    table_2,
+    table_3,
+)
 from eidrive_scenario.experiments.reproduction.part import Part
 
-MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity, channels)
+MODULES = (table_2, table_3, detection, pipeline, ei, sensitivity, channels, perception)
 PARTS = {module.PART.name: module.PART for module in MODULES}
 """Parts by name."""
 ALL = "all"

@@ -22,9 +22,7 @@ class Nothing(Detector):
         return Detections(readings.time)
 
 
-def errors(
-    count: int = 4000, *, span: float = 0.0, step: float = 0.1, seed: int = 1, deviation: float = 0.4
-) -> Array:
+def errors(count: int = 4000, *, span: float = 0.0, step: float = 0.1, seed: int = 1, deviation: float = 0.4) -> Array:
     process = PoseNoiseProcess(PoseNoise(position=deviation, yaw=2.0, correlation_time=span), "RSU", seed)
     return np.array([process.error(step * number) for number in range(count)])
 

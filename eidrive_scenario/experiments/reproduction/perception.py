@@ -1,0 +1,219 @@
+"""Cooperative perception as its field reports it: average precision over pose error, latency, loss and volume."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+from eidrive_scenario.experiments.cooperative_perception.conditions import (
+    ARMS,
+    AXES,
+    COMPARED,
+    SCAN_RATE,
+    Condition,
+    all_conditions,
+    by_volume,
+    on_axis,
+)
+from eidrive_scenario.experiments.cooperative_perception.samples import OVERLAPS, RANGES, PerceptionRecord
+from eidrive_scenario.experiments.cooperative_perception.scores import Pool
+from eidrive_scenario.experiments.reproduction.episodes import Episode
+from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
+from eidrive_scenario.experiments.reproduction.part import Case, Part, by_case
+from eidrive_scenario.experiments.reproduction.perception_shapes import SHAPE_COLUMNS, shapes
+from eidrive_scenario.experiments.reproduction.perception_text import conclusions, protocol, setup
+from eidrive_scenario.simulation import RunSettings
+
+SCENES = ("coop/scenario_3", "coop/scenario_4", "coop/scenario_5", "coop/scenario_7")
+"""Parked ego with a vehicle, and with roadside units; driven ego with both at two sites."""
+DETECTORS = ("lidar",)
+DURATION = 8.0
+"""End of a run [s]."""
+ALL_RANGES = "all"
+
+
+def cases(detectors: Sequence[str]) -> list[Case]:
+    """Return one run per scene: all arms measure the same frames."""
+    conditions = all_conditions()
+    return [
+        Case(scene, detector, RunSettings(detector=detector, time_limit=DURATION), conditions=conditions)
+        for scene, detector in product(SCENES, detectors)
+    ]
+
+
+def records(episodes: Sequence[Episode]) -> list[PerceptionRecord]:
+    """Return the measurements by scene and seed."""
+    ordered = [one for mine in by_case(episodes).values() for one in mine]
+    return [one.perception for one in ordered if one.perception is not None]
+
+
+def range_name(place: int | None) -> str:
+    """Return the name of a range class, such as `30 to 50 m`."""
+    if place is None:
+        return ALL_RANGES
+    return f"{RANGES[place - 1] if place else 0.0:g} to {RANGES[place]:g} m"
+
+
+def curve_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
+    """Yield the average precision of each arm over each axis, by range and overlap."""
+    places: tuple[int | None, ...] = (None, *range(len(RANGES)))
+    for arm, axis in product(COMPARED, AXES):
+        for value in AXES[axis][2]:
+            pool = Pool(found, on_axis(arm, axis, value).name)
+            for place, (number, overlap) in product(places, enumerate(OVERLAPS)):
+                one = pool.precision(number, place)
+                yield {
+                    "arm": arm,
+                    "axis": axis,
+                    "value": value,
+                    "range": range_name(place),
+                    "iou": overlap,
+                    "ap": _known(one.value),
+                    "low": _known(one.low),
+                    "high": _known(one.high),
+                    "ap_local_sort": _known(one.local),
+                    "objects": one.objects,
+                }
+
+
+def hidden_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
+    """Yield the recall of objects that are hidden to the ego and that the lidar of another station hits."""
+    for arm, axis in product(COMPARED, AXES):
+        for value in AXES[axis][2]:
+            pool = Pool(found, on_axis(arm, axis, value).name)
+            for number, overlap in enumerate(OVERLAPS):
+                one = pool.hidden_recall(number)
+                place: dict[str, Value] = {"arm": arm, "axis": axis, "value": value, "iou": overlap}
+                counts: dict[str, Value] = {"found": one.found, "hidden": one.objects}
+                limits = {"low": _known(one.low), "high": _known(one.high)}
+                yield {**place, **counts, "recall": _known(one.value), **limits}
+
+
+def arm_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
+    """Yield the results of each arm without faults, with both ways of sorting and both truths."""
+    for arm in ARMS:
+        pool = Pool(found, Condition(arm).name)
+        whole = [pool.precision(number) for number in range(len(OVERLAPS))]
+        row: dict[str, Value] = {"arm": arm}
+        for overlap, one in zip(OVERLAPS, whole, strict=True):
+            row |= {f"ap_{overlap:g}": one.value, f"low_{overlap:g}": one.low, f"high_{overlap:g}": one.high}
+        for place in range(len(RANGES)):
+            row[f"ap_0.5_range_{place}"] = _known(pool.precision(1, place).value)
+        row["ap_0.5_local_sort"] = whole[1].local
+        row["ap_0.5_hit"] = _known(pool.precision_of_hit_objects().value)
+        row["hidden_0.5"] = _known(pool.hidden_recall(1).value)
+        yield row
+
+
+def volume_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
+    """Yield the average precision beside the size of the messages, for the ego alone and for each way of sending."""
+    for one in (Condition("none"), *by_volume()):
+        pool = Pool(found, one.name)
+        sends = ARMS[one.arm].cooperates
+        row: dict[str, Value] = {
+            "arm": one.arm,
+            "messages_per_second": SCAN_RATE / one.every if sends else None,
+            "cell": one.cell if ARMS[one.arm].points else None,
+            "megabytes_per_second": pool.megabytes_per_second,
+        }
+        yield row | {f"ap_{overlap:g}": pool.precision(number).value for number, overlap in enumerate(OVERLAPS)}
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _precision(overlap: float) -> Column:
+    fields = (f"ap_{overlap:g}", f"low_{overlap:g}", f"high_{overlap:g}")
+    return Column(f"AP {overlap:g} (95 %)", "{%s:.3f} (%s)" % (fields[0], "{%s:.2f} to {%s:.2f}" % fields[1:]), fields)
+
+
+ARM_COLUMNS = (
+    plain("arm", "arm"),
+    *(_precision(overlap) for overlap in OVERLAPS),
+    *(plain(f"AP 0.5, {range_name(place)}", f"ap_0.5_range_{place}", ".3f") for place in range(len(RANGES))),
+    plain("AP 0.5, local sort", "ap_0.5_local_sort", ".3f"),
+    plain("AP 0.5, hit objects", "ap_0.5_hit", ".3f"),
+    plain("recall of hidden objects, 0.5", "hidden_0.5", ".3f"),
+)
+CURVE_COLUMNS = (
+    plain("axis", "axis"),
+    plain("value", "value", "g"),
+    *(plain(f"{arm}, AP {overlap:g}", f"{arm} {overlap:g}", ".3f") for overlap in OVERLAPS[1:] for arm in COMPARED),
+)
+HIDDEN_COLUMNS = (
+    plain("axis", "axis"),
+    plain("value", "value", "g"),
+    *(plain(arm, arm, ".3f") for arm in COMPARED),
+    plain("objects", "hidden"),
+)
+VOLUME_COLUMNS = (
+    plain("arm", "arm"),
+    plain("messages per second", "messages_per_second", "g"),
+    plain("grid [m]", "cell", "g"),
+    plain("MB/s", "megabytes_per_second", ".4f"),
+    *(plain(f"AP {overlap:g}", f"ap_{overlap:g}", ".3f") for overlap in OVERLAPS),
+)
+
+
+def _curve_table(rows: Sequence[Row]) -> DataTable:
+    """Return the table of all ranges with one column per arm and overlap."""
+    held = {
+        (row["axis"], row["value"], row["arm"], row["iou"]): row["ap"] for row in rows if row["range"] == ALL_RANGES
+    }
+    lines = [
+        {"axis": axis, "value": value}
+        | {f"{arm} {overlap:g}": held[axis, value, arm, overlap] for arm in COMPARED for overlap in OVERLAPS}
+        for axis, (_, _, values) in AXES.items()
+        for value in values
+    ]
+    return DataTable("perception_curves", CURVE_COLUMNS, tuple(lines))
+
+
+def _hidden_table(rows: Sequence[Row]) -> DataTable:
+    """Return the table of the recall at the overlap 0.5 with one column per arm."""
+    held = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
+    lines = [
+        {"axis": axis, "value": value}
+        | {arm: held[axis, value, arm]["recall"] for arm in COMPARED}
+        | {"hidden": held[axis, value, COMPARED[0]]["hidden"]}
+        for axis, (_, _, values) in AXES.items()
+        for value in values
+    ]
+    return DataTable("perception_hidden_curves", HIDDEN_COLUMNS, tuple(lines))
+
+
+def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
+    """Return the report: protocol, results without faults, curves, hidden objects, volume, and shapes of the curves."""
+    found = records(episodes)
+    curves, hidden = tuple(curve_rows(found)), tuple(hidden_rows(found))
+    arms, volumes = tuple(arm_rows(found)), tuple(volume_rows(found))
+    seen = shapes(curves, volumes)
+    seeds = len({one.seed for one in episodes})
+    sections = (
+        Section("Set-up", setup(found, seeds, len(SCENES))),
+        Section("Protocol", protocol()),
+        Section("Result", conclusions(arms, curves, volumes), DataTable("perception_arms", ARM_COLUMNS, arms)),
+        Section("Shapes of the curves", (), DataTable("perception_shapes", SHAPE_COLUMNS, seen)),
+        Section(
+            "Curves",
+            ("Average precision over all ranges. By range, with intervals and with local sort: perception.csv.",),
+            _curve_table(curves),
+        ),
+        Section("Data", (), DataTable("perception", (), curves)),
+        Section(
+            "Objects hidden to the ego",
+            (
+                "Recall at the overlap 0.5 of objects that the lidar of another station hits, and that of the ego does not. "
+                "Other overlaps, with intervals: perception_hidden.csv.",
+            ),
+            _hidden_table(hidden),
+        ),
+        Section("Data of hidden objects", (), DataTable("perception_hidden", (), hidden)),
+        Section("Precision and volume", (), DataTable("perception_volume", VOLUME_COLUMNS, volumes)),
+    )
+    return PartReport(PART.title, sections)
+
+
+PART = Part("perception", "Average precision of cooperative perception", 4, DETECTORS, DETECTORS, cases, report)
