@@ -13,6 +13,7 @@ from eidrive_scenario.driving.communication.message_generator import MessageGene
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
 from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
+from eidrive_scenario.driving.communication.relative_pose import relative_state
 from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.planner import Planner
@@ -125,11 +126,11 @@ class Agent:
         if fresh is not None:
             self._detections = fresh
         detections = self._detections
-        self._process_inbox(inbox, now, own_perception)
+        self._process_inbox(inbox, now, own_perception, ego)
         state = self._state(ego)
         found = fresh if self.points is None else self.points.perceive(readings, fresh)
         if found is not None and not own_perception:
-            self._accept_report(Report(self.name, found, now, state))
+            self._accept_report(Report(self.name, found, now, replace(state, pose_covariance=None)))
             self._add_own_region(found.time)
         fused = self.fusion.fuse(list(self._reports.values()), now)
         if self._fusion_checked:
@@ -164,7 +165,7 @@ class Agent:
         if self._regions is not None:
             self._regions.add(self.name, time, self._own_body.reference_pose(time), self._view)
 
-    def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float, own_perception: bool) -> None:
+    def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float, own_perception: bool, ego: EgoState) -> None:
         """Store the newest report of each sender, and delete reports that exceed their lifetime."""
         for received in inbox:
             message = self._clock.with_local_timestamps(received.message, now)
@@ -180,7 +181,13 @@ class Agent:
             if sender != self.name:
                 detections = self._without_own_body(message, detections)
             station = sender if message.kind == "cpm" else sender + SENDER_REPORT_SUFFIX
-            report = Report(station, detections, received.arrived, message.state, complete=message.objects is None)
+            report = Report(
+                station,
+                detections,
+                received.arrived,
+                self._state_relative_to(ego, message),
+                complete=message.objects is None,
+            )
             self._lifetimes[station] = self.settings.lifetime(complete=report.complete and message.kind == "cpm")
             self._accept_report(report, None if report.complete else self._assembled_detections(message))
         for station, held in list(self._reports.items()):
@@ -235,6 +242,12 @@ class Agent:
             check_followed(self.planner, plan)
             check_control(self.controller, "control", control)
         return control
+
+    def _state_relative_to(self, ego: EgoState, message: Message) -> StationState | None:
+        """Return the reported state of a sender with the covariance of its pose relative to the assumed pose."""
+        if message.sender == self.name:
+            return message.state and replace(message.state, pose_covariance=None)
+        return relative_state(message.state, ego, self.perception.pose_covariance)
 
     def _state(self, ego: EgoState) -> StationState:
         x, y, z = ego.position.tolist()
