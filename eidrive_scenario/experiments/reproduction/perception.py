@@ -97,12 +97,16 @@ def arm_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
         whole = [pool.precision(number) for number in range(len(OVERLAPS))]
         row: dict[str, Value] = {"arm": arm}
         for overlap, one in zip(OVERLAPS, whole, strict=True):
-            row |= {f"ap_{overlap:g}": one.value, f"low_{overlap:g}": one.low, f"high_{overlap:g}": one.high}
+            row |= {
+                f"ap_{_key(overlap)}": one.value,
+                f"low_{_key(overlap)}": one.low,
+                f"high_{_key(overlap)}": one.high,
+            }
         for place in range(len(RANGES)):
-            row[f"ap_0.5_range_{place}"] = _known(pool.precision(1, place).value)
-        row["ap_0.5_local_sort"] = whole[1].local
-        row["ap_0.5_hit"] = _known(pool.precision_of_hit_objects().value)
-        row["hidden_0.5"] = _known(pool.hidden_recall(1).value)
+            row[f"ap_50_range_{place}"] = _known(pool.precision(1, place).value)
+        row["ap_50_local_sort"] = whole[1].local
+        row["ap_50_hit"] = _known(pool.precision_of_hit_objects().value)
+        row["hidden_50"] = _known(pool.hidden_recall(1).value)
         yield row
 
 
@@ -117,7 +121,16 @@ def volume_rows(found: Sequence[PerceptionRecord]) -> Iterator[Row]:
             "cell": one.cell if ARMS[one.arm].points else None,
             "megabytes_per_second": pool.megabytes_per_second,
         }
-        yield row | {f"ap_{overlap:g}": pool.precision(number).value for number, overlap in enumerate(OVERLAPS)}
+        yield row | {f"ap_{_key(overlap)}": pool.precision(number).value for number, overlap in enumerate(OVERLAPS)}
+
+
+def _place(axis: str, value: float) -> dict[str, Value]:
+    return {"axis": axis, "value": value}
+
+
+def _key(overlap: float) -> int:
+    """Return the overlap in percent, for names of fields."""
+    return round(100.0 * overlap)
 
 
 def _known(value: float) -> float | None:
@@ -125,22 +138,23 @@ def _known(value: float) -> float | None:
 
 
 def _precision(overlap: float) -> Column:
-    fields = (f"ap_{overlap:g}", f"low_{overlap:g}", f"high_{overlap:g}")
-    return Column(f"AP {overlap:g} (95 %)", "{%s:.3f} (%s)" % (fields[0], "{%s:.2f} to {%s:.2f}" % fields[1:]), fields)
+    fields = (f"ap_{_key(overlap)}", f"low_{_key(overlap)}", f"high_{_key(overlap)}")
+    value, low, high = (f"{{{name}:{form}}}" for name, form in zip(fields, (".3f", ".2f", ".2f"), strict=True))
+    return Column(f"AP {overlap:g} (95 %)", f"{value} ({low} to {high})", fields)
 
 
 ARM_COLUMNS = (
     plain("arm", "arm"),
     *(_precision(overlap) for overlap in OVERLAPS),
-    *(plain(f"AP 0.5, {range_name(place)}", f"ap_0.5_range_{place}", ".3f") for place in range(len(RANGES))),
-    plain("AP 0.5, local sort", "ap_0.5_local_sort", ".3f"),
-    plain("AP 0.5, hit objects", "ap_0.5_hit", ".3f"),
-    plain("recall of hidden objects, 0.5", "hidden_0.5", ".3f"),
+    *(plain(f"AP 0.5, {range_name(place)}", f"ap_50_range_{place}", ".3f") for place in range(len(RANGES))),
+    plain("AP 0.5, local sort", "ap_50_local_sort", ".3f"),
+    plain("AP 0.5, hit objects", "ap_50_hit", ".3f"),
+    plain("recall of hidden objects, 0.5", "hidden_50", ".3f"),
 )
 CURVE_COLUMNS = (
     plain("axis", "axis"),
     plain("value", "value", "g"),
-    *(plain(f"{arm}, AP {overlap:g}", f"{arm} {overlap:g}", ".3f") for overlap in OVERLAPS[1:] for arm in COMPARED),
+    *(plain(f"{arm}, AP {overlap:g}", f"{arm}_{_key(overlap)}", ".3f") for overlap in OVERLAPS[1:] for arm in COMPARED),
 )
 HIDDEN_COLUMNS = (
     plain("axis", "axis"),
@@ -153,7 +167,7 @@ VOLUME_COLUMNS = (
     plain("messages per second", "messages_per_second", "g"),
     plain("grid [m]", "cell", "g"),
     plain("MB/s", "megabytes_per_second", ".4f"),
-    *(plain(f"AP {overlap:g}", f"ap_{overlap:g}", ".3f") for overlap in OVERLAPS),
+    *(plain(f"AP {overlap:g}", f"ap_{_key(overlap)}", ".3f") for overlap in OVERLAPS),
 )
 
 
@@ -162,9 +176,9 @@ def _curve_table(rows: Sequence[Row]) -> DataTable:
     held = {
         (row["axis"], row["value"], row["arm"], row["iou"]): row["ap"] for row in rows if row["range"] == ALL_RANGES
     }
-    lines = [
-        {"axis": axis, "value": value}
-        | {f"{arm} {overlap:g}": held[axis, value, arm, overlap] for arm in COMPARED for overlap in OVERLAPS}
+    lines: list[Row] = [
+        _place(axis, value)
+        | {f"{arm}_{_key(overlap)}": held[axis, value, arm, overlap] for arm in COMPARED for overlap in OVERLAPS}
         for axis, (_, _, values) in AXES.items()
         for value in values
     ]
@@ -174,8 +188,8 @@ def _curve_table(rows: Sequence[Row]) -> DataTable:
 def _hidden_table(rows: Sequence[Row]) -> DataTable:
     """Return the table of the recall at the overlap 0.5 with one column per arm."""
     held = {(row["axis"], row["value"], row["arm"]): row for row in rows if row["iou"] == OVERLAPS[1]}
-    lines = [
-        {"axis": axis, "value": value}
+    lines: list[Row] = [
+        _place(axis, value)
         | {arm: held[axis, value, arm]["recall"] for arm in COMPARED}
         | {"hidden": held[axis, value, COMPARED[0]]["hidden"]}
         for axis, (_, _, values) in AXES.items()
@@ -198,20 +212,25 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
         Section("Shapes of the curves", (), DataTable("perception_shapes", SHAPE_COLUMNS, seen)),
         Section(
             "Curves",
-            ("Average precision over all ranges. By range, with intervals and with local sort: perception.csv.",),
+            ("Average precision over all ranges.",),
             _curve_table(curves),
         ),
-        Section("Data", (), DataTable("perception", (), curves)),
         Section(
             "Objects hidden to the ego",
-            (
-                "Recall at the overlap 0.5 of objects that the lidar of another station hits, and that of the ego does not. "
-                "Other overlaps, with intervals: perception_hidden.csv.",
-            ),
+            ("Recall at the overlap 0.5.",),
             _hidden_table(hidden),
         ),
-        Section("Data of hidden objects", (), DataTable("perception_hidden", (), hidden)),
         Section("Precision and volume", (), DataTable("perception_volume", VOLUME_COLUMNS, volumes)),
+        Section(
+            "Data",
+            ("By arm, axis, value, range and overlap, with interval and local sort: perception.csv.",),
+            DataTable("perception", (), curves),
+        ),
+        Section(
+            "Data on hidden objects",
+            ("Recall by arm, axis, value and overlap, with intervals: perception_hidden.csv.",),
+            DataTable("perception_hidden", (), hidden),
+        ),
     )
     return PartReport(PART.title, sections)
 

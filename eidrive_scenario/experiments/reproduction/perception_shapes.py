@@ -21,7 +21,7 @@ SHAPE_COLUMNS = (plain("shape", "shape"), plain("holds", "holds"), plain("measur
 def shapes(curves: Sequence[Row], volumes: Sequence[Row]) -> tuple[Row, ...]:
     """Return for each shape whether it holds, with the numbers.
 
-    curves  rows with arm, axis, value, range, iou and ap; volumes: rows with arm, megabytes_per_second and ap_0.5
+    curves  rows with arm, axis, value, range, iou and ap; volumes: rows with arm, megabytes_per_second and ap_50
     """
     held: dict[tuple[str, str, float], dict[float, float]] = {}
     for row in curves:
@@ -141,7 +141,7 @@ def _plateaus(volumes: Sequence[Row]) -> list[Row]:
     found = []
     for arm in SENDING:
         mine = [row for row in volumes if row["arm"] == arm and row["cell"] in (None, 0.1)]
-        values = [float(row["ap_0.5"] or 0.0) for row in mine]
+        values = [float(row["ap_50"] or 0.0) for row in mine]
         volume = [float(row["megabytes_per_second"] or 0.0) for row in mine]
         text = ", ".join(f"{ap:.3f} at {size:.3g} MB/s" for ap, size in zip(values, volume, strict=True))
         shape = f"{arm}: AP 0.5 is on a plateau at half of the volume (loss up to {PLATEAU:g})"

@@ -25,45 +25,48 @@ def setup(records: Sequence[PerceptionRecord], seeds: int, scenes: int) -> tuple
     frames, objects = sum(one.frames for one in records), sum(sum(one.objects) for one in records)
     hit, hidden = sum(sum(one.hit) for one in records), sum(one.hidden for one in records)
     return (
-        f"{scenes} scenes of the library with {seeds} seeds each: scenario 3 (parked ego, one vehicle sends), 4 (parked ego, "
-        "three roadside units), 5 and 7 (ego turns at a crossing, a vehicle and one or two roadside units). All stations "
-        f"have the detector `lidar` (32 rings, 10,000 points per scan, range 100 m, {SCAN_RATE:g} Hz) without a tracker. "
-        f"One frame is measured every {SAMPLE_INTERVAL:g} s from {FIRST_SAMPLE:g} s on: {frames} frames with {objects} "
-        f"objects, of which {hit} are hit by a lidar of any station and {hidden} are hidden to the ego only.",
-        "Each run is in closed loop by the rule of its scene. All arms measure the same frames: for each arm and fault, "
-        "further agents of the ego and of the senders get the sensor readings of the run and exchange messages over a "
-        "channel of their own. They do not steer. So arms differ by fusion and messages only, not by traffic.",
+        f"{scenes} scenes of the library with {seeds} seeds each: scenario 3 (parked ego, one vehicle sends), 4 "
+        "(parked ego, three roadside units), 5 and 7 (ego turns at a crossing, a vehicle and one or two roadside "
+        "units). All stations have the detector `lidar` (32 rings, 10,000 points per scan, range 100 m, "
+        f"{SCAN_RATE:g} Hz) without a tracker. One frame is measured every {SAMPLE_INTERVAL:g} s from "
+        f"{FIRST_SAMPLE:g} s on: {frames} frames with {objects} objects, of which {hit} are hit by a lidar of any "
+        f"station and {hidden} are hidden to the ego only.",
+        "Each run is in closed loop by the rule of its scene. All arms measure the same frames: for each arm and "
+        "fault, further agents of the ego and of the senders get the sensor readings of the run and exchange "
+        "messages over a channel of their own. They do not steer. So arms differ by fusion and messages only, not "
+        "by traffic.",
         "Arms. `none`: detections of the last scan of the ego. `average`: boxes as measured, the rule of EI-Drive. "
-        "`covariance_intersection`: boxes of all scans, filtered and predicted to the current time. `early`: points of "
-        "all stations, one scan at a time. `none, filtered` is the filter of covariance intersection on own detections "
-        "only, which separates its effect from that of messages.",
-        f"Faults. Pose error: normal, standard deviation on x and on y each, and {YAW_PER_POSITION * 0.6:g}° per 0.6 m on "
-        "the heading; drawn for each station and scan, the ego included, so that the relative error is larger by a factor "
-        "of √2. OpenCOOD draws one vector for all frames, and CoAlign draws as here. Pose drift: the same deviations, "
-        f"with a correlation time of {DRIFT_TIME:g} s as of GNSS. Senders state the covariance of their poses. Latency: "
-        "constant. Loss: whole messages, independent. Scans are simultaneous, so messages without latency are of the "
-        "same scan.",
+        "`covariance_intersection`: boxes of all scans, filtered and predicted to the current time. `early`: points "
+        "of all stations, one scan at a time. `none, filtered` is the filter of covariance intersection on own "
+        "detections only, which separates its effect from that of messages.",
+        f"Faults. Pose error: normal, standard deviation on x and on y each, and {YAW_PER_POSITION * 0.6:g}° per 0.6 "
+        "m on the heading; drawn for each station and scan, the ego included, so that the relative error is larger "
+        "by a factor of √2. OpenCOOD draws one vector for all frames, and CoAlign draws as here. Pose drift: the "
+        f"same deviations, with a correlation time of {DRIFT_TIME:g} s as of GNSS. Senders state the covariance of "
+        "their poses. Latency: constant. Loss: whole messages, independent. Scans are simultaneous, so messages "
+        "without latency are of the same scan.",
     )
 
 
 def protocol() -> tuple[str, ...]:
     """Return the paragraphs about the evaluation."""
     return (
-        "Truth: all road users present at the current time with a center within "
-        f"{RANGES[-1]:g} m of that of the ego, seen or not. The ego is no object, and receivers remove its body from "
-        "received boxes and points. Sending vehicles are objects as all others; masts of roadside units are not. A detection "
-        "on a mast is wrong. Farther objects and detections are ignored. Second number: objects with at least one lidar "
-        "point of any station, as in OPV2V.",
-        "A detection is correct if its intersection over union with a free object in plan view is at least 0.3, 0.5 or 0.7; "
-        "detections choose in order of their score within a frame. Classes are not compared. Boxes are compared relative to "
-        "the ego: the error of its own pose does not affect its own detections.",
-        "Average precision is the area under precision over recall at all points, with the maximum precision at or above "
-        "each recall (PASCAL VOC 2010). Detections of all frames are sorted by score (global sort). OPV2V's papers keep the "
-        "order of the frames (local sort), which is the second number. A correct detection counts in the range of its "
-        "object, a wrong one in its own range. Scores are existence probabilities where they are estimated; the least is "
-        f"{LEAST_EXISTENCE:g}. Intervals are 95 % percentile bootstrap intervals over the runs ({RESAMPLES} samples).",
-        "Hidden objects: no lidar point of the ego is on the body, and at least one of another station is. Volume: bytes of "
-        "all sent messages per second, as encoded, from the link statistics.",
+        f"Truth: all road users present at the current time with a center within {RANGES[-1]:g} m of that of the "
+        "ego, seen or not. The ego is no object, and receivers remove its body from received boxes and points. "
+        "Sending vehicles are objects as all others; masts of roadside units are not. A detection on a mast is "
+        "wrong. Farther objects and detections are ignored. Second number: objects with at least one lidar point of "
+        "any station, as in OPV2V.",
+        "A detection is correct if its intersection over union with a free object in plan view is at least 0.3, 0.5 "
+        "or 0.7; detections choose in order of their score within a frame. Classes are not compared. Boxes are "
+        "compared relative to the ego: the error of its own pose does not affect its own detections.",
+        "Average precision is the area under precision over recall at all points, with the maximum precision at or "
+        "above each recall (PASCAL VOC 2010). Detections of all frames are sorted by score (global sort). OPV2V's "
+        "papers keep the order of the frames (local sort), which is the second number. A correct detection counts "
+        "in the range of its object, a wrong one in its own range. Scores are existence probabilities where they "
+        f"are estimated; the least is {LEAST_EXISTENCE:g}. Intervals are 95 % percentile bootstrap intervals over "
+        f"the runs ({RESAMPLES} samples).",
+        "Hidden objects: no lidar point of the ego is on the body, and at least one of another station is. Volume: "
+        "bytes of all sent messages per second, as encoded, from the link statistics.",
     )
 
 
@@ -71,10 +74,10 @@ def conclusions(arms: Sequence[Row], curves: Sequence[Row], volumes: Sequence[Ro
     """Return the paragraphs about the measured values."""
     by_arm = {str(row["arm"]): row for row in arms}
     listed = [
-        f"{name} {_number(row, 'ap_0.3'):.3f}, {_number(row, 'ap_0.5'):.3f} and {_number(row, 'ap_0.7'):.3f}"
+        f"{name} {_number(row, 'ap_30'):.3f}, {_number(row, 'ap_50'):.3f} and {_number(row, 'ap_70'):.3f}"
         for name, row in by_arm.items()
     ]
-    hidden = [f"{name} {_number(row, 'hidden_0.5'):.0%}" for name, row in by_arm.items()]
+    hidden = [f"{name} {_number(row, 'hidden_50'):.0%}" for name, row in by_arm.items()]
     return (
         f"Without faults, AP at 0.3, 0.5 and 0.7: {'; '.join(listed)}.",
         f"Hidden objects that are found at 0.5: {', '.join(hidden)}.",
@@ -112,13 +115,13 @@ def _volume(volumes: Sequence[Row]) -> str:
     return (
         f"Points need {ratio:.0f} times the bytes of boxes ({_number(early, 'megabytes_per_second'):.3f} and "
         f"{_number(late, 'megabytes_per_second'):.3f} MB/s over all links), for an AP 0.7 of "
-        f"{_number(early, 'ap_0.7'):.3f} and {_number(late, 'ap_0.7'):.3f}."
+        f"{_number(early, 'ap_70'):.3f} and {_number(late, 'ap_70'):.3f}."
     )
 
 
 def _sorting(arms: Sequence[Row]) -> str:
-    lost = [_number(row, "ap_0.5") - _number(row, "ap_0.5_local_sort") for row in arms]
-    gained = [_number(row, "ap_0.5_hit") - _number(row, "ap_0.5") for row in arms]
+    lost = [_number(row, "ap_50") - _number(row, "ap_50_local_sort") for row in arms]
+    gained = [_number(row, "ap_50_hit") - _number(row, "ap_50") for row in arms]
     return (
         f"Local sort lowers AP 0.5 by {min(lost):.3f} to {max(lost):.3f}. With hit objects only it is higher by "
         f"{min(gained):.3f} to {max(gained):.3f}."

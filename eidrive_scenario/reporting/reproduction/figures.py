@@ -13,6 +13,7 @@ from eidrive_scenario.experiments.reproduction.layout import PartReport, Row
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.reporting.reproduction.channel_curves import channels_figure
 from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
+from eidrive_scenario.reporting.reproduction.precision import perception_figure
 from eidrive_scenario.reporting.reproduction.rows import number, scenario_title
 
 COLORS = ("#0b6e99", "#c2410c")
@@ -114,6 +115,7 @@ FIGURES: Mapping[str, Callable[[PaperRows], Figure]] = {
     "detection": detection_figure,
     "sensitivity": sensitivity_figure,
     "channels": channels_figure,
+    "perception": perception_figure,
 }
 """Figure of a part, by the name of the part. The others have none."""
 
