@@ -110,6 +110,9 @@ def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: flo
     """Return the means over the boxes of each object; a single box is unchanged to the bit.
 
     numbers  object of each box
+
+    Headings that point backwards from the first one are reversed before: some detectors do not distinguish front and
+    rear, and the mean of opposite headings would be a box across the object.
     """
     labels = np.array(numbers, dtype=np.intp)
     boxes = np.concatenate([report.boxes for report in reports])
@@ -117,7 +120,11 @@ def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: flo
     several = counts > 1
     means = _sums(boxes, labels, len(counts)) / counts[:, None]
     yaw = boxes[:, 6]
-    mean_yaw = np.arctan2(_sums(np.sin(yaw), labels, len(counts)), _sums(np.cos(yaw), labels, len(counts)))
+    _, first = np.unique(labels, return_index=True)
+    front = np.where(np.cos(yaw - yaw[first][labels]) < 0.0, -1.0, 1.0)
+    mean_yaw = np.arctan2(
+        _sums(front * np.sin(yaw), labels, len(counts)), _sums(front * np.cos(yaw), labels, len(counts))
+    )
     means[several, 6] = mean_yaw[several]
     words = [word for report in reports for word in report.classes]
     votes: list[list[str]] = [[] for _ in counts]
@@ -162,7 +169,12 @@ def _mean_box(boxes: list[list[float]]) -> list[float]:
     if len(boxes) == 1:
         return boxes[0]
     mean = _mean(boxes)
-    mean[6] = math.atan2(sum([math.sin(box[6]) for box in boxes]), sum([math.cos(box[6]) for box in boxes]))
+    first = boxes[0][6]
+    fronts = [-1.0 if math.cos(box[6] - first) < 0.0 else 1.0 for box in boxes]
+    mean[6] = math.atan2(
+        sum([front * math.sin(box[6]) for front, box in zip(fronts, boxes, strict=True)]),
+        sum([front * math.cos(box[6]) for front, box in zip(fronts, boxes, strict=True)]),
+    )
     return mean
 
 

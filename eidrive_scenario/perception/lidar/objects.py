@@ -24,6 +24,10 @@ FEW = 12
 """Number of points below which the heading of the lane is used, as they may show none."""
 
 
+DENSER = 3
+"""Number of halvings of the gap between points at which a cluster that is no road user is split."""
+COVERED = 0.8
+"""Minimum share of the points of such a cluster in the parts that are road users."""
 TOUCHING = 0.2
 """Distance below which boxes are assumed to touch [m]."""
 
@@ -50,8 +54,27 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
             for one in (_fit_clusters(scan, surroundings, part_rows, min_points) if len(parts) > 1 else [])
             if one.fit.deviation <= POOR_FIT
         ]
-        merged += good or [poor]
+        merged += good or _split_dense(scan, poor) or [poor]
     return [one for one in _merge_parts(scan, merged) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
+
+
+def _split_dense(scan: Scan, poor: FittedObject) -> list[FittedObject]:
+    """Return the parts of a cluster that is no road user, for decreasing gaps between points until all are.
+
+    Far from the sensor the usual gap is wider than that between cars in adjacent lanes. Points are denser than it, for
+    example, if they are those of another station. Empty if there is no such gap.
+    """
+    if poor.fit.deviation <= UNLIKELY:
+        return []
+    step = scan.pattern.azimuth
+    for _ in range(DENSER):
+        step /= 2.0
+        parts = [poor.rows[part] for part in clusters(scan.points[poor.rows], step, grazing=False)]
+        fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= FEW]
+        found = [FittedObject(part, fit) for part, fit in fits if fit is not None and fit.deviation <= POOR_FIT]
+        if len(found) > 1 and sum(len(one.rows) for one in found) >= COVERED * len(poor.rows):
+            return found
+    return []
 
 
 def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], min_points: int) -> list[FittedObject]:

@@ -63,6 +63,14 @@ def test_average_box_has_mean_position_size_velocity_and_circular_yaw() -> None:
     np.testing.assert_allclose(fused.covariance[0], np.eye(2) * 1.5)
 
 
+@pytest.mark.parametrize(("second", "mean"), [(math.pi, 0.0), (math.pi + 0.2, 0.1), (-math.pi + 0.2, 0.1), (0.4, 0.2)])
+def test_average_of_opposite_headings_is_not_across_the_car(second: float, mean: float) -> None:
+    """A lidar does not distinguish front and rear: the front is that of the first report."""
+    for build in (fuse_average, fuse_average_small):
+        reports = [one.detections for one in (report("A", (10.0, 0.0)), report("B", (10.0, 0.0), yaw=second))]
+        assert build(reports, [0, 0], 1.0).boxes[0, 6] == pytest.approx(mean)
+
+
 def test_average_of_a_single_box_is_unchanged() -> None:
     fused = fuse(report("A", (10, 0)), report("B", (30, 0), yaw=1.0, velocity=(1.0, 2.0), kind="truck"))
     assert len(fused) == 2

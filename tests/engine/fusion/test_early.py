@@ -100,6 +100,18 @@ def test_early_fusion_detects_car_in_received_points_without_forwarding_it() -> 
     assert math.dist(step.fused.boxes[0, :2], CAR) < 0.5
 
 
+def test_early_fusion_separates_far_cars_in_adjacent_lanes() -> None:
+    """Both are near a unit and 76 m from the ego, where the columns of its own rays are 3 m apart."""
+    cars = (76.0, 4.0), (76.0, 7.2)
+    ego, rsu = agent(EGO, sensors={"lidar": {"range": 100.0}}), agent(RSU)
+    points = [car(*place, "fblr") for place in cars]
+    sent = rsu.act(readings(0.0, (96.0, 5.6, math.pi), *points), (), 0.0, None).outbox
+    fused = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(sent[0], 0.05)], 0.05, None).fused
+    found = sorted(map(tuple, fused.boxes[:, :2].tolist()))
+    assert len(found) == 2
+    assert max(math.dist(one, place) for one, place in zip(found, sorted(cars), strict=True)) < 0.3
+
+
 def test_early_fusion_box_from_several_sides_is_more_accurate() -> None:
     """The ego measures the rear, the unit the front and the left side of a long car."""
     ego, rsu = agent(EGO), agent(RSU)
