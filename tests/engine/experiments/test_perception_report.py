@@ -54,7 +54,7 @@ def test_report_states_precision_recall_and_volume(tmp_path: Path) -> None:
     text = report.markdown()
     assert "Points need 50 times the bytes of boxes (0.500 and 0.010 MB/s over all links)" in text
     assert "4 scenes of the library with 2 seeds each" in text
-    assert "40 frames with 80 objects, of which 72 are hit by a lidar of any station and 32 are hidden" in text
+    assert "40 frames with 80 objects. The lidar of any station hits 72 of them; 32 are hidden" in text
     path = draw("perception", report, tmp_path)
     assert path is not None
     assert path.stat().st_size > 10_000
