@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.reproduction.layout import Row
+from eidrive_scenario.reporting.reproduction.rows import number
 
 COLORS = {
     "none": "#6b7280",
@@ -30,7 +31,7 @@ def perception_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
     panels = figure.subplots(len(OVERLAPS) + 1, len(axes_names), squeeze=False)
     for overlap, line in zip(OVERLAPS, panels, strict=False):
         mine = [row for row in curves if row["range"] == "all" and row["iou"] == overlap]
-        top = 1.05 * max(_number(row, "high") for row in mine)
+        top = 1.05 * max(number(row, "high") for row in mine)
         for name, axes in zip(axes_names, line, strict=True):
             _curves(axes, [row for row in mine if row["axis"] == name], "ap")
             axes.set_xlabel(UNITS.get(name, name), fontsize=8)
@@ -55,7 +56,7 @@ def _curves(axes: Axes, rows: Sequence[Row], name: str) -> None:
     """Draw one curve per arm with its interval."""
     for arm, color in COLORS.items():
         mine = [row for row in rows if row["arm"] == arm]
-        at, low, middle, high = ([_number(row, field) for row in mine] for field in ("value", "low", name, "high"))
+        at, low, middle, high = ([number(row, field) for row in mine] for field in ("value", "low", name, "high"))
         axes.fill_between(at, low, high, color=color, alpha=0.12, lw=0)
         axes.plot(at, middle, "o-", color=color, ms=3, lw=1.2, label=f"{arm}, 95 %")
 
@@ -65,13 +66,13 @@ def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
     mine = [row for row in rows if row["iou"] == OVERLAPS[0] and row["range"] != "all"]
     places = list(dict.fromkeys(str(row["range"]) for row in mine))
     width = 0.8 / len(COLORS)
-    for number, (arm, color) in enumerate(COLORS.items()):
+    for place, (arm, color) in enumerate(COLORS.items()):
         some = [row for row in mine if row["arm"] == arm]
-        at = [places.index(str(row["range"])) + width * (number - (len(COLORS) - 1) / 2) for row in some]
-        values = [_number(row, "ap") for row in some]
+        at = [places.index(str(row["range"])) + width * (place - (len(COLORS) - 1) / 2) for row in some]
+        values = [number(row, "ap") for row in some]
         errors = [
-            [max(0.0, value - _number(row, "low")) for value, row in zip(values, some, strict=True)],
-            [max(0.0, _number(row, "high") - value) for value, row in zip(values, some, strict=True)],
+            [max(0.0, value - number(row, "low")) for value, row in zip(values, some, strict=True)],
+            [max(0.0, number(row, "high") - value) for value, row in zip(values, some, strict=True)],
         ]
         axes.bar(at, values, width, color=color, yerr=errors, error_kw={"lw": 0.8})
     axes.set_xticks(range(len(places)), labels=places)
@@ -82,20 +83,16 @@ def _ranges(axes: Axes, rows: Sequence[Row]) -> None:
 def _volumes(axes: Axes, rows: Sequence[Row]) -> None:
     """Draw the average precision over the size of the messages; the ego alone is a horizontal line."""
     for arm, color in COLORS.items():
-        mine = sorted((row for row in rows if row["arm"] == arm), key=lambda row: _number(row, "megabytes_per_second"))
+        mine = sorted((row for row in rows if row["arm"] == arm), key=lambda row: number(row, "megabytes_per_second"))
         for overlap, style in zip(OVERLAPS, ("o-", "s--"), strict=True):
-            values = [_number(row, f"ap_{round(100.0 * overlap)}") for row in mine]
+            values = [number(row, f"ap_{round(100.0 * overlap)}") for row in mine]
             if arm == "none":
                 axes.axhline(values[0], color=color, lw=1, ls=style[1:])
                 continue
-            at = [_number(row, "megabytes_per_second") for row in mine]
+            at = [number(row, "megabytes_per_second") for row in mine]
             label = f"at {overlap:g}" if arm == "early" else None
             axes.plot(at, values, style, color=color, ms=3, lw=1.2, label=label)
     axes.set_xscale("log")
     axes.set_xlabel("all messages [MB/s]", fontsize=8)
     axes.set_ylabel("average precision", fontsize=8)
     axes.legend(fontsize=7)
-
-
-def _number(row: Row, name: str) -> float:
-    return float(row[name] or 0.0)
