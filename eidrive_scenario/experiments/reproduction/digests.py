@@ -29,9 +29,7 @@ _LENGTH = 16
 """Number of hexadecimal digits of a digest."""
 
 
-def job_digest(
-    scenario: str, settings: RunSettings, *, load: int = 0, conditions: Sequence[Condition] = ()
-) -> str:
+def job_digest(scenario: str, settings: RunSettings, *, load: int = 0, conditions: Sequence[Condition] = ()) -> str:
     """Return the digest of a job: equal digests and seeds give equal outcomes.
 
     load        number of stations that are added to the scenario

@@ -40,9 +40,7 @@ class Case:
         if self.varied is not None:
             settings = replace(settings, parameters={**settings.parameters, **self.varied(seed)})
         digest = job_digest(self.scenario, settings, load=self.load, conditions=self.conditions)
-        return EpisodeJob(
-            self.scenario, self.arm, seed, settings, digest, self.counted, self.load, self.conditions
-        )
+        return EpisodeJob(self.scenario, self.arm, seed, settings, digest, self.counted, self.load, self.conditions)
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def test_report_states_precision_recall_and_volume(tmp_path: Path) -> None:
 def test_conditions_are_part_of_the_digest() -> None:
     conditions = all_conditions()
     settings = RunSettings(detector="lidar")
-    digests = {job_digest("coop/scenario_4", settings, conditions[:count]) for count in (0, 1, 2)}
+    digests = {job_digest("coop/scenario_4", settings, conditions=conditions[:count]) for count in (0, 1, 2)}
     assert len(digests) == 3
     assert len({one.name for one in conditions}) == len(conditions)
 
