@@ -22,7 +22,7 @@ class PoseNoise(Settings):
 
     position          standard deviation of x, and of y [m]
     yaw               standard deviation of the heading [degrees]
-    correlation_time  time after which the correlation of the error is 1/e [s]; 0: drawn anew in each time step
+    correlation_time  time after which the correlation of the error is 1/e [s]; 0: independent in each time step
     """
 
     position: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0

@@ -17,7 +17,7 @@ YAW_PER_POSITION = 1.0 / 0.6
 LEAST_EXISTENCE = 0.05
 """Minimum existence probability of fused objects, that of the detector: unlikely objects are part of the curve."""
 ONE_SCAN = 0.05
-"""Memory of early fusion [s]: less than the interval of two scans, so that each frame is detected anew."""
+"""Memory of early fusion [s]: less than the interval of two scans, so that each frame is detected separately."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Condition:
 
     deviation    standard deviation of the assumed position of each station, the ego included, along x and y [m];
                  that of the heading is proportional
-    correlation  correlation time of the pose errors; 0: drawn anew in each scan [s]
+    correlation  correlation time of the pose errors; 0: independent in each scan [s]
     latency, loss  delay of each message [s], and probability of its loss
     every        number of scans per message
     cell         grid of transmitted points [m]

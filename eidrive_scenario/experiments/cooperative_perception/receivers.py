@@ -24,7 +24,7 @@ from eidrive_scenario.v2x.profile import build_channel, load_profile
 from eidrive_scenario.world.actor import ActorSpec
 
 WAIT = 0.001
-"""Time that the ego waits for messages of its own scan [s]: scans are simultaneous, and no message arrives at once."""
+"""Time that the ego waits for messages of the same scan [s]: scans are simultaneous, and no message arrives at once."""
 
 
 def moved(found: Detections, before: EgoState, after: EgoState) -> Detections:

@@ -33,7 +33,7 @@ def setup(records: Sequence[PerceptionRecord], seeds: int, scenes: int) -> tuple
         f"them; {hidden} are hidden: not hit by the lidar of the ego, but by that of another station.",
         "Each run is in closed loop by the rule of its scene. All arms measure the same frames: for each arm and "
         "fault, further agents of the ego and of the senders get the sensor readings of the run and exchange "
-        "messages over a channel of their own. They do not steer. So arms differ by fusion and messages only, not "
+        "messages over a separate channel. They do not steer. So arms differ by fusion and messages only, not "
         "by traffic.",
         "Arms. `none`: detections of the last scan of the ego. `average`: boxes as measured, the rule of EI-Drive. "
         "`covariance_intersection`: boxes of all scans, filtered and predicted to the current time. `early`: points "
@@ -58,7 +58,7 @@ def protocol() -> tuple[str, ...]:
         "any station, as in OPV2V.",
         "A detection is correct if its intersection over union with a free object in plan view is at least 0.3, 0.5 "
         "or 0.7; detections choose in order of their score within a frame. Classes are not compared. Boxes are "
-        "compared relative to the ego: the error of its own pose does not affect its own detections.",
+        "compared relative to the ego: the error of this pose does not affect own detections.",
         "Average precision is the area under precision over recall at all points, with the maximum precision at or "
         "above each recall (PASCAL VOC 2010). Detections of all frames are sorted by score (global sort). OPV2V's "
         "papers keep the order of the frames (local sort), which is the second number. A correct detection counts "

@@ -98,7 +98,7 @@ def test_shifted_box_is_correct_up_to_the_law(shift: float, expected: list[int])
     assert precision((detected([(10.0 + shift, 0.0, 0.0)], [0.9]), truth((10.0, 0.0, 0.0)))) == expected
 
 
-def test_correct_detection_counts_in_the_range_of_its_object_and_a_wrong_one_in_its_own() -> None:
+def test_correct_detections_count_in_the_range_of_their_objects() -> None:
     found = detected([(30.2, 0.0, 0.0), (60.0, 0.0, 0.0), (0.0, 99.0, 0.0)], [0.9, 0.8, 0.7])
     pool = Pool([record((found, truth((29.9, 0.0, 0.0), (0.0, 40.0, 0.0), (0.0, 99.0, 0.0))))], NAME)
     assert [pool.precision(1, place).value for place in range(3)] == [1.0, 0.0, 0.5]
@@ -217,4 +217,4 @@ def test_points_need_more_bytes_than_boxes_and_no_fusion_none(trial: PerceptionR
     assert volume["none"] == 0.0
     assert volume["early"] > 10.0 * volume["average"] > 0.0
     lossy = trial.tallies[Condition("early", loss=0.5).name]
-    assert lossy.megabytes_per_second == pytest.approx(volume["early"]), "lost messages are on the air, too"
+    assert lossy.megabytes_per_second == pytest.approx(volume["early"]), "lost messages are transmitted, too"

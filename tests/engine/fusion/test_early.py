@@ -101,7 +101,7 @@ def test_early_fusion_detects_car_in_received_points_without_forwarding_it() -> 
 
 
 def test_early_fusion_separates_far_cars_in_adjacent_lanes() -> None:
-    """Both are near a unit and 76 m from the ego, where the columns of its own rays are 3 m apart."""
+    """Both are near a unit and 76 m from the ego, where the columns of the ego rays are 3 m apart."""
     cars = (76.0, 4.0), (76.0, 7.2)
     ego, rsu = agent(EGO, sensors={"lidar": {"range": 100.0}}), agent(RSU)
     points = [car(*place, "fblr") for place in cars]

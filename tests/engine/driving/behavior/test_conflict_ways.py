@@ -67,7 +67,7 @@ class TestFourWayJunction:
         assert {way.hold for way in lanes} == {min(way.start for way in lanes)}
 
     def test_long_vehicle_waits_before_the_crosswalk_and_looks_from_the_first_lane(self) -> None:
-        """Between the crosswalk, which ends at x = 28.2 m, and the lanes a bus of 12 m has no room."""
+        """Between the crosswalk, which ends at x = 28.2 m, and the lanes is less than the length of a bus of 12 m."""
         ways = ways_of(road_map("four_way_junction"), ("1", -1, 60.0), size=(12.0, 2.5))
         crosswalks, lanes = ([way for way in ways if way.kind == kind] for kind in ("crosswalk", "lane"))
         first = min(way.start for way in crosswalks)
