@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from eidrive_scenario.experiments.reproduction.layout import Row
+from eidrive_scenario.experiments.reproduction.rows import distinct, number, scenario_title
 
 
 def setup(runs: Mapping[tuple[str, str], int], loaded: int) -> tuple[str, ...]:
@@ -13,7 +14,9 @@ def setup(runs: Mapping[tuple[str, str], int], loaded: int) -> tuple[str, ...]:
 
     runs    runs per arm by scenario and planner;  loaded  runs per arm with added stations
     """
-    listed = "; ".join(f"{short(scenario)}, `{planner}`: {count}" for (scenario, planner), count in runs.items())
+    listed = "; ".join(
+        f"{scenario_title(scenario)}, `{planner}`: {count}" for (scenario, planner), count in runs.items()
+    )
     return (
         f"Success is a run without a collision. Runs per arm: {listed}. The channel acts on links only. Starts and "
         "speeds vary between seeds as in the tables of the paper, equally in all arms.",
@@ -34,8 +37,8 @@ def conclusions(faults: Sequence[Row], loads: Sequence[Row]) -> tuple[str, ...]:
     texts = []
     for key in dict.fromkeys((row["scenario"], row["planner"]) for row in faults):
         mine = [row for row in faults if (row["scenario"], row["planner"]) == key]
-        texts.append(f"{short(str(key[0]))}, `{key[1]}`. {_latency(mine)} {_bursts(mine)} {_radio(mine)}")
-    texts += [_load([row for row in loads if row["access"] == access]) for access in _values(loads, "access")]
+        texts.append(f"{scenario_title(str(key[0]))}, `{key[1]}`. {_latency(mine)} {_bursts(mine)} {_radio(mine)}")
+    texts += [_load([row for row in loads if row["access"] == access]) for access in distinct(loads, "access")]
     return tuple(texts)
 
 
@@ -90,17 +93,3 @@ def _load(rows: Sequence[Row]) -> str:
         f"from {first['reception']:.0%} to {last['reception']:.0%}, the mean age of information from "
         f"{first['age']:.3f} s to {last['age']:.3f} s, and success from {first['share']:.0%} to {last['share']:.0%}."
     )
-
-
-def short(scenario: str) -> str:
-    """Return the name of a scenario for texts."""
-    return scenario.removeprefix("coop/").replace("_", " ")
-
-
-def number(row: Row, name: str) -> float:
-    """Return a field as a number; 0 without a value."""
-    return float(row[name] or 0.0)
-
-
-def _values(rows: Sequence[Row], name: str) -> list[str]:
-    return list(dict.fromkeys(str(row[name]) for row in rows))

@@ -16,6 +16,7 @@ from eidrive_scenario.experiments.cooperative_perception.scores import RESAMPLES
 from eidrive_scenario.experiments.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
 from eidrive_scenario.experiments.reproduction.layout import Row
 from eidrive_scenario.experiments.reproduction.perception_shapes import crossing
+from eidrive_scenario.experiments.reproduction.rows import number
 
 SENDING = ("average", "covariance_intersection", "early")
 
@@ -74,10 +75,10 @@ def conclusions(arms: Sequence[Row], curves: Sequence[Row], volumes: Sequence[Ro
     """Return the paragraphs about the measured values."""
     by_arm = {str(row["arm"]): row for row in arms}
     listed = [
-        f"{name} {_number(row, 'ap_30'):.3f}, {_number(row, 'ap_50'):.3f} and {_number(row, 'ap_70'):.3f}"
+        f"{name} {number(row, 'ap_30'):.3f}, {number(row, 'ap_50'):.3f} and {number(row, 'ap_70'):.3f}"
         for name, row in by_arm.items()
     ]
-    hidden = [f"{name} {_number(row, 'hidden_50'):.0%}" for name, row in by_arm.items()]
+    hidden = [f"{name} {number(row, 'hidden_50'):.0%}" for name, row in by_arm.items()]
     return (
         f"Without faults, AP at 0.3, 0.5 and 0.7: {'; '.join(listed)}.",
         f"Hidden objects that are found at 0.5: {', '.join(hidden)}.",
@@ -96,7 +97,7 @@ def _limits(curves: Sequence[Row], axis: str) -> str:
         for overlap in (0.5, 0.7):
             mine, alone = (
                 {
-                    _number(row, "value"): _number(row, "ap")
+                    number(row, "value"): number(row, "ap")
                     for row in curves
                     if (row["arm"], row["axis"], row["range"], row["iou"]) == (name, axis, "all", overlap)
                 }
@@ -112,17 +113,17 @@ def _limits(curves: Sequence[Row], axis: str) -> str:
 def _volume(volumes: Sequence[Row]) -> str:
     most = {str(row["arm"]): row for row in reversed(volumes) if row["cell"] in (None, 0.1)}
     late, early = most["covariance_intersection"], most["early"]
-    ratio = _number(early, "megabytes_per_second") / max(_number(late, "megabytes_per_second"), 1e-12)
+    ratio = number(early, "megabytes_per_second") / max(number(late, "megabytes_per_second"), 1e-12)
     return (
-        f"Points need {ratio:.0f} times the bytes of boxes ({_number(early, 'megabytes_per_second'):.3f} and "
-        f"{_number(late, 'megabytes_per_second'):.3f} MB/s over all links), for an AP 0.7 of "
-        f"{_number(early, 'ap_70'):.3f} and {_number(late, 'ap_70'):.3f}."
+        f"Points need {ratio:.0f} times the bytes of boxes ({number(early, 'megabytes_per_second'):.3f} and "
+        f"{number(late, 'megabytes_per_second'):.3f} MB/s over all links), for an AP 0.7 of "
+        f"{number(early, 'ap_70'):.3f} and {number(late, 'ap_70'):.3f}."
     )
 
 
 def _sorting(arms: Sequence[Row]) -> str:
-    lost = [_number(row, "ap_50") - _number(row, "ap_50_local_sort") for row in arms]
-    gained = [_number(row, "ap_50_hit") - _number(row, "ap_50") for row in arms]
+    lost = [number(row, "ap_50") - number(row, "ap_50_local_sort") for row in arms]
+    gained = [number(row, "ap_50_hit") - number(row, "ap_50") for row in arms]
     return (
         f"Local sort lowers AP 0.5 by {min(lost):.3f} to {max(lost):.3f}. With hit objects only it is higher by "
         f"{min(gained):.3f} to {max(gained):.3f}."
@@ -134,22 +135,18 @@ def _departures(arms: Mapping[str, Row]) -> Iterator[str]:
     late, early, alone, filtered, mean = (
         arms[name] for name in ("covariance_intersection", "early", "none", "none, filtered", "average")
     )
-    if _number(early, "ap_50") < _number(late, "ap_50"):
+    if number(early, "ap_50") < number(late, "ap_50"):
         yield (
             "Early fusion is below covariance intersection, other than in the literature. Likely reasons: "
             "covariance intersection uses earlier scans, which own detections alone gain "
-            f"{_number(filtered, 'ap_50') - _number(alone, 'ap_50'):+.3f} from; and the detector groups points by "
+            f"{number(filtered, 'ap_50') - number(alone, 'ap_50'):+.3f} from; and the detector groups points by "
             "the distance from the ego, which suits points of others less the farther they are (AP 0.5 of "
-            f"{_number(early, 'ap_50_range_2'):.3f} against {_number(late, 'ap_50_range_2'):.3f} from {RANGES[1]:g} "
+            f"{number(early, 'ap_50_range_2'):.3f} against {number(late, 'ap_50_range_2'):.3f} from {RANGES[1]:g} "
             "m on)."
         )
-    if _number(mean, "ap_50_range_0") < _number(alone, "ap_50_range_0"):
+    if number(mean, "ap_50_range_0") < number(alone, "ap_50_range_0"):
         yield (
-            f"Up to {RANGES[0]:g} m `average` has an AP 0.5 of {_number(mean, 'ap_50_range_0'):.3f} and the ego "
-            f"alone {_number(alone, 'ap_50_range_0'):.3f}. Likely reason: the mean gives boxes of parts of an object "
+            f"Up to {RANGES[0]:g} m `average` has an AP 0.5 of {number(mean, 'ap_50_range_0'):.3f} and the ego "
+            f"alone {number(alone, 'ap_50_range_0'):.3f}. Likely reason: the mean gives boxes of parts of an object "
             "the same weight as a complete one, and all boxes within 4 m are one object."
         )
-
-
-def _number(row: Row, name: str) -> float:
-    return float(row[name] or 0.0)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from eidrive_scenario.experiments.reproduction.layout import Row
+from eidrive_scenario.experiments.reproduction.rows import distinct, number, scenario_title
 
 ORIGINAL = {"coop/scenario_1": (39.5, 8.0556), "coop/scenario_2": (34.5, 8.3333)}
 """Start of the hidden car [m] and speed of the ego [m/s] in EI-Drive's configuration, by scenario."""
@@ -32,13 +33,13 @@ def conclusions(cells: Sequence[Row], effects: Sequence[Row], curve: Sequence[Ro
     for planner in dict.fromkeys(str(row["planner"]) for row in cells):
         some, effect, line = ([row for row in rows if row["planner"] == planner] for rows in (cells, effects, curve))
         texts += [f"`{planner}`. {_effects(effect)}", f"`{planner}`. {_places(some)}"]
-        texts += [f"`{planner}`, {_threshold(line, scenario)}" for scenario in _scenarios(line)]
+        texts += [f"`{planner}`, {_threshold(line, scenario)}" for scenario in distinct(line, "scenario")]
     return tuple(texts)
 
 
 def _effects(effects: Sequence[Row]) -> str:
     listed = [
-        f"{_short(str(row['scenario']))}, {row['arm']}: {row['helps']}, {row['nothing']} and {row['harms']} of "
+        f"{scenario_title(str(row['scenario']))}, {row['arm']}: {row['helps']}, {row['nothing']} and {row['harms']} of "
         f"{row['cells']}"
         for row in effects
         if row["arm"] != "none"
@@ -48,20 +49,16 @@ def _effects(effects: Sequence[Row]) -> str:
 
 def _places(cells: Sequence[Row]) -> str:
     near = [
-        f"{_short(scenario)}, start {name}: {_at(cells, scenario, *places[scenario])}"
-        for scenario in _scenarios(cells)
+        f"{scenario_title(scenario)}, start {name}: {_at(cells, scenario, *places[scenario])}"
+        for scenario in distinct(cells, "scenario")
         for name, places in (("of EI-Drive", ORIGINAL), ("of the library", LIBRARY))
     ]
     return f"Collisions in the cell that is nearest to a start. {'; '.join(near)}."
 
 
-def _scenarios(rows: Sequence[Row]) -> list[str]:
-    return list(dict.fromkeys(str(row["scenario"]) for row in rows))
-
-
 def _at(cells: Sequence[Row], scenario: str, start: float, speed: float) -> str:
     mine = [row for row in cells if row["scenario"] == scenario]
-    nearest = min(mine, key=lambda row: (abs(_number(row, "start") - start), abs(_number(row, "speed") - speed)))
+    nearest = min(mine, key=lambda row: (abs(number(row, "start") - start), abs(number(row, "speed") - speed)))
     same = [row for row in mine if (row["start"], row["speed"]) == (nearest["start"], nearest["speed"])]
     counts = ", ".join(f"{row['arm']} {row['collisions']}" for row in same)
     return f"{counts} of {nearest['episodes']} at {nearest['start']:g} m and {nearest['speed']:g} m/s"
@@ -70,20 +67,12 @@ def _at(cells: Sequence[Row], scenario: str, start: float, speed: float) -> str:
 def _threshold(curve: Sequence[Row], scenario: str) -> str:
     mine = [row for row in curve if row["scenario"] == scenario]
     first, last = mine[0], mine[-1]
-    before, after = max(pairwise(mine), key=lambda pair: _number(pair[1], "share") - _number(pair[0], "share"))
+    before, after = max(pairwise(mine), key=lambda pair: number(pair[1], "share") - number(pair[0], "share"))
     ends = (
-        f"{_short(scenario)}: {first['share']:.0%} of the runs have a collision without latency, {last['share']:.0%} "
-        f"at {last['latency']:g} s"
+        f"{scenario_title(scenario)}: {first['share']:.0%} of the runs have a collision without latency, "
+        f"{last['share']:.0%} at {last['latency']:g} s"
     )
-    if _number(after, "share") <= _number(before, "share"):
+    if number(after, "share") <= number(before, "share"):
         return f"{ends}; the share nowhere increases."
     step = f"{before['share']:.0%} at {before['latency']:g} s to {after['share']:.0%} at {after['latency']:g} s"
     return f"{ends}; the largest step is from {step}."
-
-
-def _number(row: Row, name: str) -> float:
-    return float(row[name] or 0.0)
-
-
-def _short(scenario: str) -> str:
-    return scenario.removeprefix("coop/").replace("_", " ")

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from eidrive_scenario.experiments.reproduction.channels_text import number, short
 from eidrive_scenario.experiments.reproduction.layout import Row
+from eidrive_scenario.experiments.reproduction.rows import distinct, number, scenario_title
 
 COLORS = {"independent": "#0072b2", "bursty": "#d55e00", "radio": "#009e73"}
 """Colors of Okabe and Ito, which color-blind readers can distinguish."""
@@ -25,7 +25,7 @@ def channels_figure(data: Mapping[str, Sequence[Row]]) -> Figure:
         mine = [row for row in faults if (row["scenario"], row["planner"]) == (scenario, planner)]
         _latency(column[0], mine)
         _losses(column[1], mine)
-        column[0].set_title(f"{short(scenario)}, {planner}", fontsize=9)
+        column[0].set_title(f"{scenario_title(scenario)}, {planner}", fontsize=9)
     for axes in panels[:2, 0]:
         axes.set_ylabel("share of runs without a collision", fontsize=8)
     panels[0, 0].legend(fontsize=7, loc="upper right")
@@ -67,7 +67,7 @@ def _load(panels: Sequence[Axes], rows: Sequence[Row]) -> None:
     """Draw busy ratio and received share, age of information, and success over the number of stations."""
     busy, age, success = panels[:3]
     for (access, color), marker in zip(
-        zip(dict.fromkeys(str(row["access"]) for row in rows), ("#0072b2", "#d55e00"), strict=False), "os", strict=False
+        zip(distinct(rows, "access"), ("#0072b2", "#d55e00"), strict=False), "os", strict=False
     ):
         mine = [row for row in rows if row["access"] == access]
         at = [number(row, "stations") for row in mine]

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.published import COUNTS, TABLE_2
 from eidrive_scenario.experiments.reproduction.layout import PartReport, Row
+from eidrive_scenario.experiments.reproduction.rows import distinct, number, scenario_title
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.reporting.reproduction.channel_curves import channels_figure
 from eidrive_scenario.reporting.reproduction.maps import sensitivity_figure
 from eidrive_scenario.reporting.reproduction.precision import perception_figure
-from eidrive_scenario.reporting.reproduction.rows import number, scenario_title
 
 COLORS = ("#0b6e99", "#c2410c")
 PAPER = "#111827"
@@ -25,7 +25,7 @@ PaperRows = Mapping[str, Sequence[Row]]
 def table_2_figure(data: PaperRows) -> Figure:
     """Draw the means of the minimum distance by arm: one panel per planner and column of the paper."""
     rows = data["table2"]
-    planners, arms, rules = (_values(rows, name) for name in ("planner", "arm", "channel"))
+    planners, arms, rules = (distinct(rows, name) for name in ("planner", "arm", "channel"))
     columns = list(dict.fromkeys((str(row["scenario"]), str(row["detector"])) for row in rows))
     figure = Figure(figsize=(2.9 * len(columns) + 1.2, 3.2 * len(planners)), layout="constrained")
     panels = figure.subplots(len(planners), len(columns), sharex=True, sharey="row", squeeze=False)
@@ -63,7 +63,7 @@ def _paper_values(
 def table_3_figure(data: PaperRows) -> Figure:
     """Draw the success rates by senders: one panel per scenario and detector."""
     rows = data["table3"]
-    scenarios, detectors, senders = (_values(rows, name) for name in ("scenario", "detector", "senders"))
+    scenarios, detectors, senders = (distinct(rows, name) for name in ("scenario", "detector", "senders"))
     figure = Figure(figsize=(2.6 * len(scenarios) + 1.0, 3.0 * len(detectors)), layout="constrained")
     panels = figure.subplots(len(detectors), len(scenarios), sharex=True, sharey=True, squeeze=False)
     for detector, line in zip(detectors, panels, strict=True):
@@ -86,7 +86,7 @@ def table_3_figure(data: PaperRows) -> Figure:
 def detection_figure(data: PaperRows) -> Figure:
     """Draw the moving averages of the counts over time, with and without cooperation: one panel per column."""
     rows = data["detection_series"]
-    scenarios, detectors, arms = (_values(rows, name) for name in ("scenario", "detector", "arm"))
+    scenarios, detectors, arms = (distinct(rows, name) for name in ("scenario", "detector", "arm"))
     figure = Figure(figsize=(3.6 * len(detectors) + 1.0, 2.6 * len(scenarios)), layout="constrained")
     panels = figure.subplots(len(scenarios), len(detectors), sharex=True, sharey=True, squeeze=False)
     for scenario, line in zip(scenarios, panels, strict=True):
@@ -152,10 +152,6 @@ def _interval(
     above = [end - value for value, end in zip(middle, high, strict=True)]
     errors = [[max(0.0, one) for one in below], [max(0.0, one) for one in above]]
     axes.errorbar(at, middle, yerr=errors, fmt="o", ms=4, color=color, capsize=3, lw=1, label=label)
-
-
-def _values(rows: Sequence[Row], name: str) -> list[str]:
-    return list(dict.fromkeys(str(row[name]) for row in rows))
 
 
 def _select(rows: Sequence[Row], **fields: str) -> list[Row]:

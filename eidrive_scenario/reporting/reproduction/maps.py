@@ -10,8 +10,8 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.reproduction.layout import Row
+from eidrive_scenario.experiments.reproduction.rows import number, scenario_title
 from eidrive_scenario.experiments.reproduction.sensitivity_text import LIBRARY, ORIGINAL
-from eidrive_scenario.reporting.reproduction.rows import number, scenario_title
 
 COLORS = "YlOrBr"
 """Color map of the probability of a collision, from 0 (light) to 1 (dark); color-blind readers can distinguish it."""

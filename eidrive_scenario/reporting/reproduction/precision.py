@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.reproduction.layout import Row
-from eidrive_scenario.reporting.reproduction.rows import number
+from eidrive_scenario.experiments.reproduction.rows import number
 
 COLORS = {
     "none": "#6b7280",

@@ -1,0 +1,22 @@
+"""Values of the rows of a part, for its texts and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from eidrive_scenario.experiments.reproduction.layout import Row
+
+
+def number(row: Row, name: str) -> float:
+    """Return a field as number; 0 if it is empty."""
+    return float(row[name] or 0.0)
+
+
+def distinct(rows: Sequence[Row], name: str) -> list[str]:
+    """Return the values of a field as texts, in the order of their first rows."""
+    return list(dict.fromkeys(str(row[name]) for row in rows))
+
+
+def scenario_title(scenario: str) -> str:
+    """Return the name of a scenario of the library as text."""
+    return scenario.removeprefix("coop/").replace("_", " ")
