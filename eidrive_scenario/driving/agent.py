@@ -121,7 +121,7 @@ class Agent:
         own_perception = own_perception and self.receives_messages
         readings = self.perception.locate(readings)
         ego = readings.ego
-        self._own_body.record(ego)
+        self._own_body.record(ego, readings.attached)
         fresh = self.perception.perceive(readings)
         if fresh is not None:
             self._detections = fresh

@@ -258,6 +258,10 @@ class Stations(DrivingStack):
 
     def _read(self, world: World, view: WorldView, signals: Mapping[str, str]) -> dict[str, Readings]:
         readings = read_all(list(self._rigs.values()), world, view)
+        for name, reading in readings.items():
+            attached = [view.row(other) for other in world.attached(name)]
+            if attached:
+                readings[name] = replace(reading, attached=view.boxes[attached])
         for name, sensor in self._signal_sensors.items():
             visible = sensor.read(world, view, view.row(name), signals)
             readings[name] = replace(readings[name], signals=visible)

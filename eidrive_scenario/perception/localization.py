@@ -204,17 +204,24 @@ def at_pose(readings: Readings, ego: EgoState) -> Readings:
     rigid[:2, 3] = ego.position[:2] - rigid[:2, :2] @ truth.position[:2]
     truth_reading = readings.truth
     if truth_reading is not None:
-        boxes = truth_reading.boxes.copy()
-        boxes[:, :2] = boxes[:, :2] @ rigid[:2, :2].T + rigid[:2, 3]
-        boxes[:, 6] = wrap_angle(boxes[:, 6] + turn)
+        boxes = _moved(truth_reading.boxes, rigid, turn)
         truth_reading = replace(truth_reading, boxes=boxes, velocity=truth_reading.velocity @ rigid[:2, :2].T)
     return replace(
         readings,
         ego=ego,
         truth=truth_reading,
+        attached=_moved(readings.attached, rigid, turn) if len(readings.attached) else readings.attached,
         cameras={name: _camera(reading, rigid) for name, reading in readings.cameras.items()},
         lidars={name: _lidar(reading, rigid) for name, reading in readings.lidars.items()},
     )
+
+
+def _moved(boxes: Array, rigid: Array, turn: float) -> Array:
+    """Return boxes (N, 7) after a rigid motion (4, 4) in the plane that turns by this angle [rad]."""
+    moved = boxes.copy()
+    moved[:, :2] = moved[:, :2] @ rigid[:2, :2].T + rigid[:2, 3]
+    moved[:, 6] = wrap_angle(moved[:, 6] + turn)
+    return moved
 
 
 def _camera(reading: CameraReading, rigid: Array) -> CameraReading:

@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 
+NOTHING_ATTACHED: Array = np.empty((0, 7))
+"""Boxes of the trailers of a station without one."""
+NOTHING_ATTACHED.flags.writeable = False
+
 FIELDS = frozenset({"truth", "camera", "lidar", "gnss", "imu"})
 """Kinds of sensors with a separate field in `Readings`."""
 
@@ -115,3 +119,5 @@ class Readings(msgspec.Struct, frozen=True):
     """Signals in sight, for stations with a signal sensor."""
     others: Mapping[str, Mapping[str, Any]] = msgspec.field(default_factory=dict)
     """Readings of all other sensors, by kind and name."""
+    attached: Array = msgspec.field(default_factory=lambda: NOTHING_ATTACHED)
+    """Boxes (K, 7) of the own trailers, whose angles the vehicle measures, in the world frame [m, rad]."""

@@ -148,6 +148,10 @@ class World:
         """Set the pairs of a vehicle and its trailer, which may overlap; actors may be absent."""
         self._couplings.pairs = frozenset(pairs)
 
+    def attached(self, name: str) -> tuple[str, ...]:
+        """Return the present trailers of a vehicle, or all other bodies of the road train of a trailer."""
+        return tuple(other for other in self._bodies if other in self._couplings.attached(name))
+
     @property
     def weather(self) -> Weather:
         """Current weather."""

@@ -59,6 +59,18 @@ def test_connected_trailer_may_overlap_its_vehicle(run: Run) -> None:
     assert not [contact for frame in played.frames for contact in frame.view.contacts]
 
 
+@pytest.mark.element("ConnectTrailerAction")
+def test_driven_vehicle_does_not_perceive_its_trailer(run: Run) -> None:
+    """The trailer is connected at 0.5 s; until then it is an object. The car of the scene is out of range."""
+    stack = """<ObjectController><Controller name="Stack"><Properties><Property name="module" value="eidrive"/>
+      <Property name="range" value="50"/></Properties></Controller></ObjectController>"""
+    driven = TRAIN.replace("</Vehicle></ScenarioObject>", f"</Vehicle>{stack}</ScenarioObject>", 1)
+    played = play(run, 2, ("Truck", COUPLE, after(0.5)), train=driven)
+    counts = [len(frame.steps["Truck"].detections) for frame in played.frames if "Truck" in frame.steps]
+    assert counts[:9] == [1] * 9
+    assert counts[13:] == [0] * len(counts[13:]) != []
+
+
 def test_unconnected_trailer_does_not_move(run: Run) -> None:
     played = play(run, 2, ("Truck", DRIVE))
     assert played.x("Trailer") == [196.0] * len(played.frames)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,14 +11,11 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate
 from eidrive_scenario.fusion.tracks import pose_part
-from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.perception.own_bodies import BODY_MARGIN, rows_on_bodies, without_rows
+from eidrive_scenario.sensing.readings import NOTHING_ATTACHED, EgoState
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import StationState
 from eidrive_scenario.world.actor import ActorSpec
-
-BODY_MARGIN = 0.9
-"""Maximum distance of a reported box center from the ego outline at which the box is the ego body [m]. It is half the
-width of a car: the center of another car is closer only after a collision."""
 
 GATE = AssociationGate.of(0.99, 0.0)
 """Gate of the offset between a reported object and the ego body, given the covariances of both."""
@@ -34,24 +30,30 @@ class OwnBody:
         dt  time between two places [s]
         """
         self._spec = spec
-        self._places: deque[tuple[float, float, float, float, float]] = deque(maxlen=math.ceil(duration / dt) + 2)
-        """Time [s], center of the body and height of its reference point [m], heading [rad]."""
+        self._places: deque[tuple[float, tuple[float, float, float, float], Array]] = deque(
+            maxlen=math.ceil(duration / dt) + 2
+        )
+        """Time [s], center of the body and height of its reference point [m], heading [rad]; boxes of the trailers."""
         self._tracks: dict[str, int] = {}
         """Object id of the ego body at each station."""
 
-    def record(self, ego: EgoState) -> None:
-        """Store the place of the body."""
+    def record(self, ego: EgoState, attached: Array = NOTHING_ATTACHED) -> None:
+        """Store the place of the body, and the boxes (K, 7) of its trailers."""
         x, y, z = ego.position.tolist()
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         ahead, aside, _ = self._spec.offset
-        self._places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
+        center = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
+        self._places.append((ego.time, (*center, z, ego.yaw), attached))
 
     def place(self, time: float) -> tuple[float, float, float, float]:
         """Return center, height [m] and heading [rad] of the body at the last instant up to `time`, or the first."""
+        return self._at(time)[1]
+
+    def _at(self, time: float) -> tuple[float, tuple[float, float, float, float], Array]:
         for held in reversed(self._places):
             if held[0] <= time + TIME_TOLERANCE:
-                return held[1:]
-        return self._places[0][1:]
+                return held
+        return self._places[0]
 
     def reference_pose(self, time: float) -> tuple[float, float, float, float]:
         """Return position [m] and heading [rad] of the reference point at that time."""
@@ -67,12 +69,12 @@ class OwnBody:
         return np.array([x, y, z, length + BODY_MARGIN, width + BODY_MARGIN, 4.0 * height, yaw])
 
     def without(self, detections: Detections) -> Detections:
-        """Return received detections without the boxes on the ego outline, for which the vehicle must not brake.
+        """Return received detections without those on the ego body and its trailers, for which it must not brake.
 
         The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
         """
-        inside = self._rows_on_outline(detections)
-        return _without_rows(detections, inside) if inside else detections
+        detections = self._without_trailers(detections)
+        return without_rows(detections, rows_on_bodies(detections, self._outline(detections.time)))
 
     def without_perceived(
         self,
@@ -93,30 +95,27 @@ class OwnBody:
         own              newest own detections
         pose_covariance  (3, 3) of the own x, y and yaw; None: the pose is exact
         """
-        inside = self._rows_on_outline(detections)
+        detections = self._without_trailers(detections)
+        inside = rows_on_bodies(detections, self._outline(detections.time))
         if inside:
             if len(inside) == 1 and detections.tracks:
                 self._tracks[station] = detections.tracks[inside[0]]
-            return _without_rows(detections, inside)
+            return without_rows(detections, inside)
         row = self._likeliest_row(detections, self._tracks.get(station), state, own, pose_covariance)
         if row is None:
             return detections
         if detections.tracks:
             self._tracks[station] = detections.tracks[row]
-        return _without_rows(detections, [row])
+        return without_rows(detections, [row])
 
-    def _rows_on_outline(self, detections: Detections) -> list[int]:
-        if not len(detections):
-            return []
-        x, y, _, yaw = self.place(detections.time)
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        half_length, half_width = self._spec.size[0] / 2.0 + BODY_MARGIN, self._spec.size[1] / 2.0 + BODY_MARGIN
-        return [
-            row
-            for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist())
-            if abs(cos * (bx - x) + sin * (by - y)) <= half_length
-            and abs(cos * (by - y) - sin * (bx - x)) <= half_width
-        ]
+    def _without_trailers(self, detections: Detections) -> Detections:
+        attached = self._at(detections.time)[2]
+        return without_rows(detections, rows_on_bodies(detections, attached)) if len(attached) else detections
+
+    def _outline(self, time: float) -> Array:
+        """Return the box (1, 7) of the body at that time."""
+        x, y, z, yaw = self.place(time)
+        return np.array([[x, y, z, *self._spec.size, yaw]])
 
     def _may_be_body(self, kind: str) -> bool:
         """Return whether the body may be reported with this class. A roadside unit is no road user."""
@@ -177,7 +176,3 @@ def _squared_mahalanobis(offset: Array, covariance: Array) -> tuple[float, float
         return math.inf, math.inf
     distance = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
     return distance, distance + math.log(determinant)
-
-
-def _without_rows(detections: Detections, rows: Sequence[int]) -> Detections:
-    return detections.subset([row for row in range(len(detections)) if row not in rows])

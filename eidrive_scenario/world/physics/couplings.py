@@ -25,6 +25,16 @@ class Couplings:
         self._apart: dict[Pair, tuple[int, int]] = {}
         """Handles of the bodies that do not collide with each other."""
 
+    def attached(self, name: str) -> frozenset[str]:
+        """Return the actors that are connected to an actor directly or by others, without the actor itself."""
+        if not self.pairs:
+            return frozenset()
+        found, added = {name}, {name}
+        while added:
+            added = {other for pair in self.pairs if pair & added for other in pair} - found
+            found |= added
+        return frozenset(found - {name})
+
     def update(self, bodies: Mapping[str, Body]) -> None:
         """Set which bodies collide; those of a disconnected trailer and its vehicle only after they have parted."""
         for pair in sorted(self.pairs | self._apart.keys(), key=sorted):

@@ -1,0 +1,37 @@
+"""Detections of the bodies of the station itself: of the vehicle, and of its trailers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+
+BODY_MARGIN = 0.9
+"""Maximum distance of a detected box center from the outline of a body at which the box shows this body [m]. It is half
+the width of a car: the center of another car is closer only after a collision."""
+
+
+def rows_on_bodies(detections: Detections, bodies: Array) -> list[int]:
+    """Return the rows of the detections whose centers are on bodies (K, 7), or within the margin of them."""
+    outlines = [
+        (x, y, math.cos(yaw), math.sin(yaw), length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN)
+        for x, y, _, length, width, _, yaw in bodies.tolist()
+    ]
+    return [
+        row
+        for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist())
+        if any(
+            abs(cos * (bx - x) + sin * (by - y)) <= half_length and abs(cos * (by - y) - sin * (bx - x)) <= half_width
+            for x, y, cos, sin, half_length, half_width in outlines
+        )
+    ]
+
+
+def without_rows(detections: Detections, rows: Iterable[int]) -> Detections:
+    """Return the detections without these rows."""
+    removed = set(rows)
+    if not removed:
+        return detections
+    return detections.subset([row for row in range(len(detections)) if row not in removed])
