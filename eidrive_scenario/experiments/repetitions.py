@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.simulation import RunSettings
 
 T = TypeVar("T")
@@ -83,8 +84,12 @@ def run_jobs(
         return _in_processes(jobs, task, workers, end)
 
 
-def _end_with_parent() -> None:
-    """End this worker process when its parent ends; that of a killed parent would wait for jobs forever."""
+def _start_worker() -> None:
+    """Prepare a worker process: equal images of its runs are processed once, and it ends when its parent ends.
+
+    That of a killed parent would wait for jobs forever.
+    """
+    image_memory.activate(image_memory.ImageMemory())
     parent = multiprocessing.parent_process()
     if parent is not None:
 
@@ -97,7 +102,7 @@ def _end_with_parent() -> None:
 
 def _in_processes(jobs: Sequence[J], task: Callable[[J], T], workers: int, end: Callable[[T], T]) -> tuple[T, ...]:
     # Spawned, not forked: a child process must not inherit a physics client or a running progress thread.
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_parent)
+    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_start_worker)
     try:
         futures: list[Future[T]] = [pool.submit(task, job) for job in jobs]
         for future in as_completed(futures):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from pathlib import Path
 
@@ -10,11 +11,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.networks.blocks import fold
 from eidrive_scenario.perception.learned.networks.boxes import corners
 from eidrive_scenario.perception.learned.networks.ssd import decode, default_boxes
 from eidrive_scenario.perception.learned.networks.yolov5 import STRIDES, YoloV5
+from eidrive_scenario.perception.learned.weight_files import read_weights
 from eidrive_scenario.perception.learned.weights import load
 
 
@@ -31,9 +35,22 @@ class TorchNetwork(ImageNetwork):
         torch.set_num_threads(threads)
         fold(network)
         self.name = description.network
+        digest = hashlib.sha256(read_weights(path)).hexdigest()
+        self._identity = f"{digest} {self.confidence!r} {threads}"
         self._network = network
         width, height = description.input_size
         self._defaults = default_boxes(height, width)
+
+    def find(self, image: NDArray[np.uint8]) -> ImageDetections:
+        memory = image_memory.active()
+        if memory is None:
+            return super().find(image)
+        key = image_memory.key_of(self._identity, image)
+        found = memory.get(key)
+        if found is None:
+            found = super().find(image)
+            memory.add(key, found)
+        return found
 
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
         with torch.inference_mode():
