@@ -147,9 +147,13 @@ class LearnedDetector(Detector):
         return self._signals
 
     def _lift_image(self, found: ImageDetections, readings: Readings, camera: str) -> Detections:
-        """Return the objects of one image; of several lidars, the one with the best position estimate is used."""
+        """Return the objects of one image; of several lidars, the one with the best position estimate is used.
+
+        Image boxes that no body fills are omitted.
+        """
         clouds: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
-        return most_certain([self._lift_with(found, readings, camera, *cloud) for cloud in clouds.items()])
+        lifted = most_certain([self._lift_with(found, readings, camera, *cloud) for cloud in clouds.items()])
+        return lifted if lifted.scores.all() else lifted.subset(np.flatnonzero(lifted.scores).tolist())
 
     def _lift_with(
         self, found: ImageDetections, readings: Readings, camera: str, lidar: str, cloud: LidarReading | None
@@ -221,14 +225,19 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
 
 
 def most_certain(estimates: Sequence[Detections]) -> Detections:
-    """Return, row by row, the estimate of the same object with the minimum position variance."""
+    """Return, row by row, the estimate of the same object with the minimum position variance; a score of 0 is the last
+    choice."""
     if len(estimates) == 1:
         return estimates[0]
-    variances = [np.trace(estimate.covariance, axis1=1, axis2=2) for estimate in estimates]
+    variances = [
+        np.where(estimate.scores > 0.0, np.trace(estimate.covariance, axis1=1, axis2=2), np.inf)
+        for estimate in estimates
+    ]
     best, rows = np.argmin(variances, axis=0), np.arange(len(estimates[0]))
     return replace(
         estimates[0],
         boxes=np.stack([estimate.boxes for estimate in estimates])[best, rows],
+        scores=np.stack([estimate.scores for estimate in estimates])[best, rows],
         covariance=np.stack([estimate.covariance for estimate in estimates])[best, rows],
     )
 

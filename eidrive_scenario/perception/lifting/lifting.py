@@ -20,7 +20,7 @@ from eidrive_scenario.perception.geometry.size_priors import prior_of
 from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
-from eidrive_scenario.perception.lifting.ground import AT_BORDER, ByGround, lift_by_ground
+from eidrive_scenario.perception.lifting.ground import ByGround, edges_in_image, lift_by_ground
 from eidrive_scenario.perception.lifting.target import Target
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
@@ -75,23 +75,26 @@ def lift(
     clustered; if the border of the image cuts the box, points beyond the border are included. The object is a cluster
     with many points in the box, near the distance that `lift_by_ground` expects. Its L-shape fit has the size of the
     class and fills the image box. Other clusters within the fitted box belong to the object. A box without such points
-    is placed by `lift_by_ground`. Velocities are unknown.
+    is placed by `lift_by_ground`; its score is 0 if no body of its class on the ground fills the box: the network
+    mistakes markings or buildings for objects. Velocities are unknown.
     """
     boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
     surroundings = surroundings or MapContext(None)
     by_ground = lift_by_ground(boxes, classes, camera, ground=ground, surroundings=surroundings)
     lifted, covariance = by_ground.boxes, by_ground.covariance
+    may_be_body = by_ground.may_be_bodies
     if lidar is not None and len(boxes):
         scan = Scan(lidar, pattern or pattern_from_points(lidar.points), ground)
         for row, fit in enumerate(_fit_points(boxes, classes, camera, scan, by_ground)):
             if fit is not None:
                 lifted[row] = scan.frame.boxes_to_world(np.array([fit.box]))[0]
                 covariance[row] = scan.frame.covariance_to_world(fit.covariance[None])[0]
+                may_be_body[row] = True
         lifted[:, 6] = surroundings.facing(lifted)
     return Detections(
         time,
         lifted,
-        np.asarray(scores, dtype=float).reshape(-1),
+        np.where(may_be_body, np.asarray(scores, dtype=float).reshape(-1), 0.0),
         tuple(classes),
         np.full((len(boxes), 2), np.nan),
         covariance,
@@ -109,6 +112,7 @@ def _fit_points(
     places[behind, 0] = np.where(aside < 0.0, -math.inf, math.inf)
     places[behind, 1] = camera.rgb.shape[0] / 2.0
     away = np.hypot(*(world[:, :2] - camera.pose[:2, 3]).T)
+    in_image = edges_in_image(boxes, camera).tolist()
     found: list[Fit | None] = []
     for row, (box, name) in enumerate(zip(boxes, classes, strict=True)):
         guess, spread = by_ground.boxes[row], by_ground.covariance[row]
@@ -126,7 +130,7 @@ def _fit_points(
             (by_ground.costs[row] - by_ground.costs[row].min()).tolist(),
             scan.frame.to_local(guess[:2]),
             scan.frame.covariance_to_local(spread),
-            bool(box[0] <= AT_BORDER or box[2] >= camera.rgb.shape[1] - AT_BORDER),
+            in_image[row],
         )
         fit = _foreground(scan, camera, target, places, away)
         found.append(None if fit is None else replace(fit, covariance=_total_covariance(fit, scan, target, camera)))
@@ -148,11 +152,10 @@ def _total_covariance(fit: Fit, scan: Scan, target: Target, camera: CameraReadin
     outline, _ = pixels(box_corners(scan.frame.boxes_to_world(np.array([fit.box])))[0], camera)
     if np.isnan(outline).any():
         return spread
-    width = camera.rgb.shape[1]
     offsets = []
-    if box[0] > AT_BORDER:
+    if target.edges_in_image[0]:
         offsets.append(float(outline[:, 0].min()) - box[0])
-    if box[2] < width - AT_BORDER:
+    if target.edges_in_image[2]:
         offsets.append(float(outline[:, 0].max()) - box[2])
     if not offsets:
         return spread
@@ -179,7 +182,7 @@ def _foreground(scan: Scan, camera: CameraReading, target: Target, places: Array
     away     (N,) distances from the camera [m]
     """
     inside = _within(places, target.box)
-    rows = np.flatnonzero(_within(places, _widened(target.box, camera)))
+    rows = np.flatnonzero(_within(places, _widened(target)))
     best: tuple[float, Fit] | None = None
     tried: set[bytes] = set()
     for grazing in (True, False):
@@ -240,16 +243,16 @@ def _within(places: Array, box: Sequence[float]) -> NDArray[np.bool_]:
     return np.asarray((x >= left) & (x <= right) & (y >= top) & (y <= bottom))
 
 
-def _widened(box: Sequence[float], camera: CameraReading) -> tuple[float, float, float, float]:
-    """Return a box with its margin; unbounded at edges on the border of the image."""
-    left, top, right, bottom = box
-    height, width = camera.rgb.shape[:2]
+def _widened(target: Target) -> tuple[float, float, float, float]:
+    """Return the box with its margin; unbounded at edges on the border of the image."""
+    left, top, right, bottom = target.box
     across, down = MARGIN * (right - left), MARGIN * (bottom - top)
+    from_left, from_top, to_right, to_bottom = target.edges_in_image
     return (
-        left - across if left > AT_BORDER else -math.inf,
-        top - down if top > AT_BORDER else -math.inf,
-        right + across if right < width - AT_BORDER else math.inf,
-        bottom + down if bottom < height - AT_BORDER else math.inf,
+        left - across if from_left else -math.inf,
+        top - down if from_top else -math.inf,
+        right + across if to_right else math.inf,
+        bottom + down if to_bottom else math.inf,
     )
 
 

@@ -25,7 +25,7 @@ class Target(NamedTuple):
     heading  in the level frame, used if there are too few points to determine one [rad]
     first    first of the tested headings, evenly over half a turn [rad];  costs  of each, the minimum is 0
     center   expected center (2,) [m];  covariance  of it (2, 2) [m²]; both in the level frame
-    cut      whether the border of the image cuts its left or right side
+    edges_in_image  whether left, top, right and bottom edge are those of the object, not of the image
     """
 
     box: list[float]
@@ -38,7 +38,12 @@ class Target(NamedTuple):
     costs: list[float]
     center: Array
     covariance: Array
-    cut: bool
+    edges_in_image: list[bool]
+
+    @property
+    def cut(self) -> bool:
+        """Whether the border of the image cuts its left or right side."""
+        return not (self.edges_in_image[0] and self.edges_in_image[2])
 
     def agreement(self, fit: Fit) -> float:
         """Return the agreement of a box with the expected center, at most 1.

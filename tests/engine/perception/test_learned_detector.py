@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.perception.detector import DetectorContext
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, misspelt, object_category
 from eidrive_scenario.perception.learned.detector import (
     SHIPPED,
@@ -99,6 +100,26 @@ def test_detect_with_two_lidars_uses_better_position_estimate(kind: type[Learned
     np.testing.assert_array_equal(found.boxes, expected.boxes)
     np.testing.assert_array_equal(found.covariance, expected.covariance)
     assert found.classes == expected.classes
+
+
+@KINDS
+def test_detect_omits_image_boxes_that_no_body_fills(
+    kind: type[LearnedDetector], readings: Readings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A truck between the bumper and the horizon, as networks see in a stripe of a crosswalk; the car remains."""
+    detector = kind(LearnedSettings())
+    detector.setup(DetectorContext(car("Ego")))
+    detector.load_weights()
+    network = detector._network
+    assert network is not None
+    found = network.find(readings.cameras["camera"].rgb)
+    stripe = np.concatenate([found.boxes, [[161.0, 313.0, 262.0, 384.0]]])
+    false = ImageDetections(stripe, np.append(found.scores, 0.5), (*found.classes, "truck"))
+    monkeypatch.setattr(network, "find", lambda image: false)
+    detected = detector.detect(replace(readings, lidars={}))
+    assert "truck" not in detected.classes
+    assert len(detected) == len(found.boxes) > 0
+    assert detector.image_detections["camera"] is false
 
 
 @KINDS

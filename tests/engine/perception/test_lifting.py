@@ -155,6 +155,61 @@ def test_lift_object_cut_by_border_locates_complete_object() -> None:
     assert math.dist(found.boxes[0, :2], target[:2]) < 1.0
 
 
+def test_lift_takes_edges_near_border_as_those_of_image() -> None:
+    """Networks place the edge of a cut object some pixels inside the border; as its own, the car would be small."""
+    view = camera()
+    target = box("car", 5.0, 4.2)
+    edges = outline(target, view)
+    assert edges[0] == 0.0
+    found = lift(np.array([[4.0, *edges[1:]]]), ["car"], [1.0], view, time=0.0)
+    off = found.boxes[0, :2] - target[:2]
+    assert np.hypot(*off) < 1.5
+    assert off @ np.linalg.solve(found.covariance[0], off) < 9.21
+
+
+@pytest.mark.parametrize(
+    ("name", "edges"),
+    [
+        pytest.param("truck", [300, 480, 460, 600], id="stripe_before_bumper"),
+        pytest.param("car", [370, 520, 430, 560], id="arrow_on_road"),
+        pytest.param("car", [380, 20, 420, 60], id="sign_above_road"),
+    ],
+)
+def test_lift_box_that_no_body_fills_has_score_zero(name: str, edges: list[float]) -> None:
+    """The horizon is at row 300, so what is below row 480 is less than 1.5 m - 0.45 d high at a distance d."""
+    found = lift(np.array([edges, outline(box("car", 12, 0), camera())]), [name, "car"], [0.9, 0.8], camera(), time=0.0)
+    assert found.scores.tolist() == [0.0, 0.8]
+
+
+@pytest.mark.parametrize("size", [0.85, 1.0, 1.15])
+@pytest.mark.parametrize("name", ["car", "truck", "pedestrian"])
+def test_lift_bodies_of_unusual_size_keeps_scores(name: str, size: float) -> None:
+    """Bodies up to two standard deviations from the mean size, near and far, whole and cut by the border."""
+    view, rng = camera(), np.random.default_rng(4)
+    edges = []
+    while len(edges) < 60:
+        reach, bearing = rng.uniform(3.0, 60.0), rng.uniform(-0.75, 0.75)
+        target = box(name, reach * math.cos(bearing) + 3.0, reach * math.sin(bearing), rng.uniform(-3, 3))
+        target[3:6] *= size
+        target[2] = target[5] / 2.0
+        left, top, right, bottom = outline(target, view, name)
+        if right - left > 4.0 and bottom - top > 4.0:
+            edges.append([left, top, right, bottom])
+    found = lift(np.array(edges), [name] * 60, np.ones(60), view, time=0.0)
+    assert found.scores.min() == 1.0
+
+
+def test_lift_with_points_keeps_score_of_body_in_the_air(street: Any) -> None:
+    """A box that no body on the ground fills is kept if the points show a body: a car beyond a step in the ground."""
+    car = street.thing("Car", 15, 0)
+    sensors = {"front": CameraSettings(width=WIDTH, height=HEIGHT), "roof": LidarSettings()}
+    readings = street.readings([street.thing("Ego", 0, 0), car], sensors)
+    view, cloud = readings.cameras["front"], readings.lidars["roof"]
+    edges = np.array([outline(car.box, view)])
+    assert lift(edges, ["car"], [0.7], view, time=0.0, ground=-4.0).scores.tolist() == [0.0]
+    assert lift(edges, ["car"], [0.7], view, cloud, time=0.0).scores.tolist() == [0.7]
+
+
 def test_lift_ignores_edges_behind_nearer_box() -> None:
     """A nearer car hides the lower and right parts of a car; as a complete one, it would be far behind its position."""
     view = camera()
@@ -192,12 +247,12 @@ def test_lift_truck_leaving_view_keeps_position(street: Any, x: float) -> None:
 
 
 def test_lift_returns_one_row_per_box_in_order() -> None:
-    """Three boxes, one above the horizon without a ground intersection; its distance follows from its height."""
+    """Three boxes, one above the horizon, which no pedestrian fills; its distance follows from its height."""
     view = camera()
     boxes = np.array([outline(box("car", 30, 4), view), [380, 100, 420, 150], outline(box("truck", 20, -3), view)])
     found = lift(boxes, ["car", "pedestrian", "truck"], [0.3, 0.2, 0.1], view, time=0.0)
     assert found.classes == ("car", "pedestrian", "truck")
-    assert found.scores.tolist() == [0.3, 0.2, 0.1]
+    assert found.scores.tolist() == [0.3, 0.0, 0.1]
     assert np.isfinite(found.boxes).all()
     assert np.all(np.linalg.eigvalsh(found.covariance) > 0.0)
     assert len(lift(np.empty((0, 4)), [], [], view, time=0.0)) == 0
