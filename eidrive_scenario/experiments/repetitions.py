@@ -5,8 +5,9 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import TypeVar
@@ -93,22 +94,70 @@ def _start_worker() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
 
-        def wait() -> None:
+        def end_with_parent() -> None:
             parent.join()
             os._exit(1)
 
-        threading.Thread(target=wait, daemon=True).start()
+        threading.Thread(target=end_with_parent, daemon=True).start()
+
+
+class JobQueue:
+    """Jobs that are not started. A worker gets jobs of one scenario and seed in turn, whose images are often equal."""
+
+    def __init__(self, jobs: Sequence[Job]) -> None:
+        self._waiting: dict[tuple[str, int], deque[int]] = {}
+        for row, job in enumerate(jobs):
+            self._waiting.setdefault((job.scenario, job.seed), deque()).append(row)
+        self._untouched = deque(self._waiting)
+        self._of_worker: dict[int, tuple[str, int]] = {}
+
+    def next_job(self, worker: int) -> int | None:
+        """Return the row of the next job of a worker, None if all are started.
+
+        Without untouched groups, a worker takes jobs of the largest one.
+        """
+        group = self._of_worker.get(worker)
+        if group not in self._waiting:
+            while self._untouched and self._untouched[0] not in self._waiting:
+                self._untouched.popleft()
+            group = self._untouched.popleft() if self._untouched else self._largest()
+        if group is None:
+            return None
+        self._of_worker[worker] = group
+        rows = self._waiting[group]
+        row = rows.popleft()
+        if not rows:
+            del self._waiting[group]
+        return row
+
+    def _largest(self) -> tuple[str, int] | None:
+        return max(self._waiting, key=lambda group: len(self._waiting[group]), default=None)
 
 
 def _in_processes(jobs: Sequence[J], task: Callable[[J], T], workers: int, end: Callable[[T], T]) -> tuple[T, ...]:
     # Spawned, not forked: a child process must not inherit a physics client or a running progress thread.
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_start_worker)
+    context = multiprocessing.get_context("spawn")
+    pools = [ProcessPoolExecutor(1, mp_context=context, initializer=_start_worker) for _ in range(workers)]
+    queue = JobQueue(jobs)
+    results: dict[int, T] = {}
+    running: dict[Future[T], tuple[int, int]] = {}
+
+    def start(worker: int) -> None:
+        row = queue.next_job(worker)
+        if row is not None:
+            running[pools[worker].submit(task, jobs[row])] = worker, row
+
     try:
-        futures: list[Future[T]] = [pool.submit(task, job) for job in jobs]
-        for future in as_completed(futures):
-            end(future.result())
-        return tuple(future.result() for future in futures)
+        for worker in range(workers):
+            start(worker)
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                worker, row = running.pop(future)
+                results[row] = end(future.result())
+                start(worker)
+        return tuple(results[row] for row in range(len(jobs)))
     except BrokenProcessPool as error:
         raise SimulationError("a worker process died; run with one worker to see the error") from error
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        for pool in pools:
+            pool.shutdown(wait=True, cancel_futures=True)

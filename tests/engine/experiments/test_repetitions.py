@@ -16,7 +16,7 @@ import pytest
 from rich.console import Console
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.repetitions import jobs_of, run_jobs
+from eidrive_scenario.experiments.repetitions import JobQueue, jobs_of, run_jobs
 from eidrive_scenario.simulation import RunSettings
 
 JOBS = jobs_of("somewhere", {"a": RunSettings(), "b": RunSettings(channel="ideal")}, range(6))
@@ -37,6 +37,28 @@ def test_run_jobs_results_depend_neither_on_workers_nor_order(tasks: ModuleType)
     alone = run_jobs(JOBS, tasks.draw, workers=1)
     assert run_jobs(JOBS, tasks.draw, workers=2) == alone
     assert sorted(run_jobs(JOBS[::-1], tasks.draw, workers=2)) == sorted(alone)
+
+
+def test_queue_gives_jobs_of_one_seed_to_one_worker() -> None:
+    """Two workers and three seeds of two arms: the worker that is free first gets the third seed."""
+    queue = JobQueue(JOBS[:6])
+    started = [(worker, JOBS[row].seed) for worker in (0, 1, 0, 0, 1, 0) if (row := queue.next_job(worker)) is not None]
+    assert started == [(0, 0), (1, 1), (0, 0), (0, 2), (1, 1), (0, 2)]
+    assert queue.next_job(0) is None
+
+
+def test_queue_shares_last_seed_between_workers() -> None:
+    """No worker is idle while jobs wait: the second one takes jobs of the only seed."""
+    jobs = jobs_of("somewhere", {name: RunSettings() for name in "abcd"}, [1])
+    queue = JobQueue(jobs)
+    assert [queue.next_job(worker) for worker in (0, 1, 0, 1, 1)] == [0, 1, 2, 3, None]
+
+
+def test_queue_of_equal_jobs_gives_each_once() -> None:
+    queue = JobQueue((*JOBS, *JOBS))
+    rows = [queue.next_job(row % 3) for row in range(25)]
+    assert sorted(row for row in rows if row is not None) == list(range(24))
+    assert rows[-1] is None
 
 
 def test_run_jobs_with_console_shows_progress(tasks: ModuleType) -> None:

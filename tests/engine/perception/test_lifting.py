@@ -186,7 +186,7 @@ def test_lift_box_that_no_body_fills_has_score_zero(name: str, edges: list[float
 def test_lift_bodies_of_unusual_size_keeps_scores(name: str, size: float) -> None:
     """Bodies up to two standard deviations from the mean size, near and far, whole and cut by the border."""
     view, rng = camera(), np.random.default_rng(4)
-    edges = []
+    edges: list[list[float]] = []
     while len(edges) < 60:
         reach, bearing = rng.uniform(3.0, 60.0), rng.uniform(-0.75, 0.75)
         target = box(name, reach * math.cos(bearing) + 3.0, reach * math.sin(bearing), rng.uniform(-3, 3))
