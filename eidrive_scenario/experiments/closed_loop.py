@@ -19,7 +19,7 @@ from rich.console import Console
 
 from eidrive_scenario.experiments.paper import EGO, HIDDEN, SCENARIOS
 from eidrive_scenario.experiments.repetitions import Job, run_jobs
-from eidrive_scenario.experiments.statistics import wilson
+from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
 

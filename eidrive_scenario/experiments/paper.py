@@ -13,14 +13,9 @@ from dataclasses import dataclass
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.published import TABLE_2, Published
 from eidrive_scenario.experiments.repetitions import Job
-from eidrive_scenario.experiments.statistics import (
-    PairedDifference,
-    Proportion,
-    Summary,
-    paired_difference,
-    summarize,
-    wilson,
-)
+from eidrive_scenario.experiments.statistics.paired import PairedDifference, paired_difference
+from eidrive_scenario.experiments.statistics.proportions import Proportion, wilson
+from eidrive_scenario.experiments.statistics.samples import Summary, summarize
 from eidrive_scenario.simulation import RunResult, RunSettings
 
 EGO, HIDDEN = "Ego", "Incoming"

@@ -19,7 +19,7 @@ from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
 from eidrive_scenario.experiments.reproduction.part import Case, Part, by_case
 from eidrive_scenario.experiments.reproduction.sensitivity import delay
-from eidrive_scenario.experiments.statistics import wilson
+from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.simulation import RunSettings
 
 BLOCKS: Mapping[tuple[str, str], int] = {

@@ -13,7 +13,8 @@ from eidrive_scenario.experiments.published import COUNTS, RATIOS
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
-from eidrive_scenario.experiments.statistics import mean_interval, paired_difference, paired_ratio, summarize
+from eidrive_scenario.experiments.statistics.paired import paired_difference, paired_ratio
+from eidrive_scenario.experiments.statistics.samples import mean_interval, summarize
 from eidrive_scenario.simulation import RunSettings
 
 SENDERS = {"coop/scenario_3": "vehicle", "coop/scenario_4": "rsu"}

@@ -8,7 +8,8 @@ from functools import cache
 
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, Row, Value, plain
-from eidrive_scenario.experiments.statistics import summarize, wilson
+from eidrive_scenario.experiments.statistics.proportions import wilson
+from eidrive_scenario.experiments.statistics.samples import summarize
 from eidrive_scenario.library import describe_scenarios
 
 COLLISIONS = "collision.count"

@@ -11,7 +11,8 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.paper import EGO, HIDDEN
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, Value, plain
-from eidrive_scenario.experiments.statistics import mean_interval, summarize, wilson
+from eidrive_scenario.experiments.statistics.proportions import wilson
+from eidrive_scenario.experiments.statistics.samples import mean_interval, summarize
 
 CRITERIA: Mapping[str, Any] = {"time_to_collision": {"of": EGO, "to": HIDDEN}}
 """Criteria that all runs of encounters have in addition to those of the scenario."""

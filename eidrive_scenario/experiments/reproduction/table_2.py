@@ -23,7 +23,7 @@ from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
 from eidrive_scenario.experiments.reproduction.table_2_text import SUMMARY_COLUMNS, conclusions, setup, summary
-from eidrive_scenario.experiments.statistics import PairedDifference, paired_difference, paired_spread
+from eidrive_scenario.experiments.statistics.paired import PairedDifference, paired_difference, paired_spread
 from eidrive_scenario.simulation import RunSettings
 
 PLANNERS = ("conflict_area", "behavior")

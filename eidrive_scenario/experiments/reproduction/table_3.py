@@ -16,7 +16,8 @@ from eidrive_scenario.experiments.reproduction.encounters import (
 from eidrive_scenario.experiments.reproduction.episodes import Episode
 from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
-from eidrive_scenario.experiments.statistics import paired_difference, wilson
+from eidrive_scenario.experiments.statistics.paired import paired_difference
+from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.simulation import RunSettings
 
 SCENARIOS = tuple(f"coop/scenario_{number}" for number in range(5, 9))

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.experiments.statistics import Summary, summarize, wilson
+from eidrive_scenario.experiments.statistics.proportions import wilson
+from eidrive_scenario.experiments.statistics.samples import Summary, summarize
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs

@@ -22,7 +22,7 @@ from eidrive_scenario.experiments.paper import (
 )
 from eidrive_scenario.experiments.published import TABLE_2
 from eidrive_scenario.experiments.repetitions import Job, jobs_of
-from eidrive_scenario.experiments.statistics import summarize
+from eidrive_scenario.experiments.statistics.samples import summarize
 from eidrive_scenario.experiments.tables import render
 from eidrive_scenario.simulation import RunResult, RunSettings
 

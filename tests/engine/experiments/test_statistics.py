@@ -8,14 +8,9 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from eidrive_scenario.experiments.statistics import (
-    mean_interval,
-    paired_difference,
-    paired_ratio,
-    paired_spread,
-    summarize,
-    wilson,
-)
+from eidrive_scenario.experiments.statistics.paired import paired_difference, paired_ratio, paired_spread
+from eidrive_scenario.experiments.statistics.proportions import wilson
+from eidrive_scenario.experiments.statistics.samples import mean_interval, summarize
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from eidrive_scenario.experiments.paper import (
     Table,
 )
 from eidrive_scenario.experiments.published import TABLE_2
-from eidrive_scenario.experiments.statistics import wilson
+from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.demo_page import DemoSite, PageImage, _speed, write_demo
 from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story

@@ -1,0 +1,1 @@
+"""Statistics of repeated runs: samples, proportions, paired comparisons and sequential tests."""
