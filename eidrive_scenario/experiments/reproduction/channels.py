@@ -208,4 +208,16 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     return PartReport(PART.title, sections)
 
 
-PART = Part("channels", "Latency, loss and load of the channel", 10, DETECTORS, DETECTORS, cases, report)
+PART = Part(
+    "channels",
+    "Latency, loss and load of the channel",
+    (
+        "How do latency, loss, bursts of losses, radio by geometry and load of the channel change the success "
+        "of cooperation?"
+    ),
+    10,
+    DETECTORS,
+    DETECTORS,
+    cases,
+    report,
+)

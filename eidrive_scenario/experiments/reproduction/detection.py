@@ -11,7 +11,17 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.experiments.paper import EGO
 from eidrive_scenario.experiments.published import COUNTS, RATIOS
 from eidrive_scenario.experiments.reproduction.episodes import Episode
-from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
+from eidrive_scenario.experiments.reproduction.layout import (
+    REASON,
+    Column,
+    DataTable,
+    PartReport,
+    Row,
+    Section,
+    Value,
+    plain,
+    result_sections,
+)
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
 from eidrive_scenario.experiments.statistics.paired import paired_difference, paired_ratio
 from eidrive_scenario.experiments.statistics.samples import mean_interval, summarize
@@ -143,7 +153,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     ratios = tuple(ratio_row(episodes, *place) for place in product(SENDERS, detectors))
     sections = (
         Section("Set-up", _setup(int(cells[0]["episodes"] or 0))),
-        Section("Result", _conclusions(episodes, cells, ratios), DataTable("detection_ratios", RATIO_COLUMNS, ratios)),
+        *result_sections(_conclusions(episodes, cells, ratios), DataTable("detection_ratios", RATIO_COLUMNS, ratios)),
         Section("Counts", (), DataTable("detection", CELL_COLUMNS, tuple(cells))),
         Section(
             "Moving averages",
@@ -159,10 +169,10 @@ def _setup(episodes: int) -> tuple[str, ...]:
         f"Scenarios 3 and 4, {episodes} episodes a cell with seeds from 1, {STEPS} time steps of {STEP} s as in "
         "EI-Drive, without latency and loss. The parked ego counts its objects after fusion, except masts of roadside "
         "units. EI-Drive counts boxes in the same way, in one run per cell.",
-        "Free were the traffic of each seed (up to 32 vehicles in EI-Drive's eight ranges, whose models and motion are "
-        "not recorded) and the signal cycle. The oracle of EI-Drive knows every vehicle within 50 m in the view of a "
-        "camera behind the ego, unless the box of a nearer one contains its box on the screen; with cooperation it "
-        "omits this test. Here the oracle needs a line of sight from the sensor.",
+        "Free parameters: the traffic of each seed (up to 32 vehicles in EI-Drive's eight ranges, whose models and "
+        "motion are not recorded) and the signal cycle. The oracle of EI-Drive knows every vehicle within 50 m in the "
+        "view of a camera behind the ego, unless the box of a nearer one contains its box on the screen; with "
+        "cooperation it omits this test. Here the oracle needs a line of sight from the sensor.",
     )
 
 
@@ -184,11 +194,24 @@ def _conclusions(episodes: Sequence[Episode], cells: Sequence[Row], ratios: Sequ
         )
     fewer = [row for row in cells if float(row["mean"] or 0.0) < float(row["paper_mean"] or 0.0)]
     if fewer:
+        texts.append(f"The counts are below the paper's in {len(fewer)} of {len(cells)} cells.")
         texts.append(
-            f"The counts are below the paper's in {len(fewer)} of {len(cells)} cells. Likely reason with the oracle: "
-            "that of EI-Drive ignores most occlusions, so that it knows vehicles which no sensor sees."
+            f"{REASON} (low counts with the oracle): that of EI-Drive ignores most occlusions, so that it knows "
+            "vehicles which no sensor sees."
         )
     return tuple(texts)
 
 
-PART = Part("detection", "Number of detected objects", 5, DETECTORS, DETECTORS, cases, report)
+PART = Part(
+    "detection",
+    "Number of detected objects",
+    (
+        "How many more objects does a parked car know if a vehicle (scenario 3) or roadside units (scenario "
+        "4) send what they detect?"
+    ),
+    5,
+    DETECTORS,
+    DETECTORS,
+    cases,
+    report,
+)

@@ -64,4 +64,13 @@ def _conclusions(rows: Sequence[Row]) -> tuple[str, ...]:
     )
 
 
-PART = Part("ei", "EIScenarios", 5, DETECTORS, DETECTORS, cases, report)
+PART = Part(
+    "ei",
+    "EIScenarios",
+    "Does the default planner avoid the collisions in which a lane follower ends?",
+    5,
+    DETECTORS,
+    DETECTORS,
+    cases,
+    report,
+)

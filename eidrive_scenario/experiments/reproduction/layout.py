@@ -96,6 +96,17 @@ class Section:
         return "\n".join(parts)
 
 
+REASON = "Likely reason"
+"""Start of paragraphs that explain a difference from the paper."""
+
+
+def result_sections(paragraphs: Sequence[str], table: DataTable | None = None) -> tuple[Section, ...]:
+    """Return the section of the result, and one of the likely reasons of differences if there are any."""
+    reasons = tuple(text for text in paragraphs if text.startswith(REASON))
+    result = Section("Result", tuple(text for text in paragraphs if not text.startswith(REASON)), table)
+    return (result, Section("Reasons of differences", reasons)) if reasons else (result,)
+
+
 @dataclass(frozen=True)
 class PartReport:
     """Report of a part: title and sections."""

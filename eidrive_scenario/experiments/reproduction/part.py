@@ -49,6 +49,7 @@ class Part:
 
     name       name on the command line and of its files
     title      title in lists
+    question   question that it examines
     episodes   number of episodes per cell without an option, with seeds from 1
     detectors  detectors that it can use
     default    detectors without an option
@@ -58,6 +59,7 @@ class Part:
 
     name: str
     title: str
+    question: str
     episodes: int
     detectors: tuple[str, ...]
     default: tuple[str, ...]

@@ -14,7 +14,7 @@ from eidrive_scenario.experiments.cooperative_perception.conditions import (
 from eidrive_scenario.experiments.cooperative_perception.samples import RANGES, PerceptionRecord
 from eidrive_scenario.experiments.cooperative_perception.scores import RESAMPLES
 from eidrive_scenario.experiments.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
-from eidrive_scenario.experiments.reproduction.layout import Row
+from eidrive_scenario.experiments.reproduction.layout import REASON, Row
 from eidrive_scenario.experiments.reproduction.perception_shapes import crossing
 from eidrive_scenario.experiments.reproduction.rows import number
 
@@ -137,7 +137,7 @@ def _departures(arms: Mapping[str, Row]) -> Iterator[str]:
     )
     if number(early, "ap_50") < number(late, "ap_50"):
         yield (
-            "Early fusion is below covariance intersection, other than in the literature. Likely reasons: "
+            f"{REASON} (early fusion is below covariance intersection, other than in the literature): "
             "covariance intersection uses earlier scans, which own detections alone gain "
             f"{number(filtered, 'ap_50') - number(alone, 'ap_50'):+.3f} from; and the detector groups points by "
             "the distance from the ego, which suits points of others less the farther they are (AP 0.5 of "
@@ -146,7 +146,7 @@ def _departures(arms: Mapping[str, Row]) -> Iterator[str]:
         )
     if number(mean, "ap_50_range_0") < number(alone, "ap_50_range_0"):
         yield (
-            f"Up to {RANGES[0]:g} m `average` has an AP 0.5 of {number(mean, 'ap_50_range_0'):.3f} and the ego "
-            f"alone {number(alone, 'ap_50_range_0'):.3f}. Likely reason: the mean gives boxes of parts of an object "
+            f"{REASON} (up to {RANGES[0]:g} m `average` has an AP 0.5 of {number(mean, 'ap_50_range_0'):.3f} and the "
+            f"ego alone {number(alone, 'ap_50_range_0'):.3f}): the mean gives boxes of parts of an object "
             "the same weight as a complete one, and all boxes within 4 m are one object."
         )

@@ -71,4 +71,13 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     return PartReport(PART.title, sections)
 
 
-PART = Part("pipeline", "Pipeline scenarios", 5, DETECTORS, DETECTORS, cases, report)
+PART = Part(
+    "pipeline",
+    "Pipeline scenarios",
+    "Does the driving stack complete the driving tasks of the paper with each detector?",
+    5,
+    DETECTORS,
+    DETECTORS,
+    cases,
+    report,
+)

@@ -38,13 +38,27 @@ def read_provenance(out: Path) -> dict[str, Any]:
     return known
 
 
-def write_provenance(out: Path, part: str, values: Mapping[str, Any]) -> None:
+def write_provenance(
+    out: Path, part: str, values: Mapping[str, Any], *, added: int, elapsed_s: float, processes: int
+) -> None:
     """Add the origin of a part to the file of a folder, which keeps those of other parts.
 
-    values  further values of the part, such as seeds and durations
+    values     further values of the part, such as seeds
+    added      number of runs of this call; without one, commit and duration remain those of the call that computed
+    elapsed_s  duration of this call [s];  processes  number of its processes
     """
-    code = {"version": version(ENGINE), "commit": commit(), "code": code_digest(), "python": platform.python_version()}
-    parts = {**read_provenance(out), part: {**code, **values}}
+    known = read_provenance(out)
+    code = {"version": version(ENGINE), "code": code_digest(), "python": platform.python_version()}
+    call = {
+        "commit": commit(),
+        "runs_of_last_call": added,
+        "last_call_s": round(elapsed_s, 1),
+        "processes": processes,
+    }
+    former = known.get(part)
+    if not added and isinstance(former, dict) and former.get("code") == code["code"]:
+        call = {name: former.get(name) for name in call}
+    parts = {**known, part: {**code, **call, **values}}
     with create(out / FILE) as stream:
         stream.write((json.dumps(parts, indent=1, sort_keys=True) + "\n").encode())
 

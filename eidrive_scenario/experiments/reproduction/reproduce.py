@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 
-from eidrive_scenario.experiments.repetitions import run_jobs
+from eidrive_scenario.experiments.repetitions import cores, run_jobs
 from eidrive_scenario.experiments.reproduction.episodes import Episode, run_episode
-from eidrive_scenario.experiments.reproduction.layout import PartReport, as_csv
+from eidrive_scenario.experiments.reproduction.layout import PartReport, Section, as_csv
 from eidrive_scenario.experiments.reproduction.part import Part
 from eidrive_scenario.experiments.reproduction.provenance import read_provenance, write_provenance
 from eidrive_scenario.experiments.reproduction.record import Record
@@ -67,12 +67,23 @@ def reproduce(
             run_jobs(left, run_episode, workers=workers, console=console, title=part.name, finished=record.add)
         found = tuple(record.episodes[job.key] for job in jobs)
     report = part.report(found, detectors)
+    report = replace(report, sections=(Section("Question", (part.question,)), *report.sections))
     _write_report(part, out, report)
     unused = known - (len(jobs) - len(left))
     done = Reproduced(report, found, len(left), unused, time.perf_counter() - start)
-    durations = {"runs_of_last_call": done.added, "last_call_s": round(done.elapsed_s, 1)}
-    seeds = {"seeds": f"1 to {episodes}", "detectors": list(detectors), "runs": len(found)}
-    write_provenance(out, part.name, {**seeds, **durations, "all_runs_s": round(done.computed_s, 1)})
+    write_provenance(
+        out,
+        part.name,
+        {
+            "seeds": f"1 to {episodes}",
+            "detectors": list(detectors),
+            "runs": len(found),
+            "all_runs_s": round(done.computed_s, 1),
+        },
+        added=done.added,
+        elapsed_s=done.elapsed_s,
+        processes=min(workers or cores(), max(1, done.added)),
+    )
     return done
 
 

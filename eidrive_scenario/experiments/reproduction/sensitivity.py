@@ -185,4 +185,16 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     return PartReport(PART.title, sections)
 
 
-PART = Part("sensitivity", "Sensitivity of scenarios 1 and 2", 3, DETECTORS, DETECTORS, cases, report)
+PART = Part(
+    "sensitivity",
+    "Sensitivity of scenarios 1 and 2",
+    (
+        "Where in the space of starts, speeds and latencies does cooperation avoid collisions, change "
+        "nothing, or cause them, and where are the cells of Table II?"
+    ),
+    3,
+    DETECTORS,
+    DETECTORS,
+    cases,
+    report,
+)

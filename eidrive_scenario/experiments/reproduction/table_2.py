@@ -20,7 +20,16 @@ from eidrive_scenario.experiments.reproduction.encounters import (
     encounter_fields,
 )
 from eidrive_scenario.experiments.reproduction.episodes import Episode
-from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
+from eidrive_scenario.experiments.reproduction.layout import (
+    Column,
+    DataTable,
+    PartReport,
+    Row,
+    Section,
+    Value,
+    plain,
+    result_sections,
+)
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
 from eidrive_scenario.experiments.reproduction.table_2_text import SUMMARY_COLUMNS, conclusions, setup, summary
 from eidrive_scenario.experiments.statistics.paired import PairedDifference, paired_difference, paired_spread
@@ -178,7 +187,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     compared.sort(key=lambda row: order.index(str(row["statement"])))
     sections = [
         Section("Set-up", setup(len(columns[0][0].episodes))),
-        Section("Result", conclusions(rows, compared), DataTable("table2_summary", SUMMARY_COLUMNS, summary(compared))),
+        *result_sections(conclusions(rows, compared), DataTable("table2_summary", SUMMARY_COLUMNS, summary(compared))),
     ]
     for planner, variant in product(PLANNERS, VARIANTS):
         sections.append(Section(f"Planner `{planner}`, {variant.title}", (), _table(rows, planner, variant)))
@@ -191,4 +200,16 @@ def _table(rows: Sequence[Row], planner: str, variant: ModelVariant) -> DataTabl
     return DataTable("table2", CELL_COLUMNS, mine)
 
 
-PART = Part("table2", "Table II: minimum distance to an occluded car", 20, DETECTORS, DETECTORS, cases, report)
+PART = Part(
+    "table2",
+    "Table II: minimum distance to an occluded car",
+    (
+        "Does a car avoid a collision with a car that a parked truck hides, if a roadside unit (scenario 1) "
+        "or a vehicle (scenario 2) sends what it detects? What do latency and loss of the messages change?"
+    ),
+    20,
+    DETECTORS,
+    DETECTORS,
+    cases,
+    report,
+)

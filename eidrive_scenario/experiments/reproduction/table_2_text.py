@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from eidrive_scenario.experiments.reproduction.layout import Column, Row, plain
+from eidrive_scenario.experiments.reproduction.layout import REASON, Column, Row, plain
 
 PAPERS_PLANNER = "conflict_area"
 """Planner with the rule of the paper."""
@@ -20,8 +20,8 @@ def setup(episodes: int) -> tuple[str, ...]:
         "distance between the centers of the two cars, which remains above 0 in a crash: 3.4 m for a square hit. "
         "The gap between the bodies, the speed of impact and the minimum time to collision stand beside it. An episode "
         "ends after 5.5 s, half a second after the cars were nearest, because nothing that is measured changes later.",
-        "Free were the acceleration of both cars (3.5 m/s²; the paper does not specify that of CARLA's cars) and, one "
-        "per scenario, the start of the hidden car: the largest distance in steps of half a meter from which "
+        "Free parameters: the acceleration of both cars (3.5 m/s²; the paper does not specify that of CARLA's cars) "
+        "and, one per scenario, the start of the hidden car: the largest distance in steps of half a meter from which "
         "cooperation avoids the crash with the oracle in seeds 1 to 20. They are equal in all cells; none was chosen "
         "to match a distance of the paper. That cooperation avoids the crash with the oracle and the rule of the paper "
         "is therefore a condition of the set-up; the other arms, YOLOv5 and the planner `behavior` are results.",
@@ -100,17 +100,17 @@ def _agreement(compared: Sequence[Row]) -> tuple[str, ...]:
     if not apart:
         return (signs,)
     listed = "; ".join(
-        f"{row['statement']} in {_column(row)} with `{row['channel']}` ({row['difference']:+.2f} m, paper "
+        f"{row['statement']} in {_column(row)} and `{row['channel']}` ({row['difference']:+.2f} m, paper "
         f"{row['paper_difference']:+.2f} m)"
         for row in apart
     )
     statements = dict.fromkeys(str(row["statement"]) for row in apart)
-    reasons = [f"Likely reason ({name}): {REASONS[name]}" for name in statements if name in REASONS]
+    reasons = [f"{REASON} ({name}): {REASONS[name]}" for name in statements if name in REASONS]
     return (f"{signs} The others are: {listed}.", *reasons)
 
 
 def _column(row: Row) -> str:
-    return f"{str(row['scenario']).removeprefix('coop/')} {row['detector']}"
+    return f"{str(row['scenario']).removeprefix('coop/').replace('_', ' ')} with {row['detector']}"
 
 
 def _means(rows: Sequence[Row]) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ def _means(rows: Sequence[Row]) -> tuple[str, ...]:
         texts.append(
             f"`{planner}`, `{channel}`: {mean:.2f} m from the {len(mine)} means of the paper on average "
             f"({'within' if mean <= AIM else 'beyond'} {AIM} m); farthest is {_column(farthest)} "
-            f"{farthest['arm']} with {farthest['mean']:.2f} m against "
+            f"and {farthest['arm']}: {farthest['mean']:.2f} m against "
             f"{farthest['paper_mean']:.2f} m"
         )
     return (f"Mean absolute difference to the paper's means. {'; '.join(texts)}.", *_crashes(rows))
@@ -135,7 +135,7 @@ def _crashes(rows: Sequence[Row]) -> tuple[str, ...]:
     if not least:
         return ()
     return (
-        "Likely reason (differences of the means): the minimum of a run with a crash depends on the motion after the "
+        f"{REASON} (differences of the means): the minimum of a run with a crash depends on the motion after the "
         "hit. Episodes of the paper with 1.8 to 2.0 m have the distance of two cars of 1.84 m width side by side, as "
         f"if they turned parallel after the hit. Here the least distance of a run with a crash is {min(least):.2f} m.",
     )

@@ -14,7 +14,17 @@ from eidrive_scenario.experiments.reproduction.encounters import (
     encounter_fields,
 )
 from eidrive_scenario.experiments.reproduction.episodes import Episode
-from eidrive_scenario.experiments.reproduction.layout import Column, DataTable, PartReport, Row, Section, Value, plain
+from eidrive_scenario.experiments.reproduction.layout import (
+    REASON,
+    Column,
+    DataTable,
+    PartReport,
+    Row,
+    Section,
+    Value,
+    plain,
+    result_sections,
+)
 from eidrive_scenario.experiments.reproduction.part import Case, Part, select
 from eidrive_scenario.experiments.statistics.paired import paired_difference
 from eidrive_scenario.experiments.statistics.proportions import wilson
@@ -119,7 +129,7 @@ def report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
     compared = [row for detector, scenario in places for row in compare(episodes, scenario, detector)]
     sections = [
         Section("Set-up", _setup(int(rows[0]["episodes"] or 0))),
-        Section("Result", tuple(_finding(rows, compared, detector) for detector in detectors) + _reasons(rows)),
+        *result_sections([*(_finding(rows, compared, detector) for detector in detectors), *_reasons(rows)]),
     ]
     for detector in detectors:
         mine = tuple(row for row in rows if row["detector"] == detector)
@@ -132,12 +142,12 @@ def _setup(episodes: int) -> tuple[str, ...]:
     return (
         f"Scenarios 5 to 8, {episodes} episodes a cell with seeds from 1, without latency and loss. A success is a run "
         "in which the ego touches nothing. Positions, speeds, areas and the rule of the ego are those of EI-Drive.",
-        "Free were, one value per scenario and equal in its three cells: the start of the hidden car (the nearest in "
-        "steps of half a meter from which the cars collide without cooperation in seeds 1 to 20), and the start of a "
-        "bus at the head of the traffic with its variation between seeds, chosen such that it hides the car from the "
-        "sending vehicle in about half of the runs (5, 6) or in most runs (7, 8). EI-Drive draws 30 cars at random, "
-        "and neither their motion nor their models are recorded. Acceleration is 3.5 m/s². No value differs between "
-        "the cells of a scenario.",
+        "Free parameters, one value per scenario and equal in its three cells: the start of the hidden car (the "
+        "nearest in steps of half a meter from which the cars collide without cooperation in seeds 1 to 20), and "
+        "the start of a bus at the head of the traffic with its variation between seeds, chosen such that it hides "
+        "the car from the sending vehicle in about half of the runs (5, 6) or in most runs (7, 8). EI-Drive draws "
+        "30 cars at random, and neither their motion nor their models are recorded. Acceleration is 3.5 m/s². No "
+        "value differs between the cells of a scenario.",
         "The paper does not state the number of its episodes; its rates fit three batches of 10 to 20 each. It does "
         "not state the detector either: its published configuration selects YOLOv5.",
     )
@@ -167,13 +177,13 @@ def _reasons(rows: Sequence[Row]) -> tuple[str, ...]:
     texts = []
     if apart & {"both", "rsu"}:
         texts.append(
-            "Likely reason for the roadside units: the units of 5 m height see over the traffic in every run, and the "
+            f"{REASON} (roadside units): the units of 5 m height see over the traffic in every run, and the "
             "oracle misses nothing in their sight. The paper's failures with them, up to a fifth of the runs in "
             "scenario 6, need detections that are missed, or a collision with other traffic."
         )
     if "vehicle" in apart:
         texts.append(
-            "Likely reason for the vehicle: its rate is the share of runs in which the traffic leaves a gap, so that "
+            f"{REASON} (vehicle): its rate is the share of runs in which the traffic leaves a gap, so that "
             "it depends on the unknown motion of the paper's traffic more than on perception."
         )
     return tuple(texts)
@@ -183,4 +193,16 @@ def _place(row: Row) -> str:
     return str(row["scenario"]).removeprefix("coop/")
 
 
-PART = Part("table3", "Table III: success rates in heavy traffic", 40, DETECTORS, DETECTORS[:1], cases, report)
+PART = Part(
+    "table3",
+    "Table III: success rates in heavy traffic",
+    (
+        "In heavy traffic, how often does cooperation with a vehicle, with roadside units, or with both avoid "
+        "the collision?"
+    ),
+    40,
+    DETECTORS,
+    DETECTORS[:1],
+    cases,
+    report,
+)

@@ -25,7 +25,18 @@ def write_paper_page(out: Path) -> Path:
     """
     origins = read_provenance(out)
     parts = [_part(out, name, origins.get(name, {})) for name in PARTS if (out / f"{name}.json").is_file()]
-    return write_page(out / PAGE, "reproduction.html.jinja", title="Reproduction of the EI-Drive paper", parts=parts)
+    title = "Reproduction of the EI-Drive paper"
+    return write_page(out / PAGE, "reproduction.html.jinja", title=title, parts=parts, duration=_duration(origins))
+
+
+def _duration(origins: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the number of runs and the duration of all parts; empty if one was not computed in a single call."""
+    known = [origins[name] for name in PARTS if name in origins]
+    if not known or any(one.get("runs") != one.get("runs_of_last_call") for one in known):
+        return ""
+    runs, seconds = (sum(float(one[name]) for one in known) for name in ("runs", "last_call_s"))
+    processes = max(int(one.get("processes") or 1) for one in known)
+    return f"{runs:,.0f} runs in {seconds / 60.0:.0f} minutes on {processes} process{'es' if processes > 1 else ''}"
 
 
 def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
@@ -64,6 +75,7 @@ def _origin(origin: Mapping[str, Any]) -> list[str]:
         "all_runs_s": "{} s of one process",
         "runs_of_last_call": "last call {} runs",
         "last_call_s": "in {} s",
+        "processes": "on {} processes",
     }
     return [text.format(origin[key]) for key, text in texts.items() if origin.get(key) is not None]
 

@@ -40,6 +40,13 @@ def test_table_2_continues_after_a_kill_and_repeats_its_tables(
     assert [row["holds"] for row in orders] == [2] * len(orders) != []
     origin = json.loads((out / "provenance.json").read_bytes())["table2"]
     assert (origin["seeds"], origin["runs"], origin["runs_of_last_call"]) == ("1 to 2", 28, 28)
+    assert (
+        (out / "table2.md").read_text().startswith("# Table II: minimum distance to an occluded car\n\n## Question\n")
+    )
+    repeated = eidrive(*arguments)
+    assert repeated.stdout.startswith("table2: 0 runs in")
+    assert json.loads((out / "provenance.json").read_bytes())["table2"] == origin
+    assert files(out) == written
 
     record = out / "table2.jsonl"
     lines = record.read_bytes().splitlines(keepends=True)

@@ -88,6 +88,19 @@ def test_page_shows_texts_tables_and_figures_of_all_parts_in_order(tmp_path: Pat
     assert next(code.text_content() for code in page.iter("code")) == "oracle"
 
 
+def test_page_states_runs_and_duration_of_all_parts(tmp_path: Path) -> None:
+    """The sum is stated if each part was computed in a single call."""
+    origins = {
+        name: {"runs": runs, "runs_of_last_call": runs, "last_call_s": seconds, "processes": 2}
+        for name, runs, seconds in (("table2", 1120, 1800.0), ("table3", 480, 420.0))
+    }
+    (tmp_path / "provenance.json").write_text(json.dumps(origins))
+    assert "1,600 runs in 37 minutes on 2 processes." in write_paper_page(tmp_path).read_text()
+    origins["table3"]["runs_of_last_call"] = 12
+    (tmp_path / "provenance.json").write_text(json.dumps(origins))
+    assert "minutes" not in write_paper_page(tmp_path).read_text()
+
+
 def test_page_of_a_folder_without_parts_lists_none(tmp_path: Path) -> None:
     page: Any = html.fromstring(write_paper_page(tmp_path / "new").read_text(encoding="utf-8"))
     assert page.xpath("//h2") == []
