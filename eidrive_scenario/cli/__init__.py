@@ -16,6 +16,7 @@ from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
 from eidrive_scenario.cli.streams import make_writable
 from eidrive_scenario.cli.supervision import allow
+from eidrive_scenario.cli.sweep import results, sweep
 from eidrive_scenario.exit_codes import ABORTED
 
 app = typer.Typer(
@@ -32,6 +33,8 @@ app.command(name="list")(list_names)
 app.command()(tree)
 app.command()(view)
 app.command()(report)
+app.command()(sweep)
+app.command()(results)
 app.command()(reproduce)
 
 

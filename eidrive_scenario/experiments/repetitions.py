@@ -85,20 +85,23 @@ def run_jobs(
         return _in_processes(jobs, task, workers, end)
 
 
-def _start_worker() -> None:
-    """Prepare a worker process: equal images of its runs are processed once, and it ends when its parent ends.
-
-    That of a killed parent would wait for jobs forever.
-    """
-    image_memory.activate(image_memory.ImageMemory())
+def end_with_parent() -> None:
+    """End this worker process when its parent ends; that of a killed parent would wait for jobs forever."""
     parent = multiprocessing.parent_process()
-    if parent is not None:
+    if parent is None:
+        return
 
-        def end_with_parent() -> None:
-            parent.join()
-            os._exit(1)
+    def end() -> None:
+        parent.join()
+        os._exit(1)
 
-        threading.Thread(target=end_with_parent, daemon=True).start()
+    threading.Thread(target=end, daemon=True).start()
+
+
+def _start_worker() -> None:
+    """Prepare a worker process: equal images of its runs are processed once, and it ends when its parent ends."""
+    image_memory.activate(image_memory.ImageMemory())
+    end_with_parent()
 
 
 class JobQueue:

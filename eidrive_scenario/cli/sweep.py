@@ -1,0 +1,173 @@
+"""Commands `eidrive sweep` and `eidrive results`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.exit_codes import ABORTED, PASSED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from eidrive_scenario.experiments.sweeps.results import PointSummary
+
+USUAL_LIMIT = 1800.0
+"""Default maximum wall time of a run [s]."""
+
+
+def sweep(
+    scenario: Annotated[str, typer.Argument(help="An .xosc file or a library name; all runs of a distribution.")],
+    store: Annotated[Path, typer.Option(help="SQLite file of the results. A file with results is continued.")],
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUES",
+            help="Parameter, channel, channel.KEY, detector, planner, weather or cooperate (A+B), over A,B, "
+            "LOW:HIGH:STEP or LOW:HIGH; repeatable.",
+        ),
+    ] = None,
+    design: Annotated[str, typer.Option(help="grid, lhs (Latin hypercube) or sobol.")] = "grid",
+    samples: Annotated[
+        int | None, typer.Option(min=1, help="Combinations of lhs or sobol.", show_default="none")
+    ] = None,
+    seeds: Annotated[
+        str | None, typer.Option(metavar="A-B|A,B", help="Seeds of each combination.", show_default="1")
+    ] = None,
+    runs: Annotated[int | None, typer.Option(min=1, help="Total number of runs.", show_default="all")] = None,
+    channel: Annotated[str | None, typer.Option(help="Channel profile of all runs.", show_default="the file's")] = None,
+    param: Annotated[list[str] | None, typer.Option(metavar="K=V", help="Parameter of all runs; repeatable.")] = None,
+    criterion: Annotated[list[str] | None, typer.Option(metavar="YAML|FILE", help="Add criteria; repeatable.")] = None,
+    time_limit: Annotated[float, typer.Option(help="Maximum simulated time in seconds.")] = 120.0,
+    wall_limit: Annotated[float, typer.Option(help="Maximum wall time of each run in seconds.")] = USUAL_LIMIT,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="number of cores")] = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="I/N", help="Part I of N, for job arrays; a store for each.")
+    ] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Repeat aborted and crashed runs of the store.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would run.")] = False,
+) -> None:
+    """Run a scenario over parameters, settings and seeds; a killed sweep continues with the same command.
+
+    Example: eidrive sweep coop/scenario_1 --vary channel.delay.seconds=0:1:0.1 --seeds 1-10 --store s.db
+    """
+    from eidrive_scenario.cli.sweep_progress import ProgressDisplay
+    from eidrive_scenario.experiments.repetitions import cores
+    from eidrive_scenario.experiments.sweeps.axes import parse_axes
+    from eidrive_scenario.experiments.sweeps.designs import points_of
+    from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
+    from eidrive_scenario.experiments.sweeps.store import ResultStore
+    from eidrive_scenario.experiments.sweeps.sweep import run_sweep
+    from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
+    from eidrive_scenario.library import definition, resolve_scenario
+    from eidrive_scenario.simulation import RunSettings
+
+    for option, value in (("--time-limit", time_limit), ("--wall-limit", wall_limit)):
+        check_seconds(option, value)
+    path = resolve_scenario(scenario)
+    settings = RunSettings(
+        channel=channel,
+        parameters=parse_assignments("--param", param or []),
+        criteria=criterion,
+        time_limit=time_limit,
+    )
+    chosen = None if seeds is None else parse_seeds("--seeds", seeds)
+    points = points_of(parse_axes(vary or []), design, samples, seed=1)
+    plan = plan_of(path, points, settings, seeds=chosen, runs=runs, is_distribution=definition(path) == "distribution")
+    jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
+    if dry_run:
+        typer.echo(f"{len(jobs)} runs of {scenario}: {len(plan.points)} combinations, {len(plan.seeds)} seeds each")
+        for point in plan.points[:10]:
+            typer.echo("  " + (", ".join(f"{name}={value}" for name, value in point.items()) or "no axis"))
+        if len(plan.points) > 10:
+            typer.echo(f"  and {len(plan.points) - 10} more")
+        raise typer.Exit
+    with ResultStore.open(store, versions()) as opened:
+        crew = LocalWorkers(min(workers or cores(), len(jobs)))
+        try:
+            with ProgressDisplay(len(jobs)) as display:
+                progress = run_sweep(jobs, opened, crew, wall_limit=wall_limit, retry=retry, shown=display.show)
+        finally:
+            crew.close()
+    counts = ", ".join(f"{count} {status}" for status, count in sorted(progress.counts.items()))
+    kept = f", {progress.kept} already in the store" if progress.kept else ""
+    typer.echo(f"{progress.done} runs in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}")
+    raise typer.Exit(PASSED if progress.is_complete else ABORTED)
+
+
+def results(
+    stores: Annotated[list[Path], typer.Argument(metavar="STORE...", help="Stores of sweeps; shards are combined.")],
+    by: Annotated[str | None, typer.Option(metavar="A,B", help="Axes of the table.", show_default="all")] = None,
+    interval: Annotated[str, typer.Option(help="anytime (valid while runs are added), wilson or exact.")] = "anytime",
+    confidence: Annotated[float, typer.Option(help="Confidence of the intervals.")] = 0.95,
+    csv: Annotated[Path | None, typer.Option(help="Write one row per run as CSV.")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="Write one row per run as Parquet.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per combination.")] = False,
+    failures: Annotated[bool, typer.Option("--failures", help="Print the commands of runs that did not pass.")] = False,
+) -> None:
+    """Print the success rates of a sweep by combination of values, and export its runs.
+
+    Example: eidrive results s.db --by channel.delay.seconds --csv runs.csv
+    """
+    import json as json_text
+
+    from eidrive_scenario.experiments.sweeps.results import stored_runs, summaries, write_csv, write_parquet
+    from eidrive_scenario.experiments.sweeps.store import PASSED as PASSED_RUN
+
+    if not 0.0 < confidence < 1.0:
+        raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
+    found = list(stored_runs(stores))
+    names = None if by is None else [name.strip() for name in by.split(",")]
+    rows = summaries(found, by=names, interval=interval, confidence=confidence)
+    if csv is not None:
+        write_csv(found, csv)
+    if parquet is not None:
+        write_parquet(found, parquet)
+    if json:
+        for row in rows:
+            typer.echo(json_text.dumps(_as_json(row)))
+    elif failures:
+        for run in found:
+            if run.status != PASSED_RUN:
+                typer.echo(f"{run.status}: {run.command or f'{run.scenario}, run {run.run}, seed {run.seed}'}")
+                if run.error:
+                    typer.echo("  " + run.error.replace("\n", "\n  "))
+    else:
+        _print_table(rows, interval, confidence)
+
+
+def _as_json(row: PointSummary) -> dict[str, object]:
+    rate = row.rate
+    limits = {} if rate is None else {"success_rate": rate.share, "low": rate.low, "high": rate.high}
+    return {"point": dict(row.point), "runs": dict(row.counts), **limits}
+
+
+def _print_table(rows: Sequence[PointSummary], interval: str, confidence: float) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    axes = list(dict.fromkeys(name for row in rows for name in row.point))
+    statuses = [
+        status for status in dict.fromkeys(status for row in rows for status in row.counts) if status != "passed"
+    ]
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in axes:
+        table.add_column(name, overflow="fold")
+    for name in ("runs", "passed", *statuses, "success rate", f"{confidence:.0%} {interval}"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        rate = row.rate
+        table.add_row(
+            *(str(row.point.get(name, "")) for name in axes),
+            str(sum(row.counts.values())),
+            str(row.counts.get("passed", 0)),
+            *(str(row.counts.get(status, 0)) for status in statuses),
+            "" if rate is None else f"{rate.share:.1%}",
+            "" if rate is None else f"{rate.low:.1%} to {rate.high:.1%}",
+        )
+    console = Console()
+    console.print(table, soft_wrap=not console.is_terminal)

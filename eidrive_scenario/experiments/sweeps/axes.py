@@ -1,0 +1,200 @@
+"""Axes of a sweep: what varies, and over which values."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.library import library_path
+from eidrive_scenario.simulation import RunSettings
+from eidrive_scenario.v2x.profile import NO_COOPERATION, load_profile
+
+Scalar = str | int | float
+Point = Mapping[str, Scalar]
+"""Values of one combination, by name of the axis."""
+
+MOST_VALUES = 100_000
+"""Maximum number of values of a range."""
+PARAMETER = "param."
+"""Optional prefix of parameters, for those that have the name of a setting."""
+CHANNEL = "channel"
+SETTINGS = (CHANNEL, "detector", "planner", "weather", "cooperate", "dt", "time_limit")
+"""Settings of a run that may vary; all other names are parameters of the scenario."""
+_KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
+"""Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Axis of a sweep.
+
+    name    parameter of the scenario (`param.` may precede it), one of SETTINGS, or `channel.KEY` for a setting of the
+            channel profile, such as `channel.delay.seconds`
+    values  values of a list or a range; () for an interval
+    low, high  limits of an interval, for designs that sample
+    """
+
+    name: str
+    values: tuple[Scalar, ...] = ()
+    low: float = math.nan
+    high: float = math.nan
+
+    @property
+    def is_interval(self) -> bool:
+        """Whether the axis is an interval without single values."""
+        return not self.values
+
+    def at(self, share: float) -> Scalar:
+        """Return the value at a share in [0, 1): of the interval, or of the list."""
+        if self.is_interval:
+            return float(self.low + share * (self.high - self.low))
+        return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+
+
+def parse_axis(text: str) -> Axis:
+    """Return the axis of a text: `NAME=A,B,C` (list), `NAME=LOW:HIGH:STEP` (range), or `NAME=LOW:HIGH` (interval).
+
+    A range contains both ends. Steps are exact decimals: three steps of 0.1 are 0.3.
+    Raise SettingError for other texts.
+    """
+    name, separator, given = text.partition("=")
+    name, given = name.strip(), given.strip()
+    if not separator or not name or not given:
+        raise _error(text, "expected NAME=VALUES, such as EgoSpeed=6:12:0.5 or detector=oracle,yolov5")
+    parts = given.split(":")
+    if len(parts) in (2, 3) and all(_NUMBER.fullmatch(part.strip()) for part in parts):
+        numbers = [Decimal(part.strip()) for part in parts]
+        return _interval(name, text, numbers) if len(parts) == 2 else Axis(name, _range(text, *numbers))
+    values = tuple(_typed(part.strip()) for part in given.split(","))
+    if "" in values:
+        raise _error(text, "expected a value between commas")
+    if len(set(values)) < len(values):
+        raise _error(text, "a value is given twice")
+    return Axis(name, values)
+
+
+def parse_axes(texts: list[str]) -> tuple[Axis, ...]:
+    """Return the axes of several texts. Raise SettingError for an invalid one, or a name that is given twice."""
+    axes = tuple(parse_axis(text) for text in texts)
+    for row, axis in enumerate(axes):
+        if parameter_of(axis.name) in [parameter_of(other.name) for other in axes[:row]]:
+            raise _error(axis.name, "the axis is given twice")
+    return axes
+
+
+def parameter_of(name: str) -> str:
+    """Return the name of an axis without the prefix of parameters, unless it is then the name of a setting."""
+    bare = name.removeprefix(PARAMETER)
+    return name if _is_setting(bare) else bare
+
+
+def _is_setting(name: str) -> bool:
+    return name in SETTINGS or name.startswith(f"{CHANNEL}.")
+
+
+def _interval(name: str, text: str, limits: list[Decimal]) -> Axis:
+    low, high = limits
+    if low >= high:
+        raise _error(text, "the upper limit is not above the lower one")
+    return Axis(name, low=float(low), high=float(high))
+
+
+def _range(text: str, low: Decimal, high: Decimal, step: Decimal) -> tuple[Scalar, ...]:
+    if step == 0 or (high - low) / step < 0:
+        raise _error(text, "the step does not lead from the first to the last value")
+    try:
+        count = int((high - low) / step) + 1
+    except (InvalidOperation, OverflowError):
+        raise _error(text, "the range is too large") from None
+    if count > MOST_VALUES:
+        raise _error(text, f"the range has {count} values (at most {MOST_VALUES})")
+    values = [low + number * step for number in range(count)]
+    whole = all(value == value.to_integral_value() for value in (low, step))
+    return tuple(int(value) if whole else float(value) for value in values)
+
+
+def _typed(text: str) -> Scalar:
+    if re.fullmatch(r"[+-]?(0|[1-9]\d{0,15})", text, re.ASCII):
+        return int(text)
+    return float(text) if _NUMBER.fullmatch(text) and math.isfinite(float(text)) else text
+
+
+def settings_at(point: Point, base: RunSettings, profile: Mapping[str, Any] | None) -> RunSettings:
+    """Return the settings of a run at a point.
+
+    base     settings of all runs
+    profile  channel profile whose settings `channel.KEY` replace unless the point selects a channel: that of the
+             option or of the scenario, with all defaults; None for no cooperation
+
+    Raise SettingError for settings of a channel without one.
+    """
+    parameters = dict(base.parameters)
+    fields: dict[str, Any] = {}
+    changes: dict[str, Scalar] = {}
+    for name, value in point.items():
+        if name.startswith(f"{CHANNEL}."):
+            changes[name.removeprefix(f"{CHANNEL}.")] = value
+        elif name == "cooperate":
+            fields[name] = () if value == NO_COOPERATION else tuple(str(value).split("+"))
+        elif name in ("dt", "time_limit"):
+            fields[name] = _seconds(name, value)
+        elif name in SETTINGS:
+            fields[name] = str(value)
+        else:
+            parameters[parameter_of(name)] = text_of_value(value)
+    if changes:
+        fields[CHANNEL] = changed_profile(_profile_of(point, profile, changes), changes)
+    return replace(base, parameters=parameters, **fields)
+
+
+def _profile_of(point: Point, profile: Mapping[str, Any] | None, changes: Mapping[str, Scalar]) -> Mapping[str, Any]:
+    """Return the profile that a point changes. Raise SettingError if there is none."""
+    if CHANNEL in point:
+        selected = load_profile(str(point[CHANNEL]), [library_path() / "channels"])
+        profile = None if selected is None else selected.model_dump(mode="json", exclude_unset=True)
+    if profile is None:
+        message = f"{CHANNEL}.{next(iter(changes))}: the runs have no channel"
+        raise SettingError(Diagnostic(message, "select a profile by --channel"))
+    return profile
+
+
+def changed_profile(profile: Mapping[str, Any], changes: Mapping[str, Scalar]) -> dict[str, Any]:
+    """Return a channel profile with changed settings, given by their paths: `{"delay.seconds": 0.3}`.
+
+    A part without the setting is replaced if there is one kind for it alone: `delay.seconds` then selects a constant
+    delay, and `loss.probability` independent losses. The name of the profile is removed.
+    """
+    changed: dict[str, Any] = {key: value for key, value in profile.items() if key not in ("name", "description")}
+    for path, value in changes.items():
+        *parts, last = path.split(".")
+        inner = changed
+        for part in parts:
+            held = inner.get(part)
+            inner[part] = inner = dict(held) if isinstance(held, Mapping) else {}
+        kind = _KINDS.get((parts[-1], last)) if len(parts) == 1 else None
+        if kind is not None and last not in inner:
+            inner.clear()
+            inner["kind"] = kind
+        inner[last] = value
+    return changed
+
+
+def text_of_value(value: Scalar) -> str:
+    """Return a value as the text of a parameter; integers and exact decimals as they were given."""
+    return value if isinstance(value, str) else repr(value)
+
+
+def _seconds(name: str, value: Scalar) -> float:
+    if isinstance(value, str):
+        raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a number of seconds"))
+    return float(value)
+
+
+def _error(text: str, hint: str) -> SettingError:
+    return SettingError(Diagnostic(f"--vary: {quoted(text)}", hint))

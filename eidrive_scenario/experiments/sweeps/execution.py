@@ -1,0 +1,92 @@
+"""Execution of one job of a sweep in a worker process."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import traceback
+from types import FrameType
+
+from eidrive_scenario.errors import ConstraintError, InputError, WallLimitError
+from eidrive_scenario.exit_codes import ABORTED as ABORTED_CODE
+from eidrive_scenario.experiments.commands import command_of
+from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
+from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, EXCLUDED, FAILED, INVALID, PASSED, StoredRun
+from eidrive_scenario.library import name_of
+from eidrive_scenario.perception.learned import image_memory
+from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
+
+_one_run = threading.Lock()
+"""A process executes one run at a time, as workers of a cluster may have several threads."""
+
+
+def prepare_process() -> None:
+    """Prepare a worker process: equal images are processed once, and code that never returns ends the process."""
+    image_memory.activate(image_memory.ImageMemory())
+    set_last_resort(LastResort(_end_process))
+
+
+def _end_process(limit: Limit, frame: FrameType | None) -> None:
+    os._exit(ABORTED_CODE)
+
+
+def execute(job: SweepJob, wall_limit: float | None) -> StoredRun:
+    """Run a job and return its row; errors are rows, too.
+
+    wall_limit  limit of the wall time of loading and run [s]
+    """
+    with _one_run:
+        start = time.perf_counter()
+        try:
+            result = run_and_save(source_of(job), seed=job.seed, settings=job.settings, wall_limit=wall_limit)
+        except ConstraintError as error:
+            return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
+        except InputError as error:
+            return _without_result(job, INVALID, str(error), time.perf_counter() - start)
+        except Exception as error:
+            return _without_result(job, ABORTED, _message(error), time.perf_counter() - start)
+        return StoredRun(
+            key=job.key,
+            number=job.number,
+            scenario=result.scenario,
+            run=job.run,
+            seed=job.seed,
+            status=PASSED if result.passed else FAILED,
+            point=dict(job.point),
+            result=result.to_dict(),
+            error="",
+            command=result.command,
+            wall_s=round(time.perf_counter() - start, 4),
+            settings=result.settings.canonical,
+        )
+
+
+def crashed(job: SweepJob, message: str) -> StoredRun:
+    """Return the row of a job whose worker process ended."""
+    return _without_result(job, CRASHED, message, 0.0)
+
+
+def _without_result(job: SweepJob, status: str, message: str, wall_s: float) -> StoredRun:
+    command = "" if job.run is not None else command_of(job.scenario, job.seed, job.settings)
+    return StoredRun(
+        key=job.key,
+        number=job.number,
+        scenario=name_of(job.scenario),
+        run=job.run,
+        seed=job.seed,
+        status=status,
+        point=dict(job.point),
+        result={},
+        error=message,
+        command=command,
+        wall_s=round(wall_s, 4),
+    )
+
+
+def _message(error: Exception) -> str:
+    """Return the error of a run; with its traceback if it is none of a run."""
+    if isinstance(error, WallLimitError) or type(error).__module__.startswith("eidrive_scenario"):
+        return str(error)
+    return "".join(traceback.format_exception(error)).rstrip()

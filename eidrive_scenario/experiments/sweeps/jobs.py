@@ -1,0 +1,167 @@
+"""Jobs of a sweep: one run each, with a key that depends on its inputs only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.sweeps.axes import Point, Scalar, settings_at
+from eidrive_scenario.openscenario import ConcreteRun, load_distribution
+from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json, package_versions, sha256_of
+from eidrive_scenario.simulation import RunSettings, Simulation
+
+MOST_RUNS = 10_000_000
+"""Maximum number of runs of a sweep."""
+RUN = "run"
+"""Name of the axis of the runs of a distribution file."""
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """Run of a sweep.
+
+    key       digest of the inputs
+    number    position in the sweep, from 0
+    scenario  file of the scenario or of the distribution
+    run       number among the runs of a distribution; None for a scenario
+    point     values of the axes
+    """
+
+    key: str
+    number: int
+    scenario: Path
+    run: int | None
+    seed: int
+    point: Point
+    settings: RunSettings
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """All runs of a sweep, created one by one in the order of their seeds.
+
+    scenario  file of the scenario or of the distribution
+    points    combinations of the values of the axes; the axis `run` is the number of a run of a distribution
+    seeds     seeds of each combination
+    runs      maximum number of runs; with fewer than all, every combination gets the first seeds
+    settings  settings of all runs
+    inputs    digest of all input files and versions
+    profile   channel profile whose settings the axes `channel.KEY` replace
+    """
+
+    scenario: Path
+    points: tuple[Point, ...]
+    seeds: Sequence[int]
+    runs: int
+    settings: RunSettings
+    inputs: str
+    profile: Mapping[str, Any] | None
+
+    def __len__(self) -> int:
+        return self.runs
+
+    def __iter__(self) -> Iterator[SweepJob]:
+        return islice(self._jobs(), self.runs)
+
+    def _jobs(self) -> Iterator[SweepJob]:
+        number = 0
+        for seed in self.seeds:
+            for point in self.points:
+                yield self.job(number, point, seed)
+                number += 1
+
+    def job(self, number: int, point: Point, seed: int) -> SweepJob:
+        """Return a run at a point, which need not be one of the plan."""
+        varied = {name: value for name, value in point.items() if name != RUN}
+        settings = settings_at(varied, self.settings, self.profile)
+        run = int(point[RUN]) if RUN in point else None
+        content = {"inputs": self.inputs, "run": run, "seed": seed, "settings": _plain(settings)}
+        return SweepJob(sha256_of(canonical_json(content).encode()), number, self.scenario, run, seed, point, settings)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Part of a plan for one job of a job array: every `count`-th run from the `number`-th on, from 1."""
+
+    plan: SweepPlan
+    number: int = 1
+    count: int = 1
+
+    def __len__(self) -> int:
+        return len(range(self.number - 1, len(self.plan), self.count))
+
+    def __iter__(self) -> Iterator[SweepJob]:
+        return islice(self.plan, self.number - 1, None, self.count)
+
+
+def plan_of(
+    scenario: Path,
+    points: Sequence[Point],
+    settings: RunSettings,
+    *,
+    seeds: Iterable[int] | None = None,
+    runs: int | None = None,
+    is_distribution: bool = False,
+) -> SweepPlan:
+    """Return the plan of a sweep. The first run is built, not executed, to find errors that concern all runs.
+
+    seeds  seeds of each combination; None: 1, or as many from 1 on as `runs` requires
+    runs   number of runs; None: every combination with every seed
+
+    Raise InputError for an invalid scenario or setting.
+    """
+    if is_distribution:
+        points = [{RUN: number, **point} for number in range(len(load_distribution(scenario))) for point in points]
+    chosen = _seeds(len(points), None if seeds is None else list(seeds), runs)
+    total = len(points) * len(chosen)
+    if not 0 < total <= MOST_RUNS:
+        raise SettingError(Diagnostic(f"the sweep has {total} runs", f"expected 1 to {MOST_RUNS}"))
+    first = _resolved(scenario, points[0].get(RUN), settings)
+    profile = first.channel_profile
+    digest = sha256_of(canonical_json({"files": first.files, "versions": dict(first.versions)}).encode())
+    plan = SweepPlan(scenario, tuple(points), chosen, min(total, runs or total), settings, digest, profile)
+    next(iter(plan))  # settings of the first point
+    return plan
+
+
+def versions() -> Mapping[str, str]:
+    """Return the versions of the packages that affect results."""
+    return package_versions()
+
+
+def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[int]:
+    if seeds is not None:
+        if len(set(seeds)) < len(seeds):
+            raise SettingError(Diagnostic("--seeds: a seed is given twice", "give each seed once"))
+        if runs is not None and runs > points * len(seeds):
+            hint = f"there are {points} combinations with {len(seeds)} seeds"
+            raise SettingError(Diagnostic(f"--runs is {runs}", hint))
+        return seeds
+    return range(1, 1 + (-(-runs // points) if runs is not None and points else 1))
+
+
+def _resolved(scenario: Path, run: Scalar | None, settings: RunSettings) -> ResolvedSettings:
+    source = scenario if run is None else load_distribution(scenario)[int(run)]
+    with Simulation(source, settings=settings) as simulation:
+        return simulation.resolved
+
+
+def source_of(job: SweepJob) -> Path | ConcreteRun:
+    """Return what a job runs: a scenario, or one run of a distribution."""
+    return job.scenario if job.run is None else load_distribution(job.scenario)[job.run]
+
+
+def _plain(settings: RunSettings) -> dict[str, Any]:
+    return {name: _text(value) for name, value in asdict(settings).items()}
+
+
+def _text(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _text(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_text(item) for item in value]
+    return value if value is None or isinstance(value, str | int | float | bool) else str(value)

@@ -1,0 +1,146 @@
+"""Results of sweeps as tables."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval, clopper_pearson, wilson
+from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, STATUSES, ResultStore, StoredRun
+from eidrive_scenario.files.atomic import atomic_output
+from eidrive_scenario.recording.text.csv_writer import neutralize_formula
+
+INTERVALS: Mapping[str, Callable[..., Proportion]] = {
+    "anytime": anytime_interval,
+    "wilson": wilson,
+    "exact": clopper_pearson,
+}
+"""Intervals of success rates by name. That of a confidence sequence is valid while runs are added; the others are for a
+number of runs that was fixed before."""
+FIXED = ("key", "number", "status", "error", "command", "seconds")
+"""Columns of every run before those of its axes and of its result."""
+
+
+@dataclass(frozen=True)
+class PointSummary:
+    """Runs of one combination of values.
+
+    point   values of the axes
+    counts  number of runs by status
+    rate    share of passed runs among passed and failed ones
+    """
+
+    point: Mapping[str, Any]
+    counts: Mapping[str, int]
+    rate: Proportion | None
+
+
+def stored_runs(paths: Sequence[Path]) -> Iterator[StoredRun]:
+    """Yield the runs of several stores; those of a later store replace equal ones. Raise SettingError as a store."""
+    found: dict[str, StoredRun] = {}
+    for path in paths:
+        with ResultStore.read(path) as store:
+            found.update((run.key, run) for run in store.runs())
+    return iter(sorted(found.values(), key=lambda run: (run.number, run.key)))
+
+
+def summaries(
+    runs: Iterable[StoredRun], *, by: Sequence[str] | None = None, interval: str = "anytime", confidence: float = 0.95
+) -> list[PointSummary]:
+    """Return the runs by combination of values, in the order of the sweep.
+
+    by  names of the axes that distinguish combinations; None: all
+
+    Raise SettingError for an axis that no run has, or an unknown interval.
+    """
+    if interval not in INTERVALS:
+        raise SettingError(Diagnostic(f"--interval: unknown interval {interval!r}", f"expected {', '.join(INTERVALS)}"))
+    groups: dict[tuple[tuple[str, Any], ...], dict[str, int]] = {}
+    names: dict[str, None] = {}
+    for run in runs:
+        names.update(dict.fromkeys(run.point))
+        chosen = run.point if by is None else {name: run.point[name] for name in by if name in run.point}
+        counts = groups.setdefault(tuple(chosen.items()), dict.fromkeys(STATUSES, 0))
+        counts[run.status] += 1
+    unknown = [name for name in by or () if name not in names]
+    if unknown:
+        hint = f"expected {', '.join(names)}" if names else "the runs vary by their seeds only"
+        raise SettingError(Diagnostic(f"--by: no axis {unknown[0]!r}", hint))
+    found = []
+    for point, counts in groups.items():
+        trials = counts[PASSED] + counts[FAILED]
+        rate = INTERVALS[interval](counts[PASSED], trials, confidence) if trials else None
+        found.append(PointSummary(dict(point), {name: count for name, count in counts.items() if count}, rate))
+    return found
+
+
+def columns_of(run: StoredRun) -> dict[str, Any]:
+    """Return the flat row of a run: status, axes (`vary.NAME`), then the columns of `RunResult.to_dict`."""
+    fixed = dict(zip(FIXED, (run.key, run.number, run.status, run.error, run.command, run.wall_s), strict=True))
+    identity = {"scenario": run.scenario, "run": run.run, "seed": run.seed}
+    return {**fixed, **{f"vary.{name}": value for name, value in run.point.items()}, **identity, **run.result}
+
+
+def as_table(runs: Iterable[StoredRun]) -> tuple[list[str], list[dict[str, Any]]]:
+    """Return the names of all columns in order of appearance, and the rows."""
+    rows = [columns_of(run) for run in runs]
+    return list(dict.fromkeys(name for row in rows for name in row)), rows
+
+
+def read_results(*stores: str | Path) -> Any:
+    """Return the runs of one or several stores as a pandas DataFrame, one row per run.
+
+    Raise SettingError if a file is no store, or without pandas.
+    """
+    pandas = _library("pandas")
+    names, rows = as_table(stored_runs([Path(store) for store in stores]))
+    return pandas.DataFrame(rows, columns=names)
+
+
+def write_csv(runs: Iterable[StoredRun], path: Path) -> None:
+    """Write the runs as a CSV file. Raise SettingError if it cannot be written."""
+    names, rows = as_table(runs)
+    with atomic_output(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(names)
+        writer.writerows([[_cell(row.get(name)) for name in names] for row in rows])
+
+
+def _cell(value: Any) -> Any:
+    return neutralize_formula(value) if isinstance(value, str) else value
+
+
+def write_parquet(runs: Iterable[StoredRun], path: Path) -> None:
+    """Write the runs as a Parquet file. Columns with texts and numbers become texts.
+
+    Raise SettingError if it cannot be written, or without pyarrow.
+    """
+    arrow, parquet = _library("pyarrow"), _library("pyarrow.parquet")
+    names, rows = as_table(runs)
+    columns = {name: _one_type([row.get(name) for row in rows]) for name in names}
+    with atomic_output(path) as partial:
+        parquet.write_table(arrow.table(columns), partial)
+
+
+def _one_type(values: list[Any]) -> list[Any]:
+    """Return the values of a column with one type: numbers, truth values or texts; None stays."""
+    kinds = {type(value) for value in values if value is not None}
+    if len(kinds) < 2:
+        return values
+    if kinds == {int, float}:
+        return [None if value is None else float(value) for value in values]
+    return [None if value is None else str(value) for value in values]
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        package = name.partition(".")[0]
+        hint = "install it: pip install 'eidrive-scenario[tables]'"
+        raise SettingError(Diagnostic(f"{package} is not installed", hint)) from error

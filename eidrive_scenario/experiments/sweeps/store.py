@@ -1,0 +1,222 @@
+"""Store of the results of sweeps: an SQLite file with one row per run."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+import msgspec
+
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError, SimulationError
+from eidrive_scenario.files.atomic import exclusive
+
+T = TypeVar("T")
+FORMAT = 1
+"""Version of the tables."""
+APPLICATION = 0x65694452
+"""Application id in the header of the file, `eiDR`."""
+PASSED, FAILED, ABORTED, CRASHED, INVALID, EXCLUDED = "passed", "failed", "aborted", "crashed", "invalid", "excluded"
+STATUSES = (PASSED, FAILED, ABORTED, CRASHED, INVALID, EXCLUDED)
+"""Outcomes of a run: verdict of its criteria; aborted by an error or its wall limit; end of its worker process; invalid
+input; excluded by constraints of parameters."""
+REPEATABLE = (ABORTED, CRASHED)
+"""Outcomes that need not be those of a repetition."""
+
+_TABLES = """
+CREATE TABLE IF NOT EXISTS meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS runs (
+    key TEXT PRIMARY KEY, number INTEGER NOT NULL, scenario TEXT NOT NULL, run INTEGER, seed INTEGER NOT NULL,
+    status TEXT NOT NULL, point TEXT NOT NULL, result TEXT NOT NULL, error TEXT NOT NULL, command TEXT NOT NULL,
+    wall_s REAL NOT NULL, settings BLOB NOT NULL
+) WITHOUT ROWID;
+"""
+
+
+class StoredRun(msgspec.Struct, frozen=True):
+    """Run of a sweep in the store.
+
+    key       digest of the inputs;  number  position in its sweep
+    run       number in a distribution; None for a scenario
+    status    one of STATUSES
+    point     values of the axes
+    result    outcome, criteria and metrics as columns: `RunResult.to_dict`; empty if the run did not end
+    error     message of a run that did not end
+    command   command line that repeats the run
+    wall_s    duration with loading [s]
+    settings  all settings of the run as JSON, with versions and digests of all files; empty if it did not start
+    """
+
+    key: str
+    number: int
+    scenario: str
+    run: int | None
+    seed: int
+    status: str
+    point: dict[str, Any]
+    result: dict[str, Any]
+    error: str
+    command: str
+    wall_s: float
+    settings: str = ""
+
+
+class ResultStore:
+    """Results of sweeps. Only one process writes; the result of a run is on the disk when `add` returns.
+
+    The journal is a separate file, as in all SQLite files that network file systems may hold.
+    """
+
+    def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
+        self.path = path
+        self._connection = connection
+
+    @classmethod
+    @contextmanager
+    def open(cls, path: Path, versions: Mapping[str, str]) -> Iterator[Self]:
+        """Open a store for writing, and create it if there is none; other processes may read it.
+
+        versions  versions of the packages that affect results: a store contains results of one set of them
+
+        Raise SettingError if the file cannot be written, is no store, or is one of other versions, or if another
+        process writes it.
+        """
+        if path.exists() and not path.is_file():
+            raise _error("cannot write: not a regular file", "choose another file", path)
+        with ExitStack() as stack:
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise _error(f"cannot write: {error.strerror}", "choose another file", path) from error
+            stack.enter_context(exclusive(path))
+            connection = _checked(path, lambda: _connect(path))
+            stack.callback(connection.close)
+            store = cls(path, connection)
+            _checked(path, store._create)
+            store._check_versions(versions)
+            yield store
+
+    @classmethod
+    @contextmanager
+    def read(cls, path: Path) -> Iterator[Self]:
+        """Open a store for reading. Raise SettingError if there is none."""
+        if not path.is_file():
+            raise _error("no such store", "give the file of a sweep", path)
+        connection = _checked(path, lambda: _connect(path, read_only=True))
+        try:
+            _checked(path, lambda: _check_format(path, connection))
+            yield cls(path, connection)
+        finally:
+            connection.close()
+
+    def _create(self) -> None:
+        if _is_empty(self._connection):
+            with self._connection:
+                self._connection.execute(f"PRAGMA application_id={APPLICATION}")
+                self._connection.execute(f"PRAGMA user_version={FORMAT}")
+                for statement in _TABLES.split(";"):
+                    self._connection.execute(statement)
+        _check_format(self.path, self._connection)
+
+    def _check_versions(self, versions: Mapping[str, str]) -> None:
+        """Store the versions, or compare them with the stored ones."""
+        rows = dict(self._connection.execute("SELECT name, value FROM meta"))
+        held = json.loads(rows["versions"]) if "versions" in rows else None
+        if held is None:
+            with self._connection:
+                self._connection.execute("INSERT INTO meta VALUES ('versions', ?)", (json.dumps(dict(versions)),))
+        elif held != dict(versions):
+            different = sorted(name for name in {*held, *versions} if held.get(name) != versions.get(name))
+            texts = [f"{name} {held.get(name, 'none')} (now {versions.get(name, 'none')})" for name in different]
+            raise _error(f"the store has results of {', '.join(texts)}", "give a new file", self.path)
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Versions of the packages that computed the results."""
+        rows = dict(self._connection.execute("SELECT name, value FROM meta WHERE name = 'versions'"))
+        return dict(json.loads(rows["versions"])) if rows else {}
+
+    def add(self, run: StoredRun) -> None:
+        """Add a run, or replace the one with its key. Raise SimulationError if it cannot be written."""
+        row = (
+            run.key,
+            run.number,
+            run.scenario,
+            run.run,
+            run.seed,
+            run.status,
+            json.dumps(run.point),
+            json.dumps(run.result),
+            run.error,
+            run.command,
+            run.wall_s,
+            zlib.compress(run.settings.encode()),
+        )
+        try:
+            with self._connection:
+                self._connection.execute(f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * len(row))})", row)
+        except sqlite3.Error as error:
+            raise SimulationError(
+                f"{self.path}: cannot write a result: {error}; the results of all earlier runs are stored, and the "
+                "same command continues"
+            ) from error
+
+    def statuses(self) -> dict[str, str]:
+        """Return the status of each run by its key."""
+        return dict(self._connection.execute("SELECT key, status FROM runs"))
+
+    def runs(self) -> Iterator[StoredRun]:
+        """Yield all runs in the order of their sweep."""
+        for row in self._connection.execute("SELECT * FROM runs ORDER BY number, key"):
+            key, number, scenario, run, seed, status, point, result, error, command, wall_s, settings = row
+            yield StoredRun(
+                key,
+                number,
+                scenario,
+                run,
+                seed,
+                status,
+                json.loads(point),
+                json.loads(result),
+                error,
+                command,
+                wall_s,
+                zlib.decompress(settings).decode(),
+            )
+
+
+def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:
+    uri = f"{path.absolute().as_uri()}{'?mode=ro' if read_only else ''}"
+    return sqlite3.connect(uri, uri=True, timeout=30.0)
+
+
+def _is_empty(connection: sqlite3.Connection) -> bool:
+    return not connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+
+
+def _check_format(path: Path, connection: sqlite3.Connection) -> None:
+    application = connection.execute("PRAGMA application_id").fetchone()[0]
+    if application != APPLICATION:
+        raise _error("the file is no store of a sweep", "give a new file", path)
+    held = connection.execute("PRAGMA user_version").fetchone()[0]
+    if held != FORMAT:
+        hint = "read it with the version that wrote it, or give a new file"
+        raise _error(f"the store has format {held} (expected {FORMAT})", hint, path)
+
+
+def _checked(path: Path, action: Callable[[], T]) -> T:
+    """Return the result of an action. Raise SettingError for errors of the database."""
+    try:
+        return action()
+    except InputError:
+        raise
+    except sqlite3.Error as error:
+        raise _error(f"cannot use the store: {error}", "give a new file", path) from error
+
+
+def _error(message: str, hint: str, path: Path) -> SettingError:
+    return SettingError(Diagnostic(message, hint, str(path)))

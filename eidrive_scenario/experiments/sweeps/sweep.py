@@ -1,0 +1,124 @@
+"""Execution of a sweep: jobs to workers, results to the store."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sized
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from eidrive_scenario.experiments.sweeps.execution import crashed, execute
+from eidrive_scenario.experiments.sweeps.jobs import SweepJob
+from eidrive_scenario.experiments.sweeps.store import EXCLUDED, FAILED, PASSED, REPEATABLE, ResultStore, StoredRun
+from eidrive_scenario.experiments.sweeps.workers import Workers
+
+TRIES = 2
+"""Number of tries of a job whose worker process ends."""
+
+
+class Jobs(Sized, Iterable[SweepJob], Protocol):
+    """Jobs with a known number."""
+
+
+@dataclass
+class SweepProgress:
+    """Progress of a sweep.
+
+    total   number of runs
+    kept    number of runs that the store already had
+    counts  number of runs of this call by status
+    """
+
+    total: int
+    kept: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
+    start: float = field(default_factory=time.perf_counter)
+
+    @property
+    def done(self) -> int:
+        """Number of runs of this call that have ended."""
+        return self.counts.total()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all runs of this call have a verdict, or are excluded by constraints."""
+        return self.left == 0 and not set(self.counts) - {PASSED, FAILED, EXCLUDED}
+
+    @property
+    def left(self) -> int:
+        """Number of runs that have not ended."""
+        return self.total - self.kept - self.done
+
+    @property
+    def elapsed_s(self) -> float:
+        """Duration of this call [s]."""
+        return time.perf_counter() - self.start
+
+    @property
+    def rate(self) -> float:
+        """Number of ended runs per second."""
+        return self.done / max(self.elapsed_s, 1e-9)
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Expected duration of the other runs [s]; None before the first end."""
+        return self.left / self.rate if self.done else None
+
+
+def run_sweep(
+    jobs: Jobs,
+    store: ResultStore,
+    workers: Workers,
+    *,
+    wall_limit: float | None = None,
+    retry: bool = False,
+    shown: Callable[[SweepProgress, StoredRun | None], None] = lambda progress, run: None,
+) -> SweepProgress:
+    """Run all jobs without a result in the store, and return the progress.
+
+    wall_limit  limit of the wall time of each run [s]
+    retry       repeat runs that were aborted or whose worker ended
+    shown       function that gets the progress at the start and after each run
+
+    Raise SimulationError if the store cannot be written; the results of all earlier runs are stored.
+    """
+    held = store.statuses()
+    progress = SweepProgress(len(jobs))
+    running: dict[Future[StoredRun], tuple[SweepJob, int]] = {}
+
+    def start(job: SweepJob, tries: int) -> None:
+        running[workers.submit(execute, job, wall_limit)] = job, tries
+
+    def left() -> Iterator[SweepJob]:
+        for job in jobs:
+            status = held.get(job.key)
+            if status is None or (retry and status in REPEATABLE):
+                yield job
+            else:
+                progress.kept += 1
+
+    waiting = left()
+    shown(progress, None)
+    while True:
+        while len(running) < workers.capacity and (job := next(waiting, None)) is not None:
+            start(job, 1)
+        if not running:
+            shown(progress, None)
+            return progress
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            job, tries = running.pop(future)
+            error = future.exception()
+            if error is None:
+                run = future.result()
+            elif not workers.is_crash(error):
+                raise error
+            elif tries < TRIES:
+                start(job, tries + 1)
+                continue
+            else:
+                run = crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}")
+            store.add(run)
+            progress.counts[run.status] += 1
+            shown(progress, run)
