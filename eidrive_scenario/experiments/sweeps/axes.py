@@ -83,13 +83,13 @@ def parse_axes(texts: list[str]) -> tuple[Axis, ...]:
     """Return the axes of several texts. Raise SettingError for an invalid one, or a name that is given twice."""
     axes = tuple(parse_axis(text) for text in texts)
     for row, axis in enumerate(axes):
-        if parameter_of(axis.name) in [parameter_of(other.name) for other in axes[:row]]:
+        if _identity(axis.name) in [_identity(other.name) for other in axes[:row]]:
             raise _error(axis.name, "the axis is given twice")
     return axes
 
 
-def parameter_of(name: str) -> str:
-    """Return the name of an axis without the prefix of parameters, unless it is then the name of a setting."""
+def _identity(name: str) -> str:
+    """Return one name for a parameter with and without prefix, unless a setting has this name."""
     bare = name.removeprefix(PARAMETER)
     return name if _is_setting(bare) else bare
 
@@ -147,7 +147,7 @@ def settings_at(point: Point, base: RunSettings, profile: Mapping[str, Any] | No
         elif name in SETTINGS:
             fields[name] = str(value)
         else:
-            parameters[parameter_of(name)] = text_of_value(value)
+            parameters[name.removeprefix(PARAMETER)] = text_of_value(value)
     if changes:
         fields[CHANNEL] = changed_profile(_profile_of(point, profile, changes), changes)
     return replace(base, parameters=parameters, **fields)

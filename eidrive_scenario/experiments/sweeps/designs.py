@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, Point
-from eidrive_scenario.randomness import generator
+from eidrive_scenario.randomness import integer_key
 
 GRID = "grid"
 MOST_POINTS = 1_000_000
@@ -52,7 +52,7 @@ def points_of(axes: Sequence[Axis], design: str, samples: int | None, seed: int)
         raise SettingError(
             Diagnostic(f"--design {design}: --samples is {samples}", f"expected 1 to {MOST_POINTS} combinations")
         )
-    shares = _SAMPLED[design](len(axes), samples, generator(seed, "design", design))
+    shares = _SAMPLED[design](len(axes), samples, np.random.default_rng(integer_key(seed, "design", design, size=16)))
     return [{axis.name: axis.at(float(share)) for axis, share in zip(axes, row, strict=True)} for row in shares]
 
 

@@ -1,0 +1,133 @@
+"""Stores of sweeps: rows, versions, locks, damaged files, full disks."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from eidrive_scenario.errors import SettingError, SimulationError
+from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
+
+VERSIONS = {"eidrive-scenario": "1.0", "numpy": "2.4"}
+RUN = StoredRun(
+    key="a" * 64,
+    number=3,
+    scenario="coop/scenario_1",
+    run=None,
+    seed=2,
+    status="passed",
+    point={"Speed": 8.5, "detector": "oracle"},
+    result={"passed": True, "collision.count": 0.0, "collision.limit": None},
+    error="",
+    command="eidrive run coop/scenario_1 --seed 2",
+    wall_s=0.25,
+    settings='{"dt":0.05,"name":"ä"}',
+)
+
+
+@contextmanager
+def opened(path: Path, **versions: str) -> Iterator[ResultStore]:
+    with ResultStore.open(path, {**VERSIONS, **versions}) as store:
+        yield store
+
+
+def test_store_returns_added_runs_in_order(tmp_path: Path) -> None:
+    path = tmp_path / "new folder" / "s.db"
+    with opened(path) as store:
+        store.add(RUN)
+        store.add(replace(RUN, key="b" * 64, number=1, status="aborted", result={}, error="no\nway", settings=""))
+        assert store.statuses() == {"a" * 64: "passed", "b" * 64: "aborted"}
+    with ResultStore.read(path) as store:
+        first, second = store.runs()
+        assert (first.number, first.error) == (1, "no\nway")
+        assert second == RUN
+        assert store.versions == VERSIONS
+
+
+def test_add_with_same_key_replaces_row(tmp_path: Path) -> None:
+    with opened(tmp_path / "s.db") as store:
+        store.add(replace(RUN, status="crashed"))
+        store.add(RUN)
+        assert list(store.runs()) == [RUN]
+
+
+def test_open_of_store_of_other_versions_raises(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(RUN)
+    with (
+        pytest.raises(SettingError, match=r"eidrive-scenario 1.0 \(now 2.0\)"),
+        opened(path, **{"eidrive-scenario": "2.0"}),
+    ):
+        pass
+    with opened(path) as store:
+        assert len(store.statuses()) == 1
+
+
+def test_open_of_other_format_raises(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
+    with opened(path):
+        pass
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version=99")
+    connection.close()
+    with pytest.raises(SettingError, match="format 99"), opened(path):
+        pass
+    with pytest.raises(SettingError, match="format 99"), ResultStore.read(path):
+        pass
+
+
+def test_open_of_other_files_raises_and_keeps_them(tmp_path: Path) -> None:
+    other = tmp_path / "other.db"
+    with sqlite3.connect(other) as connection:
+        connection.execute("CREATE TABLE mine (x)")
+    connection.close()
+    text = tmp_path / "notes.txt"
+    text.write_text("not a database, but long enough to have a header" * 10)
+    for path in (other, text):
+        before = path.read_bytes()
+        with pytest.raises(SettingError, match=r"no store|cannot use the store"), opened(path):
+            pass
+        assert path.read_bytes() == before
+
+
+def test_two_writers_of_one_store_raise(tmp_path: Path) -> None:
+    """The second one is refused; a reader is not."""
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(RUN)
+        with pytest.raises(SettingError, match="another"), opened(path):
+            pass
+        with ResultStore.read(path) as reader:
+            assert list(reader.runs()) == [RUN]
+
+
+@pytest.mark.parametrize("kind", ["folder", "missing", "file below a file"])
+def test_unusable_paths_raise(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "file").write_text("")
+    path = {"folder": tmp_path, "missing": tmp_path / "no.db", "file below a file": tmp_path / "file" / "s.db"}[kind]
+    if kind == "missing":
+        with pytest.raises(SettingError, match="no such store"), ResultStore.read(path):
+            pass
+    else:
+        with pytest.raises(SettingError, match="cannot"), opened(path):
+            pass
+
+
+def test_full_disk_raises_and_keeps_earlier_rows(tmp_path: Path) -> None:
+    """SQLite's limit of the number of pages has the error of a full disk."""
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(RUN)
+        pages = store._connection.execute("PRAGMA page_count").fetchone()[0]
+        store._connection.execute(f"PRAGMA max_page_count={pages}")
+        long = replace(RUN, key="b" * 64, error="x" * 500_000)
+        with pytest.raises(SimulationError, match=r"full; the results of all earlier runs are stored"):
+            store.add(long)
+    with ResultStore.read(path) as store:
+        assert RUN in list(store.runs())

@@ -1,0 +1,199 @@
+"""Sweeps: plans, rows of all outcomes, continuation, killed workers and killed sweeps."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes
+from eidrive_scenario.experiments.sweeps.designs import points_of
+from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of, versions
+from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
+from eidrive_scenario.experiments.sweeps.sweep import SweepProgress, run_sweep
+from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
+from eidrive_scenario.simulation import RunSettings
+
+SPEEDS: list[Point] = points_of(parse_axes(["Speed=10,30,50"]), "grid", None, 1)
+
+
+class InProcess:
+    """Workers that execute a call at once in this process."""
+
+    capacity = 1
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(function(*arguments))
+        return future
+
+    def is_crash(self, error: BaseException) -> bool:
+        return False
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def swept(plan: SweepPlan, store: Path, **options: Any) -> tuple[SweepProgress, list[StoredRun]]:
+    with ResultStore.open(store, versions()) as opened:
+        progress = run_sweep(Shard(plan), opened, InProcess(), **options)
+        return progress, list(opened.runs())
+
+
+def test_plan_orders_runs_by_seed_and_limits_them(scenario: Path) -> None:
+    plan = plan_of(scenario, SPEEDS, RunSettings(), runs=7)
+    assert [(job.number, job.seed, job.point["Speed"]) for job in plan] == [
+        (0, 1, 10),
+        (1, 1, 30),
+        (2, 1, 50),
+        (3, 2, 10),
+        (4, 2, 30),
+        (5, 2, 50),
+        (6, 3, 10),
+    ]
+    assert len({job.key for job in plan}) == 7
+
+
+def test_keys_depend_on_inputs_only(scenario: Path, tmp_path: Path) -> None:
+    """Order and number of the runs do not change a key; content of the scenario, settings and seed do."""
+    one = {(job.seed, job.point["Speed"]): job.key for job in plan_of(scenario, SPEEDS, RunSettings(), seeds=[1, 2])}
+    reverse = plan_of(scenario, SPEEDS[::-1], RunSettings(), seeds=[2, 1])
+    assert {(job.seed, job.point["Speed"]): job.key for job in reverse} == one
+    for changed in (RunSettings(dt=0.1), RunSettings(criteria="{collision: {of: Ego}}")):
+        assert not {job.key for job in plan_of(scenario, SPEEDS, changed, seeds=[1, 2])} & set(one.values())
+    scenario.write_text(scenario.read_text().replace('value="0.5"', 'value="0.6"'))
+    assert not {job.key for job in plan_of(scenario, SPEEDS, RunSettings(), seeds=[1, 2])} & set(one.values())
+
+
+def test_shards_are_disjoint_and_complete(scenario: Path) -> None:
+    plan = plan_of(scenario, SPEEDS, RunSettings(), runs=10)
+    shards = [Shard(plan, number, 4) for number in (1, 2, 3, 4)]
+    assert [len(shard) for shard in shards] == [len(list(shard)) for shard in shards] == [3, 3, 2, 2]
+    assert sorted(job.number for shard in shards for job in shard) == list(range(10))
+
+
+def test_sweep_stores_every_outcome_as_row(scenario: Path, tmp_path: Path) -> None:
+    """Passed, failed by its criterion, and excluded by the constraint of the parameter."""
+    progress, runs = swept(plan_of(scenario, SPEEDS, RunSettings()), tmp_path / "s.db")
+    assert [(run.point["Speed"], run.status) for run in runs] == [(10, "passed"), (30, "failed"), (50, "excluded")]
+    assert runs[0].result["max_speed.value"] == pytest.approx(10.0, abs=0.5)
+    assert runs[0].result["parameter.Speed"] == 10
+    assert '"versions"' in runs[0].settings
+    assert "constraint" in runs[2].error
+    assert runs[1].command == f"eidrive run {scenario} --param Speed=30 --seed 1"
+    assert progress.is_complete
+    assert progress.left == 0
+
+
+def test_sweep_of_distribution_runs_all_its_values(distribution: Path, tmp_path: Path) -> None:
+    plan = plan_of(distribution, points_of((), "grid", None, 1), RunSettings(), is_distribution=True, seeds=[1, 2])
+    _, runs = swept(plan, tmp_path / "s.db")
+    assert [(run.seed, run.run, run.status) for run in runs] == [
+        (seed, run, status) for seed in (1, 2) for run, status in enumerate(("passed", "failed", "excluded"))
+    ]
+
+
+def test_sweep_continues_without_repetition(scenario: Path, tmp_path: Path) -> None:
+    store = tmp_path / "s.db"
+    first = plan_of(scenario, SPEEDS[:2], RunSettings())
+    swept(first, store)
+    longer = plan_of(scenario, SPEEDS, RunSettings(), seeds=[1, 2])
+    progress, runs = swept(longer, store)
+    assert (progress.kept, progress.done, len(runs)) == (2, 4, 6)
+    _, alone = swept(longer, tmp_path / "other.db")
+    strip = [(run.key, run.status, run.result.get("trace_hash")) for run in alone]
+    assert sorted(strip) == sorted((run.key, run.status, run.result.get("trace_hash")) for run in runs)
+
+
+def test_retry_repeats_aborted_runs_only(scenario: Path, tmp_path: Path) -> None:
+    """A wall limit that no run meets aborts all; with `retry` they are repeated."""
+    store = tmp_path / "s.db"
+    plan = plan_of(scenario, SPEEDS, RunSettings())
+    progress, runs = swept(plan, store, wall_limit=1e-4)
+    assert [run.status for run in runs].count("aborted") >= 2
+    assert not progress.is_complete
+    assert all("wall" in run.error for run in runs if run.status == "aborted")
+    assert swept(plan, store)[0].done == 0
+    _, runs = swept(plan, store, retry=True)
+    assert [run.status for run in runs] == ["passed", "failed", "excluded"]
+
+
+def test_invalid_value_of_one_point_is_a_row(scenario: Path, tmp_path: Path) -> None:
+    points = points_of(parse_axes(["Speed=10,fast"]), "grid", None, 1)
+    progress, runs = swept(plan_of(scenario, points, RunSettings()), tmp_path / "s.db")
+    assert [run.status for run in runs] == ["passed", "invalid"]
+    assert "fast" in runs[1].error
+    assert not progress.is_complete
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"runs": 9, "seeds": [1]}, "--runs is 9"),
+        ({"seeds": [1, 1]}, "twice"),
+        ({"seeds": []}, "0 runs"),
+        ({"settings": RunSettings(channel="no such")}, "no such"),
+        ({"settings": RunSettings(parameters={"Sped": "1"})}, "Sped"),
+    ],
+)
+def test_invalid_plans_raise(scenario: Path, options: dict[str, Any], expected: str) -> None:
+    settings = options.pop("settings", RunSettings())
+    with pytest.raises(InputError, match=expected):
+        plan_of(scenario, SPEEDS, settings, **options)
+
+
+def test_killed_worker_is_a_row_and_others_are_unharmed(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The worker of one run is killed in each try; it is replaced, and all other runs have results."""
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    import sweep_tasks
+
+    monkeypatch.setattr("eidrive_scenario.experiments.sweeps.sweep.execute", sweep_tasks.killed_at_30)
+    plan = plan_of(scenario, points_of(parse_axes(["Speed=8,10,12,30,14,16"]), "grid", None, 1), RunSettings())
+    workers = LocalWorkers(2)
+    try:
+        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+            progress = run_sweep(Shard(plan), store, workers)
+            statuses = {run.point["Speed"]: run.status for run in store.runs()}
+    finally:
+        workers.close()
+    assert statuses == {8: "passed", 10: "passed", 12: "passed", 30: "crashed", 14: "passed", 16: "passed"}
+    assert not progress.is_complete
+
+
+def test_killed_sweep_continues_to_the_same_results(scenario: Path, tmp_path: Path) -> None:
+    """SIGKILL of the command twice, at any moment; then all rows are those of an uninterrupted sweep."""
+    store = tmp_path / "s.db"
+    command = [sys.executable, "-m", "eidrive_scenario", "sweep", str(scenario), "--store", str(store)]
+    command += ["--vary", "Speed=1:20:1", "--seeds", "1-3", "--workers", "2"]
+    for rows in (4, 20):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None and _count(store) < rows:
+            time.sleep(0.02)
+        process.kill()
+        process.wait()
+    assert 20 <= _count(store) < 60
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    plan = plan_of(scenario, points_of(parse_axes(["Speed=1:20:1"]), "grid", None, 1), RunSettings(), seeds=[1, 2, 3])
+    _, alone = swept(plan, tmp_path / "other.db")
+    with ResultStore.read(store) as opened:
+        runs = list(opened.runs())
+    assert [(run.key, run.number, run.status, run.result["trace_hash"]) for run in runs] == [
+        (run.key, run.number, run.status, run.result["trace_hash"]) for run in alone
+    ]
+
+
+def _count(store: Path) -> int:
+    if not store.exists() or not store.stat().st_size:
+        return 0
+    with ResultStore.read(store) as opened:
+        return len(opened.statuses())
