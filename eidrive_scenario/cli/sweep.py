@@ -45,8 +45,27 @@ def sweep(
     time_limit: Annotated[float, typer.Option(help="Maximum simulated time in seconds.")] = 120.0,
     wall_limit: Annotated[float, typer.Option(help="Maximum wall time of each run in seconds.")] = USUAL_LIMIT,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="number of cores")] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS|slurm|kubernetes", help="Dask cluster.", show_default="processes"),
+    ] = None,
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="Part I of N, for job arrays; a store for each.")
+    ] = None,
+    find_boundary: Annotated[
+        str | None,
+        typer.Option(metavar="NAME=LOW:HIGH", help="Find the value at which the success rate crosses --bound."),
+    ] = None,
+    bound: Annotated[float, typer.Option(help="Success rate of --find-boundary.")] = 0.5,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Accuracy of --find-boundary.", show_default="2 % of the range")
+    ] = None,
+    falsify: Annotated[
+        bool, typer.Option("--falsify", help="Search the space of --vary for failures, and print different ones.")
+    ] = False,
+    objective: Annotated[
+        str | None,
+        typer.Option(metavar="METRIC", help="Metric that --falsify minimizes instead of margins."),
     ] = None,
     retry: Annotated[bool, typer.Option("--retry", help="Repeat aborted and crashed runs of the store.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would run.")] = False,
@@ -56,13 +75,16 @@ def sweep(
     Example: eidrive sweep coop/scenario_1 --vary channel.delay.seconds=0:1:0.1 --seeds 1-10 --store s.db
     """
     from eidrive_scenario.cli.sweep_progress import ProgressDisplay
+    from eidrive_scenario.cli.sweep_search import Search
     from eidrive_scenario.experiments.repetitions import cores
     from eidrive_scenario.experiments.sweeps.axes import parse_axes
+    from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
     from eidrive_scenario.experiments.sweeps.designs import points_of
     from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
+    from eidrive_scenario.experiments.sweeps.searches import BATCH
     from eidrive_scenario.experiments.sweeps.store import ResultStore
     from eidrive_scenario.experiments.sweeps.sweep import run_sweep
-    from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
+    from eidrive_scenario.experiments.sweeps.workers import LocalWorkers, Workers
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.simulation import RunSettings
 
@@ -76,7 +98,14 @@ def sweep(
         time_limit=time_limit,
     )
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
-    points = points_of(parse_axes(vary or []), design, samples, seed=1)
+    axes = parse_axes(vary or [])
+    search = None
+    if falsify or find_boundary is not None:
+        search = Search.of(axes, find_boundary, bound, tolerance, falsify, objective, runs)
+        axes, runs, chosen = search.fixed, None, chosen or [1]
+        if shard is not None or design != "grid":
+            raise SettingError(Diagnostic("a search has neither shards nor a design", "remove --shard and --design"))
+    points = points_of(axes, design, samples, seed=1)
     plan = plan_of(path, points, settings, seeds=chosen, runs=runs, is_distribution=definition(path) == "distribution")
     jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
     if dry_run:
@@ -87,8 +116,15 @@ def sweep(
             typer.echo(f"  and {len(plan.points) - 10} more")
         raise typer.Exit
     with ResultStore.open(store, versions()) as opened:
-        crew = LocalWorkers(min(workers or cores(), len(jobs)))
+        crew: Workers
+        if scheduler is None:
+            crew = LocalWorkers(min(workers or cores(), len(jobs) if search is None else BATCH))
+        else:
+            crew = DaskWorkers.connect(scheduler, workers)
         try:
+            if search is not None:
+                search.run(plan, opened, crew, wall_limit=wall_limit, retry=retry)
+                raise typer.Exit
             with ProgressDisplay(len(jobs)) as display:
                 progress = run_sweep(jobs, opened, crew, wall_limit=wall_limit, retry=retry, shown=display.show)
         finally:
@@ -162,7 +198,7 @@ def _print_table(rows: Sequence[PointSummary], interval: str, confidence: float)
     for row in rows:
         rate = row.rate
         table.add_row(
-            *(str(row.point.get(name, "")) for name in axes),
+            *(_short(row.point.get(name, "")) for name in axes),
             str(sum(row.counts.values())),
             str(row.counts.get("passed", 0)),
             *(str(row.counts.get(status, 0)) for status in statuses),
@@ -170,4 +206,10 @@ def _print_table(rows: Sequence[PointSummary], interval: str, confidence: float)
             "" if rate is None else f"{rate.low:.1%} to {rate.high:.1%}",
         )
     console = Console()
-    console.print(table, soft_wrap=not console.is_terminal)
+    if not console.is_terminal:  # lines as long as necessary, so that other programs can read them
+        console = Console(width=max(200, 40 * len(table.columns)))
+    console.print(table)
+
+
+def _short(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

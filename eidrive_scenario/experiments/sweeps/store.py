@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -172,21 +172,23 @@ class ResultStore:
     def runs(self) -> Iterator[StoredRun]:
         """Yield all runs in the order of their sweep."""
         for row in self._connection.execute("SELECT * FROM runs ORDER BY number, key"):
-            key, number, scenario, run, seed, status, point, result, error, command, wall_s, settings = row
-            yield StoredRun(
-                key,
-                number,
-                scenario,
-                run,
-                seed,
-                status,
-                json.loads(point),
-                json.loads(result),
-                error,
-                command,
-                wall_s,
-                zlib.decompress(settings).decode(),
-            )
+            yield _stored_run(row)
+
+    def rows(self, keys: Sequence[str]) -> list[StoredRun]:
+        """Return the runs with these keys in their order. Raise KeyError if one is missing."""
+        found = []
+        for key in keys:
+            row = self._connection.execute("SELECT * FROM runs WHERE key = ?", (key,)).fetchone()
+            if row is None:
+                raise KeyError(key)
+            found.append(_stored_run(row))
+        return found
+
+
+def _stored_run(row: Sequence[Any]) -> StoredRun:
+    key, number, scenario, run, seed, status, point, result, error, command, wall_s, settings = row
+    texts = json.loads(point), json.loads(result), error, command, wall_s, zlib.decompress(settings).decode()
+    return StoredRun(key, number, scenario, run, seed, status, *texts)
 
 
 def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:

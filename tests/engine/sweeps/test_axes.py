@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, changed_profile, parse_axes, parse_axis, settings_at
+from eidrive_scenario.experiments.sweeps.axes import Axis, Point, changed_profile, parse_axes, parse_axis, settings_at
 from eidrive_scenario.simulation import RunSettings
 
 
@@ -56,7 +56,7 @@ def test_at_returns_share_of_interval_or_list() -> None:
 
 def test_settings_at_sets_parameters_settings_and_channel() -> None:
     base = RunSettings(parameters={"Speed": "5", "Gap": "2"})
-    point = {"Speed": 8.5, "param.weather": "dry", "weather": "rain", "cooperate": "A+B", "time_limit": 9}
+    point: Point = {"Speed": 8.5, "param.weather": "dry", "weather": "rain", "cooperate": "A+B", "time_limit": 9}
     settings = settings_at(point, base, None)
     assert settings.parameters == {"Speed": "8.5", "Gap": "2", "weather": "dry"}
     assert (settings.weather, settings.cooperate, settings.time_limit) == ("rain", ("A", "B"), 9.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 import time
@@ -154,9 +155,8 @@ def test_killed_worker_is_a_row_and_others_are_unharmed(
 ) -> None:
     """The worker of one run is killed in each try; it is replaced, and all other runs have results."""
     monkeypatch.syspath_prepend(Path(__file__).parent)
-    import sweep_tasks
-
-    monkeypatch.setattr("eidrive_scenario.experiments.sweeps.sweep.execute", sweep_tasks.killed_at_30)
+    task = importlib.import_module("sweep_tasks").killed_at_30
+    monkeypatch.setattr("eidrive_scenario.experiments.sweeps.sweep.execute", task)
     plan = plan_of(scenario, points_of(parse_axes(["Speed=8,10,12,30,14,16"]), "grid", None, 1), RunSettings())
     workers = LocalWorkers(2)
     try:

@@ -1,0 +1,122 @@
+"""Searches of `eidrive sweep`: `--find-boundary` and `--falsify`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import typer
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis
+from eidrive_scenario.experiments.sweeps.boundary import Boundary
+from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
+from eidrive_scenario.experiments.sweeps.searches import Execute, falsify, find_boundary
+from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
+from eidrive_scenario.experiments.sweeps.sweep import run_sweep
+from eidrive_scenario.experiments.sweeps.workers import Workers
+
+MOST_RUNS = 200
+"""Default maximum number of runs of a search."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Search that replaces the runs of a sweep.
+
+    boundary  axis of `--find-boundary`; None for `--falsify`
+    space     axes of `--falsify`
+    fixed     axes with one value, which all runs have
+    """
+
+    boundary: Axis | None
+    bound: float
+    tolerance: float
+    space: tuple[Axis, ...]
+    fixed: tuple[Axis, ...]
+    objective: str | None
+    runs: int
+
+    @classmethod
+    def of(
+        cls,
+        axes: Sequence[Axis],
+        boundary: str | None,
+        bound: float,
+        tolerance: float | None,
+        falsified: bool,
+        objective: str | None,
+        runs: int | None,
+    ) -> Self:
+        """Return the search of these options. Raise SettingError for options that do not fit together."""
+        if boundary is not None and falsified:
+            raise SettingError(Diagnostic("--find-boundary and --falsify are two searches", "give one of them"))
+        space = tuple(axis for axis in axes if axis.is_interval or len(axis.values) > 1)
+        fixed = tuple(axis for axis in axes if axis not in space)
+        most = runs or MOST_RUNS
+        if boundary is None:
+            return cls(None, bound, math.nan, space, fixed, objective, most)
+        axis = parse_axis(boundary)
+        if not axis.is_interval:
+            raise SettingError(Diagnostic(f"--find-boundary: {axis.name} is no interval", "expected NAME=LOW:HIGH"))
+        if space:
+            hint = "give each axis of --vary one value, or use a sweep for each"
+            raise SettingError(Diagnostic(f"--find-boundary: {space[0].name} varies, too", hint))
+        if not 0.0 < bound < 1.0:
+            raise SettingError(Diagnostic(f"--bound is {bound}", "give a success rate between 0 and 1"))
+        least = 0.02 * (axis.high - axis.low) if tolerance is None else tolerance
+        if not 0.0 < least < math.inf:
+            raise SettingError(Diagnostic(f"--tolerance is {tolerance}", "give a positive number"))
+        return cls(axis, bound, least, (), fixed, objective, most)
+
+    def run(
+        self, plan: SweepPlan, store: ResultStore, workers: Workers, *, wall_limit: float | None, retry: bool
+    ) -> None:
+        """Search, and print the result."""
+
+        def execute(jobs: Sequence[SweepJob]) -> list[StoredRun]:
+            run_sweep(jobs, store, workers, wall_limit=wall_limit, retry=retry)
+            return store.rows([job.key for job in jobs])
+
+        if self.boundary is None:
+            self._falsify(plan, execute)
+            return
+        found = find_boundary(
+            plan,
+            self.boundary,
+            execute,
+            bound=self.bound,
+            tolerance=self.tolerance,
+            runs=self.runs,
+            shown=lambda one: typer.echo(_estimate(one), err=True),
+        )
+        name = self.boundary.name
+        if math.isnan(found.value) or found.inside < 0.5:
+            typer.echo(f"{name}: the success rate does not cross {self.bound:g} in the range ({found.runs} runs)")
+            return
+        change = "rises" if found.rising > 0.5 else "falls"
+        typer.echo(
+            f"{name}: the success rate {change} through {self.bound:g} at {found.value:.4g} "
+            f"(95 %: {found.low:.4g} to {found.high:.4g}; {found.runs} runs)"
+        )
+
+    def _falsify(self, plan: SweepPlan, execute: Execute) -> None:
+        found = falsify(
+            plan,
+            self.space,
+            execute,
+            runs=self.runs,
+            objective=self.objective,
+            shown=lambda done, failed: typer.echo(f"{done} runs, {failed} failed", err=True),
+        )
+        typer.echo(f"{found.failed} of {found.runs} runs failed")
+        for run in found.failures:
+            typer.echo(run.command)
+        if not found.failures and found.least is not None:
+            typer.echo(f"nearest to a failure: {found.least.command}")
+
+
+def _estimate(one: Boundary) -> str:
+    return f"{one.runs} runs: {one.low:.4g} to {one.high:.4g}"

@@ -1,0 +1,223 @@
+"""Searches in a sweep: boundary of success along one axis, and failures in a space of several axes.
+
+Runs are proposed in batches of a fixed size, so that a search depends neither on the number of workers nor on
+interruptions: known results are taken from the store.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.sweeps.axes import Axis, Point, Scalar
+from eidrive_scenario.experiments.sweeps.boundary import Boundary, BoundarySearch, is_found
+from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
+from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
+
+BATCH = 8
+"""Number of runs that are proposed at a time."""
+Execute = Callable[[Sequence[SweepJob]], Sequence[StoredRun]]
+"""Function that runs jobs, unless the store has their results, and returns their rows in order."""
+
+
+def find_boundary(
+    plan: SweepPlan,
+    axis: Axis,
+    execute: Execute,
+    *,
+    bound: float,
+    tolerance: float,
+    runs: int,
+    shown: Callable[[Boundary], None] = lambda boundary: None,
+) -> Boundary:
+    """Return the boundary of success along an interval; the other values are those of the first point of the plan.
+
+    bound      success rate at the boundary;  tolerance  half of the width of the interval at which the search ends
+    runs       maximum number of runs, with seeds 1, 2, 3 …
+    shown      function that gets the estimate after each batch
+
+    Runs without a verdict do not count. Raise SettingError if there is none in a batch.
+    """
+    search = BoundarySearch(axis.low, axis.high, bound)
+    started = 0
+    while started < runs:
+        values = search.proposals(min(BATCH, runs - started))
+        jobs = [
+            plan.job(started + row, {**plan.points[0], axis.name: value}, started + row + 1)
+            for row, value in enumerate(values)
+        ]
+        found = execute(jobs)
+        started += len(jobs)
+        verdicts = [
+            (value, run.status == PASSED) for value, run in zip(values, found, strict=True) if _has_verdict(run)
+        ]
+        if not verdicts:
+            raise _without_verdict(found)
+        for value, passed in verdicts:
+            search.add(value, passed)
+        boundary = search.estimate()
+        shown(boundary)
+        if is_found(boundary, tolerance):
+            break
+    return search.estimate()
+
+
+@dataclass(frozen=True)
+class Falsification:
+    """Result of a search for failures.
+
+    runs      number of runs;  failed  failed ones
+    failures  the most different failures, the first found first
+    least     run with the least objective; None without one
+    """
+
+    runs: int
+    failed: int
+    failures: tuple[StoredRun, ...]
+    least: StoredRun | None
+
+
+def falsify(
+    plan: SweepPlan,
+    axes: Sequence[Axis],
+    execute: Execute,
+    *,
+    runs: int,
+    objective: str | None = None,
+    shown_failures: int = 10,
+    seed: int = 1,
+    shown: Callable[[int, int], None] = lambda done, failed: None,
+) -> Falsification:
+    """Search a space for failed runs with Optuna's TPE sampler, and return the most different ones.
+
+    objective  metric or column of the result whose small values are near a failure, such as `min_distance.A.B.box`;
+               None: the least margin of all criteria with a value and a limit, relative to the limit
+    shown      function that gets the numbers of runs and of failures after each batch
+
+    Raise SettingError without Optuna, without axes, or if no run of a batch has a verdict or the objective.
+    """
+    if not axes:
+        raise SettingError(Diagnostic("--falsify without --vary", "give the axes of the space"))
+    optuna = _optuna()
+    sampler = optuna.samplers.TPESampler(
+        seed=seed, multivariate=True, constant_liar=True, warn_independent_sampling=False
+    )
+    study = optuna.create_study(sampler=sampler)
+    found: list[StoredRun] = []
+    while len(found) < runs:
+        trials = [study.ask(_distributions(optuna, axes)) for _ in range(min(BATCH, runs - len(found)))]
+        jobs = [
+            plan.job(len(found) + row, {**plan.points[0], **_values(axes, trial.params)}, plan.seeds[0])
+            for row, trial in enumerate(trials)
+        ]
+        rows = execute(jobs)
+        if not any(_has_verdict(row) for row in rows):
+            raise _without_verdict(rows)
+        for trial, row in zip(trials, rows, strict=True):
+            value = _objective(row, objective) if _has_verdict(row) else None
+            if value is None:
+                study.tell(trial, state=optuna.trial.TrialState.FAIL)
+            else:
+                study.tell(trial, value)
+        found += rows
+        if objective is not None and not any(objective in row.result for row in found):
+            known = sorted({name for row in found for name, value in row.result.items() if _is_number(value)})
+            raise SettingError(Diagnostic(f"--objective: no run has {objective!r}", f"known: {', '.join(known)}"))
+        shown(len(found), sum(row.status == FAILED for row in found))
+    failed = [row for row in found if row.status == FAILED]
+    valued = [(value, row) for row in found if (value := _objective(row, objective)) is not None]
+    least = min(valued, key=lambda pair: pair[0])[1] if valued else None
+    return Falsification(len(found), len(failed), tuple(most_different(failed, axes, shown_failures)), least)
+
+
+def most_different(runs: Sequence[StoredRun], axes: Sequence[Axis], count: int) -> list[StoredRun]:
+    """Return `count` runs that are far from each other, the first one first (farthest point sampling).
+
+    Distances are those of the shares of the intervals; different values of a list have the distance 1.
+    """
+    if len(runs) <= count:
+        return list(runs)
+    places = np.array([_place(run.point, axes) for run in runs])
+    chosen = [0]
+    away = _distances(places, places[0])
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, _distances(places, places[chosen[-1]]))
+    return [runs[row] for row in chosen]
+
+
+def _place(point: Point, axes: Sequence[Axis]) -> list[float]:
+    """Return the coordinates of a point: one for an interval, one for each value of a list."""
+    found: list[float] = []
+    for axis in axes:
+        value = point[axis.name]
+        if axis.is_interval:
+            found.append((float(value) - axis.low) / (axis.high - axis.low))
+        else:
+            found += [float(value == one) / np.sqrt(2.0) for one in axis.values]
+    return found
+
+
+def _distances(places: Array, place: Array) -> Array:
+    return np.asarray(np.linalg.norm(places - place, axis=1))
+
+
+def _objective(run: StoredRun, name: str | None) -> float | None:
+    if name is not None:
+        value: Any = run.result.get(name)
+        return float(value) if _is_number(value) else None
+    margins = [_margin(run, key.removesuffix(".passed")) for key in run.result if key.endswith(".passed")]
+    return min(margins, default=None)
+
+
+def _margin(run: StoredRun, criterion: str) -> float:
+    """Return the margin of a criterion: distance of its value from its limit over the limit, negative if it failed."""
+    passed = bool(run.result[f"{criterion}.passed"])
+    value: Any = run.result.get(f"{criterion}.value")
+    limit: Any = run.result.get(f"{criterion}.limit")
+    margin = 1.0
+    if _is_number(value) and _is_number(limit) and limit != 0:
+        margin = abs((value - limit) / limit)
+    return margin if passed else -margin
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _distributions(optuna: Any, axes: Sequence[Axis]) -> dict[str, Any]:
+    kinds = optuna.distributions
+    return {
+        axis.name: kinds.FloatDistribution(axis.low, axis.high)
+        if axis.is_interval
+        else kinds.CategoricalDistribution(axis.values)
+        for axis in axes
+    }
+
+
+def _values(axes: Sequence[Axis], params: dict[str, Any]) -> dict[str, Scalar]:
+    return {axis.name: params[axis.name] for axis in axes}
+
+
+def _has_verdict(run: StoredRun) -> bool:
+    return run.status in (PASSED, FAILED)
+
+
+def _without_verdict(runs: Sequence[StoredRun]) -> SettingError:
+    return SettingError(Diagnostic(f"no run has a verdict: {runs[0].status}: {runs[0].error}", "correct the settings"))
+
+
+def _optuna() -> Any:
+    try:
+        optuna = import_module("optuna")
+    except ImportError as error:
+        hint = "install it: pip install 'eidrive-scenario[search]'"
+        raise SettingError(Diagnostic("optuna is not installed", hint)) from error
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    return optuna
