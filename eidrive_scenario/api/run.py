@@ -7,6 +7,7 @@ from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, PASSED
 from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.experiments.sweeps.results import read_results
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, read_recording
@@ -32,6 +33,7 @@ __all__ = [
     "load_for_seed",
     "load_scenario",
     "read_recording",
+    "read_results",
     "run_and_save",
     "run_file",
     "text_of_csv",

@@ -6,6 +6,7 @@ interruptions: known results are taken from the store.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -105,9 +106,9 @@ def falsify(
     if not axes:
         raise SettingError(Diagnostic("--falsify without --vary", "give the axes of the space"))
     optuna = _optuna()
-    sampler = optuna.samplers.TPESampler(
-        seed=seed, multivariate=True, constant_liar=True, warn_independent_sampling=False
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of the options of the sampler
+        sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
     study = optuna.create_study(sampler=sampler)
     found: list[StoredRun] = []
     while len(found) < runs:

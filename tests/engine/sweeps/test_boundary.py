@@ -1,0 +1,84 @@
+"""Search of a boundary of success with simulated outcomes of known rates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import expit
+
+from eidrive_scenario.experiments.sweeps.boundary import Boundary, BoundarySearch, is_found
+from eidrive_scenario.randomness import generator
+
+
+def searched(
+    seed: int, runs: int, rate_at: object, *, low: float = 0.0, high: float = 1.0, bound: float = 0.5
+) -> Boundary:
+    """Return the estimate after runs whose success rate is `rate_at(x)`."""
+    assert callable(rate_at)
+    rng, search = generator(seed, "boundary"), BoundarySearch(low, high, bound)
+    while search.runs < runs:
+        for x in search.proposals(8):
+            search.add(x, bool(rng.random() < rate_at(x)))
+    return search.estimate()
+
+
+def falling(x: float) -> float:
+    """Return the rate of a curve with the boundary 0.37 and the width 0.05."""
+    return float(expit(-(x - 0.37) / 0.05))
+
+
+@pytest.mark.parametrize(("runs", "error"), [(40, 0.0267), (80, 0.0172)])
+def test_error_is_at_most_that_of_probabilistic_bisection(runs: int, error: float) -> None:
+    """Root mean square errors of probabilistic bisection on the same curve, from 400 repetitions in other code."""
+    found = [searched(seed, runs, falling).value - 0.37 for seed in range(30)]
+    assert math.sqrt(np.mean(np.square(found))) <= 1.25 * error
+
+
+def test_interval_covers_boundary() -> None:
+    """30 searches of 80 runs: 95 % credible intervals contain the boundary in at least 85 % of them."""
+    found = [searched(seed, 80, falling) for seed in range(100, 130)]
+    assert np.mean([one.low <= 0.37 <= one.high for one in found]) >= 0.85
+
+
+def test_sharp_boundary_needs_few_runs() -> None:
+    """A step at 0.113 within ±0.02 after at most 40 runs; a grid of this resolution has 26 values of several runs."""
+    for seed in range(8):
+        found = searched(seed, 40, lambda x: float(x < 0.113))
+        assert abs(found.value - 0.113) <= 0.02
+        assert is_found(found, 0.02)
+        assert found.rising < 0.01
+
+
+def test_rising_rate_and_other_range_are_found() -> None:
+    found = searched(1, 80, lambda x: float(expit((x - 8.0) / 0.2)), low=6.0, high=12.0)
+    assert found.value == pytest.approx(8.0, abs=0.3)
+    assert found.rising > 0.99
+
+
+def test_bound_selects_other_place_of_curve() -> None:
+    """The rate of 0.9 is at 0.37 - 0.05 ln 9 = 0.260."""
+    found = [searched(seed, 160, falling, bound=0.9) for seed in range(10)]
+    assert np.median([one.value for one in found]) == pytest.approx(0.26, abs=0.02)
+
+
+@pytest.mark.parametrize("always", [True, False])
+def test_constant_outcome_has_no_boundary_in_range(always: bool) -> None:
+    found = searched(1, 64, lambda x: float(always))
+    assert found.inside < 0.5
+    assert not is_found(found, 0.1)
+
+
+def test_lapses_do_not_move_boundary() -> None:
+    """One outcome in twenty is random; the median of ten searches is at the boundary."""
+    found = [searched(seed, 120, lambda x: 0.025 + 0.95 * float(x < 0.6)).value for seed in range(10)]
+    assert np.median(found) == pytest.approx(0.6, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "bound"), [(1.0, 1.0, 0.5), (2.0, 1.0, 0.5), (0.0, math.inf, 0.5), (0, 1, 1.0)]
+)
+def test_invalid_search_raises(low: float, high: float, bound: float) -> None:
+    with pytest.raises(ValueError, match="not"):
+        BoundarySearch(low, high, bound)

@@ -1,0 +1,158 @@
+"""Results of sweeps: summaries, exports, and the commands of the command line."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from command_fixtures import Eidrive, eidrive
+
+from eidrive_scenario.api.run import read_results
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.experiments.statistics.proportions import anytime_interval, wilson
+from eidrive_scenario.experiments.sweeps.results import summaries, write_parquet
+from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
+
+__all__ = ["eidrive"]
+
+
+def run(number: int, status: str, **point: str | float) -> StoredRun:
+    ended = status in ("passed", "failed")
+    result = {"passed": status == "passed", "distance": 1.5 * number, "note": "=1+1"} if ended else {}
+    return StoredRun(f"{number:064}", number, "s", None, number, status, dict(point), result, "", f"run {number}", 0.1)
+
+
+RUNS = [
+    run(0, "passed", Speed=5, detector="oracle"),
+    run(1, "failed", Speed=5, detector="ssd"),
+    run(2, "passed", Speed=5, detector="oracle"),
+    run(3, "crashed", Speed=8, detector="oracle"),
+]
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    path = tmp_path / "s.db"
+    with ResultStore.open(path, {"numpy": "2"}) as opened:
+        for one in RUNS:
+            opened.add(one)
+    return path
+
+
+def test_summaries_group_by_all_or_some_axes() -> None:
+    rows = summaries(RUNS)
+    assert [(row.point["Speed"], row.point["detector"], row.counts) for row in rows] == [
+        (5, "oracle", {"passed": 2}),
+        (5, "ssd", {"failed": 1}),
+        (8, "oracle", {"crashed": 1}),
+    ]
+    assert rows[2].rate is None
+    first, second = summaries(RUNS, by=["Speed"], interval="wilson")
+    assert first.counts == {"passed": 2, "failed": 1}
+    assert first.rate == wilson(2, 3)
+    assert second.counts == {"crashed": 1}
+    assert summaries(RUNS, by=[])[0].rate == anytime_interval(2, 3)
+
+
+@pytest.mark.parametrize(("options", "expected"), [({"by": ["Sped"]}, "Sped"), ({"interval": "normal"}, "normal")])
+def test_summaries_with_unknown_names_raise(options: dict[str, object], expected: str) -> None:
+    with pytest.raises(SettingError, match=expected):
+        summaries(RUNS, **options)  # type: ignore[arg-type]
+
+
+def test_read_results_has_one_row_per_run(store: Path) -> None:
+    pytest.importorskip("pandas")
+    table = read_results(store)
+    assert len(table) == 4
+    assert table["vary.Speed"].tolist() == [5, 5, 5, 8]
+    assert table.loc[table["status"] == "passed", "distance"].tolist() == [0.0, 3.0]
+    assert table.groupby("vary.detector")["passed"].sum().to_dict() == {"oracle": 2, "ssd": 0}
+
+
+def test_parquet_keeps_numbers_and_missing_values(store: Path, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    with ResultStore.read(store) as opened:
+        write_parquet(opened.runs(), tmp_path / "r.parquet")
+    columns = parquet.read_table(tmp_path / "r.parquet").to_pydict()
+    assert columns["distance"] == [0.0, 1.5, 3.0, None]
+    assert columns["vary.Speed"] == [5, 5, 5, 8]
+
+
+def test_results_prints_table_and_exports(eidrive: Eidrive, store: Path, tmp_path: Path) -> None:
+    done = eidrive("results", store, "--by", "detector", "--csv", tmp_path / "r.csv")
+    assert done.exit_code == 0
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert lines[0][:5] == ["detector", "runs", "passed", "crashed", "failed"]
+    assert lines[1][:6] == ["oracle", "3", "2", "1", "0", "100.0%"]
+    with (tmp_path / "r.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["distance"] for row in rows] == ["0.0", "1.5", "3.0", ""]
+    assert rows[0]["note"] == "'=1+1"
+
+
+def test_results_as_json_and_failures(eidrive: Eidrive, store: Path) -> None:
+    rows = [json.loads(line) for line in eidrive("results", store, "--json").stdout.splitlines()]
+    assert rows[0]["point"] == {"Speed": 5, "detector": "oracle"}
+    assert (rows[0]["success_rate"], rows[0]["runs"]) == (1.0, {"passed": 2})
+    failures = eidrive("results", store, "--failures").stdout.splitlines()
+    assert failures == ["failed: run 1", "crashed: run 3"]
+
+
+def test_results_combine_stores(eidrive: Eidrive, store: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.db"
+    with ResultStore.open(other, {"numpy": "2"}) as opened:
+        opened.add(RUNS[0])
+        opened.add(run(9, "passed", Speed=5, detector="ssd"))
+    done = eidrive("results", store, other, "--by", "detector", "--json")
+    counts = {row["point"]["detector"]: row["runs"] for row in map(json.loads, done.stdout.splitlines())}
+    assert counts == {"oracle": {"passed": 2, "crashed": 1}, "ssd": {"failed": 1, "passed": 1}}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("results", "no.db"), "no such store"),
+        (("sweep", "{scenario}", "--store", "s.db", "--vary", "Speed"), "--vary"),
+        (("sweep", "{scenario}", "--store", "s.db", "--vary", "Speed=1:2"), "interval in a grid"),
+        (("sweep", "{scenario}", "--store", "s.db", "--seeds", "3-1"), "--seeds"),
+        (("sweep", "{scenario}", "--store", "s.db", "--shard", "3/2"), "--shard"),
+        (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1,2"), "no interval"),
+        (("sweep", "{scenario}", "--store", "s.db", "--falsify"), "without --vary"),
+        (("sweep", "{scenario}", "--store", "s.db", "--vary", "channel.delay.seconds=0,1"), "no channel"),
+        (("sweep", "no_such_scenario", "--store", "s.db"), "no_such_scenario"),
+        (("sweep", "{scenario}", "--store", "{folder}"), "not a regular file"),
+    ],
+)
+def test_invalid_commands_are_clear_errors(
+    eidrive: Eidrive, scenario: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], expected: str
+) -> None:
+    monkeypatch.chdir(scenario.parent)
+    given = [one.format(scenario=scenario, folder=scenario.parent) for one in arguments]
+    done = eidrive(*given)
+    assert done.exit_code == 2
+    assert expected in done.stderr
+
+
+def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    arguments = ("sweep", scenario, "--vary", "Speed=10,30", "--store", tmp_path / "s.db", "--workers", "1")
+    assert eidrive(*arguments, "--dry-run").stdout.splitlines() == [
+        f"2 runs of {scenario}: 2 combinations, 1 seeds each",
+        "  Speed=10",
+        "  Speed=30",
+    ]
+    first = eidrive(*arguments)
+    assert first.exit_code == 0
+    assert "1 failed, 1 passed" in first.stdout
+    assert "2 already in the store" in eidrive(*arguments).stdout
+
+
+def test_find_boundary_command_prints_value(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    """The limit of the criterion is 20 m/s."""
+    options = ("--find-boundary", "Speed=10:30", "--tolerance", "0.5", "--store", tmp_path / "s.db", "--workers", "1")
+    done = eidrive("sweep", scenario, *options)
+    assert done.exit_code == 0
+    value = float(done.stdout.split(" at ")[1].split()[0])
+    assert value == pytest.approx(20.0, abs=0.5)
+    assert "falls through 0.5" in done.stdout
