@@ -60,7 +60,7 @@ class Search:
             return cls(None, bound, math.nan, space, fixed, objective, most)
         axis = parse_axis(boundary)
         if not axis.is_interval:
-            raise SettingError(Diagnostic(f"--find-boundary: {axis.name} is no interval", "expected NAME=LOW:HIGH"))
+            raise SettingError(Diagnostic(f"--find-boundary: {axis.name} is not an interval", "expected NAME=LOW:HIGH"))
         if space:
             hint = "give each axis of --vary one value, or use a sweep for each"
             raise SettingError(Diagnostic(f"--find-boundary: {space[0].name} varies, too", hint))

@@ -50,11 +50,11 @@ def anytime_interval(successes: int, trials: int, confidence: float = 0.95) -> P
     """Return a proportion with the interval of a confidence sequence.
 
     The intervals after 1, 2, 3 … runs all cover the true proportion at the same time with at least this confidence, so
-    that somebody may look at them while runs are added, and stop at any time. It contains all p for which the mixture
-    of the likelihood over a uniform prior is less than 1 / alpha times the likelihood of p (Robbins, Statistical
-    methods related to the law of the iterated logarithm, 1970; Howard et al., Time-uniform, nonparametric,
-    nonasymptotic confidence sequences, Annals of Statistics 49(2), 2021). Without a run it is 0 to 1. Errors as for
-    `wilson`.
+    that they are valid while runs are added, and a series may be stopped because of them. The interval contains all p
+    for which the mixture of the likelihood over a uniform prior is less than 1 / alpha times the likelihood of p
+    (Robbins, Statistical methods related to the law of the iterated logarithm, 1970; Howard et al., Time-uniform,
+    nonparametric, nonasymptotic confidence sequences, Annals of Statistics 49(2), 2021). Without a run it is 0 to 1.
+    Errors as for `wilson`.
     """
     if trials == 0 and successes == 0:
         _check(0, 1, confidence)

@@ -95,7 +95,7 @@ def as_table(runs: Iterable[StoredRun]) -> tuple[list[str], list[dict[str, Any]]
 def read_results(*stores: str | Path) -> Any:
     """Return the runs of one or several stores as a pandas DataFrame, one row per run.
 
-    Raise SettingError if a file is no store, or without pandas.
+    Raise SettingError if a file is not a store, or without pandas.
     """
     pandas = _library("pandas")
     names, rows = as_table(stored_runs([Path(store) for store in stores]))

@@ -82,7 +82,7 @@ class ResultStore:
 
         versions  versions of the packages that affect results: a store contains results of one set of them
 
-        Raise SettingError if the file cannot be written, is no store, or is one of other versions, or if another
+        Raise SettingError if the file cannot be written, is not a store, or is one of other versions, or if another
         process writes it.
         """
         if path.exists() and not path.is_file():
@@ -203,7 +203,7 @@ def _is_empty(connection: sqlite3.Connection) -> bool:
 def _check_format(path: Path, connection: sqlite3.Connection) -> None:
     application = connection.execute("PRAGMA application_id").fetchone()[0]
     if application != APPLICATION:
-        raise _error("the file is no store of a sweep", "give a new file", path)
+        raise _error("the file is not a store of a sweep", "give a new file", path)
     held = connection.execute("PRAGMA user_version").fetchone()[0]
     if held != FORMAT:
         hint = "read it with the version that wrote it, or give a new file"

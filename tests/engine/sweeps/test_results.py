@@ -118,7 +118,7 @@ def test_results_combine_stores(eidrive: Eidrive, store: Path, tmp_path: Path) -
         (("sweep", "{scenario}", "--store", "s.db", "--vary", "Speed=1:2"), "interval in a grid"),
         (("sweep", "{scenario}", "--store", "s.db", "--seeds", "3-1"), "--seeds"),
         (("sweep", "{scenario}", "--store", "s.db", "--shard", "3/2"), "--shard"),
-        (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1,2"), "no interval"),
+        (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1,2"), "not an interval"),
         (("sweep", "{scenario}", "--store", "s.db", "--falsify"), "without --vary"),
         (("sweep", "{scenario}", "--store", "s.db", "--vary", "channel.delay.seconds=0,1"), "no channel"),
         (("sweep", "no_such_scenario", "--store", "s.db"), "no_such_scenario"),
