@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.check import check
+from eidrive_scenario.cli.compare import compare
 from eidrive_scenario.cli.error_output import Guarded, print_error
 from eidrive_scenario.cli.reproduce import reproduce
 from eidrive_scenario.cli.run import run
@@ -35,6 +36,7 @@ app.command()(view)
 app.command()(report)
 app.command()(sweep)
 app.command()(results)
+app.command()(compare)
 app.command()(reproduce)
 
 
