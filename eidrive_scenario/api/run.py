@@ -7,6 +7,8 @@ from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, PASSED
 from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.experiments.statistics.sequential import success_rate
+from eidrive_scenario.experiments.success_rate import RateVerdict
 from eidrive_scenario.experiments.sweeps.results import read_results
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording.frame import Frame
@@ -23,6 +25,7 @@ __all__ = [
     "CheckReport",
     "Frame",
     "Observer",
+    "RateVerdict",
     "Recording",
     "RunResult",
     "RunSettings",
@@ -36,5 +39,6 @@ __all__ = [
     "read_results",
     "run_and_save",
     "run_file",
+    "success_rate",
     "text_of_csv",
 ]

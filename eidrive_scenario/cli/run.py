@@ -59,6 +59,14 @@ def run(
     criterion: Criteria = None,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with consecutive seeds from --seed.")] = 1,
+    success_rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATE",
+            help="Run seeds until they show whether the success rate is at least RATE; at most --repeat, or 500.",
+        ),
+    ] = None,
+    confidence: Annotated[float, typer.Option(help="Confidence of --success-rate.")] = 0.95,
     max_runs: Annotated[
         int | None,
         typer.Option(min=1, help="Maximum runs of a distribution, spread over its values.", show_default="all"),
@@ -94,6 +102,7 @@ def run(
 ) -> None:
     """Run and evaluate a scenario, or all runs of a parameter value distribution."""
     from eidrive_scenario.cli.batch import run_distribution
+    from eidrive_scenario.cli.rate import decision_code, rate_test
     from eidrive_scenario.cli.verdicts import show, show_warnings
     from eidrive_scenario.experiments.commands import reproduction_lines
     from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
@@ -131,11 +140,16 @@ def run(
         allow_torchscript=allow_torchscript,
     )
 
+    test = None if success_rate is None else rate_test(success_rate, confidence, repeat)
+    most = repeat if test is None else test.limit
+
     def run_seeds(source: Path | ConcreteRun) -> list[int]:
         codes: list[int] = []
         parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
-        for each in range(seed, seed + repeat):
-            suffixes = [*parts, f"seed-{each}"] if repeat > 1 else parts
+        for each in range(seed, seed + most):
+            if test is not None and (decided := decision_code(test, codes, json=json)) is not None:
+                return [decided]
+            suffixes = [*parts, f"seed-{each}"] if most > 1 else parts
             explanations = [Explanation(name) for name in explain or ()]
             failures.begin(each, None if isinstance(source, Path) else source.number)
             try:
@@ -172,14 +186,22 @@ def run(
             for explanation in explanations:
                 typer.echo("\n".join(explanation.lines()), err=json)
             codes.append(result.exit_code)
-        return codes
+        decided = None if test is None else decision_code(test, codes, json=json)
+        return codes if decided is None else [decided]
 
     path = resolve_scenario(scenario)
     written = {"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}
     check_output_paths(written, (path, channel, weather, *stacks.values(), *(criterion or ())))
     if definition(path) == "distribution":
         raise typer.Exit(
-            run_distribution(path, run_seeds, seed=seed, repeat=repeat, max_runs=max_runs, parameters=parameters)
+            run_distribution(
+                path,
+                run_seeds,
+                seed=seed,
+                repeat=repeat if test is None else 1,
+                max_runs=max_runs,
+                parameters=parameters,
+            )
         )
     if max_runs is not None:
         raise SettingError(

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
 
@@ -14,13 +14,22 @@ from eidrive_scenario.errors import ExtensionError, InputError, SimulationError,
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.library import definition, library_path, resolve_scenario
 from eidrive_scenario.pytest_plugin.options import MarkerSettings, RunVariant, run_variants
-from eidrive_scenario.pytest_plugin.outcome import explain, path_beside, properties, run_variant
+from eidrive_scenario.pytest_plugin.outcome import (
+    explain,
+    explain_rate,
+    path_beside,
+    properties,
+    rate_properties,
+    run_variant,
+)
 
 if TYPE_CHECKING:
+    from eidrive_scenario.experiments.statistics.sequential import RatioTest
+    from eidrive_scenario.experiments.success_rate import RateVerdict
     from eidrive_scenario.openscenario import Source
     from eidrive_scenario.simulation import RunResult
 
-_KEYWORDS = ("channel", "seeds", "drive", "criteria")
+_KEYWORDS = ("channel", "seeds", "success_rate", "drive", "criteria")
 
 
 @dataclass(frozen=True)
@@ -41,7 +50,7 @@ class RunScenario(Protocol):
         channel: str | None = None,
         seed: int | None = None,
         **settings: object,
-    ) -> RunResult: ...
+    ) -> Any: ...
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -58,11 +67,13 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         if sum(own.name == marker.name for own in metafunc.definition.own_markers) > 1:
             raise ValueError('several markers scenario (expected one with all patterns: scenario("a.xosc", "b.xosc"))')
         channels, seeds = _read_marker(marker)
+        rate = _read_rate(marker)
         added = _added(marker, metafunc.definition.path.parent)
         paths = [path for pattern in marker.args for path in _matches(pattern, metafunc)]
     except ValueError as error:
         raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {error}", pytrace=False) from None
-    cases = [Case(path, variant) for path in paths for variant in run_variants(metafunc.config, channels, seeds, added)]
+    variants = list(run_variants(metafunc.config, channels, seeds, added, rate))
+    cases = [Case(path, variant) for path in paths for variant in variants]
     metafunc.parametrize(
         "run_scenario", cases, indirect=True, ids=[f"{case.source.stem}-{case.variant}" for case in cases]
     )
@@ -86,6 +97,22 @@ def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]
     if seeds is not None and (not isinstance(seeds, int) or isinstance(seeds, bool) or seeds < 1):
         raise ValueError(f"seeds: not a positive number of seeds (got {seeds!r})")
     return channels, seeds
+
+
+def _read_rate(marker: pytest.Mark) -> RatioTest | None:
+    """Return the test of the success rate. Raise ValueError for another value."""
+    given = marker.kwargs.get("success_rate")
+    if given is None:
+        return None
+    from eidrive_scenario.experiments.statistics.sequential import RatioTest, success_rate
+
+    if isinstance(given, RatioTest):
+        return given
+    if marker.kwargs.get("seeds") is not None:
+        raise ValueError("marker scenario: seeds and success_rate exclude each other")
+    if not isinstance(given, float):
+        raise ValueError(f"success_rate: not a rate (got {given!r}; expected 0.9 or success_rate(at_least=0.9))")
+    return success_rate(given)
 
 
 def _added(marker: pytest.Mark, folder: Path) -> MarkerSettings:
@@ -118,7 +145,8 @@ def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
 def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
     """Return a function that runs a scenario, adds its numbers to the test report and returns its RunResult.
 
-    In a test with the marker `scenario` the function is called without arguments. Other scenarios are run by
+    In a test with the marker `scenario` the function is called without arguments. With `success_rate` in the marker it
+    runs the seeds 1, 2, 3 … and returns a RateVerdict, whose `passed` is the verdict. Other scenarios are run by
     `run_scenario("coop/scenario_1", channel="none", seed=3)`; further keywords are fields of RunSettings. Instead of a
     name, every source of load_scenario is valid, for example a Scenario of scenariogeneration.
 
@@ -130,7 +158,7 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
 
     def run(
         source: Source | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
-    ) -> RunResult:
+    ) -> RunResult | RateVerdict:
         __tracebackhide__ = True  # a failure shows the calling line of the test
         source = case.source if source is None and case is not None else source
         if source is None:
@@ -143,9 +171,12 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             variant.seed if seed is None else seed,
             replaced,
             added=variant.added,
+            rate=variant.rate if seed is None else None,
         )
         try:
             source = resolve_scenario(source) if isinstance(source, str | Path) else source
+            if variant.rate is not None:
+                return _rate_verdict(request.node, source, variant, settings)
             result = run_variant(request.node, source, variant, **settings)
         except InputError as error:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
@@ -161,6 +192,19 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
         return result
 
     return run
+
+
+def _rate_verdict(
+    item: pytest.Item, source: Source, variant: RunVariant, settings: Mapping[str, object]
+) -> RateVerdict:
+    """Run the seeds of a test of the success rate, and add the verdict to the report of the test."""
+    from eidrive_scenario.experiments.success_rate import decide_rate
+
+    verdict = decide_rate(lambda seed: run_variant(item, source, replace(variant, seed=seed), **settings), variant.rate)
+    item.user_properties.extend(rate_properties(verdict))
+    if not verdict.passed:
+        item.add_report_section("call", "eidrive", explain_rate(verdict))
+    return verdict
 
 
 def _from_file(trace: TracebackType | None, file: str) -> TracebackType | None:

@@ -12,6 +12,7 @@ from eidrive_scenario.pytest_plugin.options import RunVariant
 from eidrive_scenario.pytest_plugin.outcome import ScenarioFailed, failure_text, run_file_and_report
 
 if TYPE_CHECKING:
+    from eidrive_scenario.experiments.success_rate import RateVerdict
     from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.simulation import RunResult
 
@@ -29,7 +30,7 @@ class ScenarioItem(pytest.Item):
         super().__init__(**named)
         self.variant = variant
         self.run = run
-        self._result: RunResult | None = None
+        self._result: RunResult | RateVerdict | None = None
 
     def setup(self) -> None:
         """Run the scenario and record its properties. Raise a pytest exception with the diagnostics of an error."""
@@ -48,7 +49,7 @@ class ScenarioItem(pytest.Item):
             raise pytest.fail.Exception(text, pytrace=False) from None
 
     def runtest(self) -> None:
-        """Raise ScenarioFailed if a criterion failed or the simulated time ran out."""
+        """Raise ScenarioFailed if a criterion failed, the simulated time ran out, or the success rate is not shown."""
         if self._result is not None and not self._result.passed:
             raise ScenarioFailed(self._result)
 

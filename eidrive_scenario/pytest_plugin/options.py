@@ -14,14 +14,15 @@ import pytest
 from eidrive_scenario.pytest_plugin import hung_runs
 
 MARKER = (
-    "scenario(pattern, channel=None, seeds=None, drive=None, criteria=None): run the test once for every scenario that "
-    "matches the pattern (beside the test file, below the root, or in the library), channel and seed, through the "
-    "fixture run_scenario; drive and criteria are those of RunSettings"
+    "scenario(pattern, channel=None, seeds=None, success_rate=None, drive=None, criteria=None): run the test once for "
+    "every scenario that matches the pattern (beside the test file, below the root, or in the library), channel and "
+    "seed, through the fixture run_scenario; success_rate: run seeds until a sequential test decides; drive and "
+    "criteria are those of RunSettings"
 )
 _DEFAULT_MAX_RUNS = 100
 _MAX_LENGTH = 80
 """Maximum number of characters of a channel in the name of a test."""
-_SHOWN = ("channel", "drive", "criterion", "detector", "planner", "seeds", "out")
+_SHOWN = ("channel", "drive", "criterion", "detector", "planner", "seeds", "success_rate", "out")
 """Options that the header of a report lists."""
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _WORKER_KEY = "eidrive_given"
@@ -51,6 +52,7 @@ class RunVariant:
     replaced  warnings about options that replace lists of the marker of the test
     label     channel in the name of the test, if its short name is not unique
     added     driving stacks and criteria of the marker of the test
+    rate      sequential test of the success rate over seeds, a RatioTest; None for a single run
     """
 
     channel: str | None
@@ -58,10 +60,11 @@ class RunVariant:
     replaced: tuple[str, ...] = ()
     label: str = ""
     added: MarkerSettings = _NOTHING
+    rate: Any = None
 
     def __str__(self) -> str:
         channel = [] if self.channel is None else [self.label or _short(self.channel)]
-        return "-".join([*channel, f"seed{self.seed}"])
+        return "-".join([*channel, f"seed{self.seed}" if self.rate is None else f"rate{self.rate.bad:g}"])
 
 
 def _short(channel: str) -> str:
@@ -82,6 +85,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption(
         "--eidrive-seeds", metavar="N", type=_count, help="run each scenario with the seeds 1 to N (default: 1)"
+    )
+    group.addoption(
+        "--eidrive-success-rate",
+        metavar="RATE",
+        type=_rate,
+        help="run each scenario with the seeds 1, 2, 3 … until they show whether its success rate is at least RATE "
+        "with a confidence of 95 %%; a test is undecided and fails after 500 runs",
     )
     group.addoption(
         "--eidrive-drive",
@@ -123,6 +133,16 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise ArgumentTypeError(f"not a positive integer (got {text!r})")
     return int(text)
+
+
+def _rate(text: str) -> Any:
+    """Return the test of a success rate."""
+    from eidrive_scenario.experiments.statistics.sequential import success_rate
+
+    try:
+        return success_rate(float(text))
+    except ValueError as error:
+        raise ArgumentTypeError(f"not a rate between 0 and 1 (got {text!r})") from error
 
 
 def _count_or_all(text: str) -> int | None:
@@ -167,6 +187,8 @@ def pytest_report_header(config: pytest.Config) -> str | None:
     """Return the options with a value, or None."""
     options = {name: config.getoption(f"eidrive_{name}") for name in _SHOWN}
     options = {name: ",".join(value) if isinstance(value, list) else value for name, value in options.items()}
+    if options["success_rate"] is not None:
+        options["success_rate"] = f"{options['success_rate'].bad:g}"
     given = [f"{name} {value}" for name, value in options.items() if value is not None]
     return f"eidrive: {', '.join(given)}" if given else None
 
@@ -176,8 +198,12 @@ def run_variants(
     channels: Sequence[str] | None = None,
     seeds: int | None = None,
     added: MarkerSettings = _NOTHING,
+    rate: Any = None,
 ) -> Iterator[RunVariant]:
-    """Yield every channel with every seed. The command line overrides `channels` and `seeds` of the marker."""
+    """Yield every channel with every seed, or once with a sequential test of the success rate.
+
+    The command line overrides `channels`, `seeds` and `rate` of the marker.
+    """
     given = config.getoption("eidrive_channel")
     names: Sequence[str | None] = _channels(",".join(given)) if given else []
     option = config.getoption("eidrive_seeds")
@@ -192,7 +218,11 @@ def run_variants(
         if name in added.driven:
             replaced.append(f"--eidrive-drive {name} replaces the driving stack of {name!r} in the marker")
     chosen = names or channels or (None,)
+    tested = config.getoption("eidrive_success_rate") or rate
     for channel, label in zip(chosen, _labels(chosen), strict=True):
+        if tested is not None:
+            yield RunVariant(channel, 1, tuple(replaced), label, added, tested)
+            continue
         for seed in range(1, (option or seeds or 1) + 1):
             yield RunVariant(channel, seed, tuple(replaced), label, added)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +18,14 @@ from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
 if TYPE_CHECKING:
     from eidrive_scenario.evaluation import Verdict
+    from eidrive_scenario.experiments.success_rate import RateVerdict
     from eidrive_scenario.openscenario import ConcreteRun, Source
     from eidrive_scenario.simulation import RunResult
 
 Properties = list[tuple[str, object]]
 
+_SHOWN_FAILURES = 5
+"""Number of failed runs that a failed test of the success rate explains."""
 WARNING = "warning"
 """Name of the properties with the warnings of a run."""
 
@@ -30,17 +33,30 @@ WARNING = "warning"
 class ScenarioFailed(Exception):
     """Failed verdict of a run."""
 
-    def __init__(self, result: RunResult) -> None:
-        super().__init__(explain(result))
+    def __init__(self, result: RunResult | RateVerdict) -> None:
+        super().__init__(explain_outcome(result))
         self.result = result
 
 
 def run_file_and_report(
     item: pytest.Item, source: Path, variant: RunVariant, run: ConcreteRun | None = None
-) -> RunResult:
-    """Run the scenario of a test, or one run of its distribution, and record its properties. Raise InputError."""
-    result = _run_and_report(item.config, source, run or source, variant, {})
-    item.user_properties.extend(properties(result))
+) -> RunResult | RateVerdict:
+    """Run the scenario of a test, or one run of its distribution, and record its properties. Raise InputError.
+
+    A test of the success rate runs one seed after the other until it decides.
+    """
+    result: RunResult | RateVerdict
+    if variant.rate is None:
+        result = _run_and_report(item.config, source, run or source, variant, {})
+        item.user_properties.extend(properties(result))
+    else:
+        from eidrive_scenario.experiments.success_rate import decide_rate
+
+        result = decide_rate(
+            lambda seed: _run_and_report(item.config, source, run or source, replace(variant, seed=seed), {}),
+            variant.rate,
+        )
+        item.user_properties.extend(rate_properties(result))
     if run is not None:
         item.user_properties.extend((f"parameter.{name}", value) for name, value in run.parameters.items())
     return result
@@ -163,6 +179,35 @@ def setting_properties(settings: ResolvedSettings) -> Properties:
         plain = isinstance(value, str | int | float) and not isinstance(value, bool)
         entries.append((f"settings.{name}", value if plain else canonical_json(value)))
     return [*entries, ("settings_sha256", settings.digest)]
+
+
+def rate_properties(verdict: RateVerdict) -> Properties:
+    """Return the report properties of a test of the success rate."""
+    rate = verdict.rate
+    return [
+        ("success_rate.decision", str(verdict.decision)),
+        ("success_rate.at_least", verdict.test.bad),
+        ("success_rate.confidence", 1.0 - verdict.test.false_pass),
+        ("success_rate.passed_runs", rate.successes),
+        ("success_rate.runs", rate.trials),
+        ("success_rate.low", rate.low),
+        ("success_rate.high", rate.high),
+        ("success_rate.failed_seeds", ",".join(str(failure.seed) for failure in verdict.failures)),
+    ]
+
+
+def explain_rate(verdict: RateVerdict) -> str:
+    """Return the reason of a failed or undecided test of the success rate, with its first failed runs."""
+    shown = [explain(failure) for failure in verdict.failures[:_SHOWN_FAILURES]]
+    more = len(verdict.failures) - len(shown)
+    return "\n\n".join([str(verdict), *shown, *([f"and {more} more failed runs"] if more else [])])
+
+
+def explain_outcome(result: RunResult | RateVerdict) -> str:
+    """Return the reason of a failed run, or of a failed test of the success rate."""
+    from eidrive_scenario.simulation import RunResult
+
+    return explain(result) if isinstance(result, RunResult) else explain_rate(result)
 
 
 def explain(result: RunResult) -> str:

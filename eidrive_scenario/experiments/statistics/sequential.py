@@ -119,10 +119,10 @@ class RatioTest:
         return Characteristics(passed, failed, float(waiting.sum()), mean)
 
 
-def required_rate_test(
+def success_rate(
     at_least: float, *, confidence: float = 0.95, expected: float | None = None, limit: int = LIMIT
 ) -> RatioTest:
-    """Return the test that a success rate is at least a required one.
+    """Return the test that the success rate of a stochastic scenario is at least a required one.
 
     A pass is wrong, and a failure is wrong at a rate of `expected`, with a probability of at most 1 - confidence.
     `expected` is the rate of a system that should pass; the default is half of the permitted failures. The nearer it is

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest, required_rate_test
+from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest, success_rate
 from eidrive_scenario.randomness import generator
 
 WALD = RatioTest(good=0.95, bad=0.80, limit=2000)
@@ -104,14 +104,14 @@ def test_characteristics_at_certain_rates() -> None:
     assert WALD.characteristics(0.0).failed == 1.0
 
 
-def test_required_rate_test_rarely_passes_below_required_rate() -> None:
+def test_success_rate_rarely_passes_below_required_rate() -> None:
     """The guarantee of a pass holds at the required rate itself, that of a failure at the expected one."""
-    test = required_rate_test(0.9, confidence=0.95, limit=2000)
+    test = success_rate(0.9, confidence=0.95, limit=2000)
     assert (test.bad, test.good) == (0.9, 0.95)
     assert test.characteristics(0.9).passed <= 0.05
     assert test.characteristics(0.85).passed <= 0.05
     assert test.characteristics(0.95).failed <= 0.05
-    assert required_rate_test(0.9, expected=0.99).characteristics(0.99).mean_runs < test.characteristics(0.99).mean_runs
+    assert success_rate(0.9, expected=0.99).characteristics(0.99).mean_runs < test.characteristics(0.99).mean_runs
 
 
 @pytest.mark.parametrize(
@@ -132,14 +132,14 @@ def test_ratio_test_with_invalid_arguments_raises(arguments: dict[str, float], e
 
 
 @pytest.mark.parametrize("at_least", [0.0, 1.0, -0.1, math.nan])
-def test_required_rate_test_with_impossible_rate_raises(at_least: float) -> None:
+def test_success_rate_with_impossible_rate_raises(at_least: float) -> None:
     with pytest.raises(ValueError, match="rates"):
-        required_rate_test(at_least)
+        success_rate(at_least)
 
 
-def test_required_rate_test_with_low_confidence_raises() -> None:
+def test_success_rate_with_low_confidence_raises() -> None:
     with pytest.raises(ValueError, match="confidence"):
-        required_rate_test(0.9, confidence=0.5)
+        success_rate(0.9, confidence=0.5)
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(-1, 3), (4, 3), (0, -1)])

@@ -1,0 +1,59 @@
+"""Verdict on a success rate: runs with consecutive seeds until a sequential test decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval
+from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest
+from eidrive_scenario.simulation import RunResult
+
+
+@dataclass(frozen=True)
+class RateVerdict:
+    """Verdict on a success rate.
+
+    decision   passed, failed, or undecided at the limit of the test
+    rate       passed runs among all, with the interval of a confidence sequence
+    failures   runs that did not pass
+    """
+
+    test: RatioTest
+    decision: Decision
+    rate: Proportion
+    failures: tuple[RunResult, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the runs show the required rate."""
+        return self.decision is Decision.PASSED
+
+    def __str__(self) -> str:
+        """Return the verdict in one line."""
+        return decision_text(self.test, self.decision, self.rate)
+
+
+def decision_text(test: RatioTest, decision: Decision, rate: Proportion) -> str:
+    """Return the decision of a test of a required rate in one line."""
+    runs = f"{rate.successes} of {rate.trials} runs passed: {rate.share:.1%}, {rate.low:.1%} to {rate.high:.1%}"
+    confidence = 1.0 - test.false_pass
+    return f"success rate of at least {test.bad:.1%} with a confidence of {confidence:.0%}: {decision} ({runs})"
+
+
+def decide_rate(run: Callable[[int], RunResult], test: RatioTest, *, first_seed: int = 1) -> RateVerdict:
+    """Return the verdict on the success rate of a run, which is called with one seed after the other.
+
+    An exception of a run ends the test.
+    """
+    failures: list[RunResult] = []
+    trials = 0
+    decision = None
+    while decision is None:
+        result = run(first_seed + trials)
+        trials += 1
+        if not result.passed:
+            failures.append(result)
+        decision = test.decision(trials - len(failures), trials)
+    rate = anytime_interval(trials - len(failures), trials, 1.0 - test.false_pass)
+    return RateVerdict(test, decision, rate, tuple(failures))
