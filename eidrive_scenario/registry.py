@@ -70,6 +70,15 @@ class Registry:
     def __iter__(self) -> Iterator[str]:
         return iter(sorted(self._points))
 
+    def add(self, name: str, value: str) -> None:
+        """Add an extension `package.module:Object` that is not installed. Raise RegistryError for another one."""
+        other = self._points.get(name)
+        if other is not None and other.value != value:
+            raise RegistryError(
+                f"{singular(self.kind)} {name!r} is registered twice: {other.value} and {value}; rename one"
+            )
+        self._points.setdefault(name, EntryPoint(name, value, f"eidrive_scenario.{self.kind}"))
+
     def value(self, name: str) -> str:
         """Return module and object of an extension as `package.module:Object`."""
         return self._points[name].value
@@ -135,6 +144,21 @@ _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
 def registry(kind: str) -> Registry:
     """Return the registry of one kind; it is read once per process."""
     return Registry(kind)
+
+
+def register(kind: str, name: str, value: str) -> None:
+    """Register an extension of a project that is not installed, such as in `conftest.py`.
+
+    kind   group of its entry point, such as `criteria`
+    value  `package.module:Object`; the module must be importable
+
+    Raise RegistryError for an unknown kind, a value of another form, or a name that another extension has.
+    """
+    if kind not in GROUPS:
+        raise RegistryError(f"unknown kind of extensions {kind!r}; {suggestion(kind, GROUPS)}")
+    if EntryPoint.pattern.match(value) is None or ":" not in value:
+        raise RegistryError(f"extension {name!r}: {value!r} is not an object (expected package.module:Object)")
+    registry(kind).add(name, value)
 
 
 def distributions(used: Iterable[tuple[str, str]]) -> dict[str, str]:

@@ -26,6 +26,7 @@ from eidrive_scenario.geometry import (
 )
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.registry import register
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.tolerances import EPSILON, TIME_TOLERANCE
@@ -64,6 +65,7 @@ __all__ = [
     "overlap",
     "parse_settings",
     "point_in_polygon",
+    "register",
     "suggestion",
     "wrap_angle",
 ]

@@ -12,6 +12,7 @@ import typer
 from eidrive_scenario.cli.check import check
 from eidrive_scenario.cli.compare import compare
 from eidrive_scenario.cli.error_output import Guarded, print_error
+from eidrive_scenario.cli.init import init
 from eidrive_scenario.cli.reproduce import reproduce
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
@@ -38,6 +39,7 @@ app.command()(sweep)
 app.command()(results)
 app.command()(compare)
 app.command()(reproduce)
+app.command()(init)
 
 
 def _show_version(requested: bool) -> None:
