@@ -3,72 +3,21 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from image_boxes import HEIGHT, USUAL, WIDTH, box, camera, outline
 from msgspec.structs import replace
 from opendrive_xml import elevation_xml, map_xml, road_xml
 
-from eidrive_scenario.geometry import iou_bev, rotation_matrix
+from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import pixels, straight_boxes
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount
-from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.meshes import actor_mesh
-
-WIDTH, HEIGHT, FOCAL = 800, 600, 400.0
-USUAL = {"car": (4.6, 1.85, 1.55), "truck": (8.2, 2.6, 3.5), "pedestrian": (0.55, 0.55, 1.72)}
-
-
-def camera(
-    x: float = 0.0, y: float = 0.0, z: float = 1.5, yaw: float = 0.0, pitch: float = 0.0, **options: Any
-) -> CameraReading:
-    """Return a camera that points along yaw and downwards by pitch, with an empty image."""
-    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
-    pose = np.eye(4)
-    pose[:3, 2] = cy * cp, sy * cp, -sp
-    pose[:3, 0] = sy, -cy, 0.0
-    pose[:3, 1] = np.cross(pose[:3, 2], pose[:3, 0])
-    pose[:3, 3] = x, y, z
-    intrinsics = np.array([[FOCAL, 0, WIDTH / 2], [0, FOCAL, HEIGHT / 2], [0, 0, 1.0]])
-    return CameraReading(
-        np.zeros((HEIGHT, WIDTH, 3), np.uint8),
-        np.zeros((HEIGHT, WIDTH), np.float32),
-        np.zeros((HEIGHT, WIDTH), np.int32),
-        intrinsics,
-        pose,
-        **options,
-    )
-
-
-def box(name: str, x: float, y: float, yaw: float = 0.0, ground: float = 0.0) -> np.ndarray:
-    length, width, height = USUAL[name]
-    return np.array([x, y, ground + height / 2, length, width, height, yaw])
-
-
-@cache
-def body(name: str, size: tuple[float, float, float]) -> np.ndarray:
-    """Return corners (N, 3) of the rendered body, relative to the center of its base."""
-    length, _, height = size
-    spec = ActorSpec(
-        name, name, name, size, (0.3 * length, 0.0, height / 2.0), wheelbase=0.6 * length, wheel_radius=0.33
-    )
-    return np.concatenate(list(actor_mesh(spec).values())).reshape(-1, 3)
-
-
-def outline(target: np.ndarray, view: CameraReading, name: str = "car") -> list[float]:
-    """Return the image box around an object, clipped at the border."""
-    x, y, z, length, width, height, yaw = target.tolist()
-    points = body(name, (length, width, height)) @ rotation_matrix(yaw, 0.0, 0.0).T + (x, y, z - height / 2.0)
-    places, _ = pixels(points, view)
-    low, high = places.min(axis=0), places.max(axis=0)
-    return [*np.clip(low, 0, (WIDTH, HEIGHT)).tolist(), *np.clip(high, 0, (WIDTH, HEIGHT)).tolist()]
 
 
 def test_pixels_of_known_points_equal_hand_calculation() -> None:
@@ -153,61 +102,6 @@ def test_lift_object_cut_by_border_locates_complete_object() -> None:
     assert edges[0] == 0.0
     found = lift(np.array([edges]), ["car"], [1.0], view, time=0.0)
     assert math.dist(found.boxes[0, :2], target[:2]) < 1.0
-
-
-def test_lift_takes_edges_near_border_as_those_of_image() -> None:
-    """Networks place the edge of a cut object some pixels inside the border; as its own, the car would be small."""
-    view = camera()
-    target = box("car", 5.0, 4.2)
-    edges = outline(target, view)
-    assert edges[0] == 0.0
-    found = lift(np.array([[4.0, *edges[1:]]]), ["car"], [1.0], view, time=0.0)
-    off = found.boxes[0, :2] - target[:2]
-    assert np.hypot(*off) < 1.5
-    assert off @ np.linalg.solve(found.covariance[0], off) < 9.21
-
-
-@pytest.mark.parametrize(
-    ("name", "edges"),
-    [
-        pytest.param("truck", [300, 480, 460, 600], id="stripe_before_bumper"),
-        pytest.param("car", [370, 520, 430, 560], id="arrow_on_road"),
-        pytest.param("car", [380, 20, 420, 60], id="sign_above_road"),
-    ],
-)
-def test_lift_box_that_no_body_fills_has_score_zero(name: str, edges: list[float]) -> None:
-    """The horizon is at row 300, so what is below row 480 is less than 1.5 m - 0.45 d high at a distance d."""
-    found = lift(np.array([edges, outline(box("car", 12, 0), camera())]), [name, "car"], [0.9, 0.8], camera(), time=0.0)
-    assert found.scores.tolist() == [0.0, 0.8]
-
-
-@pytest.mark.parametrize("size", [0.85, 1.0, 1.15])
-@pytest.mark.parametrize("name", ["car", "truck", "pedestrian"])
-def test_lift_bodies_of_unusual_size_keeps_scores(name: str, size: float) -> None:
-    """Bodies up to two standard deviations from the mean size, near and far, whole and cut by the border."""
-    view, rng = camera(), np.random.default_rng(4)
-    edges: list[list[float]] = []
-    while len(edges) < 60:
-        reach, bearing = rng.uniform(3.0, 60.0), rng.uniform(-0.75, 0.75)
-        target = box(name, reach * math.cos(bearing) + 3.0, reach * math.sin(bearing), rng.uniform(-3, 3))
-        target[3:6] *= size
-        target[2] = target[5] / 2.0
-        left, top, right, bottom = outline(target, view, name)
-        if right - left > 4.0 and bottom - top > 4.0:
-            edges.append([left, top, right, bottom])
-    found = lift(np.array(edges), [name] * 60, np.ones(60), view, time=0.0)
-    assert found.scores.min() == 1.0
-
-
-def test_lift_with_points_keeps_score_of_body_in_the_air(street: Any) -> None:
-    """A box that no body on the ground fills is kept if the points show a body: a car beyond a step in the ground."""
-    car = street.thing("Car", 15, 0)
-    sensors = {"front": CameraSettings(width=WIDTH, height=HEIGHT), "roof": LidarSettings()}
-    readings = street.readings([street.thing("Ego", 0, 0), car], sensors)
-    view, cloud = readings.cameras["front"], readings.lidars["roof"]
-    edges = np.array([outline(car.box, view)])
-    assert lift(edges, ["car"], [0.7], view, time=0.0, ground=-4.0).scores.tolist() == [0.0]
-    assert lift(edges, ["car"], [0.7], view, cloud, time=0.0).scores.tolist() == [0.7]
 
 
 def test_lift_ignores_edges_behind_nearer_box() -> None:
