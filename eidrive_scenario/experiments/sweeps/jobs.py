@@ -8,8 +8,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.experiments.sweeps.axes import Point, Scalar, settings_at
+from eidrive_scenario.errors import ConstraintError, Diagnostic, SettingError
+from eidrive_scenario.experiments.sweeps.axes import CHANNEL, Point, Scalar, settings_at
 from eidrive_scenario.openscenario import ConcreteRun, load_distribution
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json, package_versions, sha256_of
 from eidrive_scenario.simulation import RunSettings, Simulation
@@ -76,8 +76,7 @@ class SweepPlan:
 
     def job(self, number: int, point: Point, seed: int) -> SweepJob:
         """Return a run at a point, which need not be one of the plan."""
-        varied = {name: value for name, value in point.items() if name != RUN}
-        settings = settings_at(varied, self.settings, self.profile)
+        settings = settings_at(_without_run(point), self.settings, self.profile)
         run = int(point[RUN]) if RUN in point else None
         content = {"inputs": self.inputs, "run": run, "seed": seed, "settings": _plain(settings)}
         return SweepJob(sha256_of(canonical_json(content).encode()), number, self.scenario, run, seed, point, settings)
@@ -107,12 +106,14 @@ def plan_of(
     runs: int | None = None,
     is_distribution: bool = False,
 ) -> SweepPlan:
-    """Return the plan of a sweep. The first run is built, not executed, to find errors that concern all runs.
+    """Return the plan of a sweep.
+
+    The first run that its constraints do not exclude is built, not executed, to find errors that concern all runs.
 
     seeds  seeds of each combination; None: 1, or as many from 1 on as `runs` requires
     runs   number of runs; None: every combination with every seed
 
-    Raise InputError for an invalid scenario or setting.
+    Raise InputError for an invalid scenario or setting, and ConstraintError if all runs are excluded.
     """
     if is_distribution:
         points = [{RUN: number, **point} for number in range(len(load_distribution(scenario))) for point in points]
@@ -120,11 +121,12 @@ def plan_of(
     total = len(points) * len(chosen)
     if not 0 < total <= MOST_RUNS:
         raise SettingError(Diagnostic(f"the sweep has {total} runs", f"expected 1 to {MOST_RUNS}"))
-    first = _resolved(scenario, points[0].get(RUN), settings)
+    first = _first_resolved(scenario, points, settings)
     profile = first.channel_profile
     digest = sha256_of(canonical_json({"files": first.files, "versions": dict(first.versions)}).encode())
     plan = SweepPlan(scenario, tuple(points), chosen, min(total, runs or total), settings, digest, profile)
-    next(iter(plan))  # settings of the first point
+    for point in points:  # a point that cannot be run is an error before the runs, not among them
+        settings_at(_without_run(point), settings, profile)
     return plan
 
 
@@ -142,6 +144,28 @@ def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[i
             raise SettingError(Diagnostic(f"--runs is {runs}", hint))
         return seeds
     return range(1, 1 + (-(-runs // points) if runs is not None and points else 1))
+
+
+def _first_resolved(scenario: Path, points: Sequence[Point], settings: RunSettings) -> ResolvedSettings:
+    """Return the resolved settings without a point, or of the first point if constraints exclude this run.
+
+    Without a point, so that the digest of the inputs does not depend on the order of the points.
+    """
+    try:
+        return _resolved(scenario, points[0].get(RUN), settings)
+    except ConstraintError as error:
+        excluded = error
+    for point in points:
+        chosen = {name: value for name, value in _without_run(point).items() if not name.startswith(f"{CHANNEL}.")}
+        try:
+            return _resolved(scenario, point.get(RUN), settings_at(chosen, settings, None))
+        except ConstraintError as error:
+            excluded = error
+    raise excluded
+
+
+def _without_run(point: Point) -> Point:
+    return {name: value for name, value in point.items() if name != RUN}
 
 
 def _resolved(scenario: Path, run: Scalar | None, settings: RunSettings) -> ResolvedSettings:

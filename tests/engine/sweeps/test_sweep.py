@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import ConstraintError, InputError, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes
 from eidrive_scenario.experiments.sweeps.designs import points_of
 from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of, versions
@@ -132,6 +132,22 @@ def test_invalid_value_of_one_point_is_a_row(scenario: Path, tmp_path: Path) -> 
     assert [run.status for run in runs] == ["passed", "invalid"]
     assert "fast" in runs[1].error
     assert not progress.is_complete
+
+
+def test_plan_of_which_the_first_runs_are_excluded_is_valid(scenario: Path, tmp_path: Path) -> None:
+    """The constraint of the scenario excludes its default speed and the first one."""
+    scenario.write_text(scenario.read_text().replace('value="5">', 'value="45">'))
+    points = points_of(parse_axes(["Speed=50,10"]), "grid", None, 1)
+    _, runs = swept(plan_of(scenario, points, RunSettings()), tmp_path / "s.db")
+    assert [run.status for run in runs] == ["excluded", "passed"]
+    with pytest.raises(ConstraintError):
+        plan_of(scenario, points[:1], RunSettings())
+
+
+def test_plan_with_an_impossible_later_point_raises(scenario: Path) -> None:
+    points = points_of(parse_axes(["channel=ideal,none", "channel.delay.seconds=0.1"]), "grid", None, 1)
+    with pytest.raises(SettingError, match="no channel"):
+        plan_of(scenario, points, RunSettings())
 
 
 @pytest.mark.parametrize(
