@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from scipy.optimize import brentq
 from scipy.special import betaln
-from scipy.stats import binomtest
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,7 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Proportion:
 
     Raise ValueError if `successes` is not within 0 … `trials`, there is no trial, or `confidence` is not within (0, 1).
     """
-    _check(successes, trials, confidence)
-    interval = binomtest(successes, trials).proportion_ci(confidence, method="wilson")
-    return Proportion(successes, trials, float(interval.low), float(interval.high), confidence)
+    return _interval(successes, trials, confidence, "wilson")
 
 
 def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Proportion:
@@ -41,8 +39,14 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Pr
 
     Errors as for `wilson`.
     """
+    return _interval(successes, trials, confidence, "exact")
+
+
+def _interval(successes: int, trials: int, confidence: float, method: Literal["wilson", "exact"]) -> Proportion:
+    from scipy.stats import binomtest  # takes half a second, which a run without statistics need not spend
+
     _check(successes, trials, confidence)
-    interval = binomtest(successes, trials).proportion_ci(confidence, method="exact")
+    interval = binomtest(successes, trials).proportion_ci(confidence, method=method)
     return Proportion(successes, trials, float(interval.low), float(interval.high), confidence)
 
 
