@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from eidrive_scenario.arrays import Array, Bools
 
@@ -51,6 +50,8 @@ def assign_matrix(cost: Array, inside: Bools) -> list[tuple[int, int]]:
     """
     rows, columns = np.nonzero(inside)
     if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
+        from scipy.optimize import linear_sum_assignment
+
         rows, columns = linear_sum_assignment(np.where(inside, cost, OUTSIDE))
     return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
 
@@ -62,6 +63,8 @@ def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) 
     """
     if len(set(rows)) == len(rows) and len(set(columns)) == len(columns):
         return list(zip(rows, columns, strict=True))
+    from scipy.optimize import linear_sum_assignment
+
     row_of = {row: place for place, row in enumerate(sorted(set(rows)))}
     column_of = {column: place for place, column in enumerate(sorted(set(columns)))}
     matrix = np.full((len(row_of), len(column_of)), OUTSIDE)

@@ -55,7 +55,7 @@ class Registry:
     def __init__(self, kind: str, found: list[EntryPoint] | None = None) -> None:
         self.kind = kind
         self._points: dict[str, EntryPoint] = {}
-        for point in entry_points(group=f"eidrive_scenario.{kind}") if found is None else found:
+        for point in _installed(tuple(sys.path)).get(kind, ()) if found is None else found:
             other = self._points.get(point.name)
             if other is not None and other.value != point.value:
                 raise RegistryError(
@@ -138,6 +138,13 @@ class Registry:
 
 _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
 """Extensions that passed all checks, by kind, name and base class."""
+
+
+@cache
+def _installed(folders: tuple[str, ...]) -> dict[str, tuple[EntryPoint, ...]]:
+    """Return the entry points of all packages in the folders of `sys.path` by kind; each file is read once."""
+    found = entry_points()
+    return {kind: tuple(found.select(group=f"eidrive_scenario.{kind}")) for kind in GROUPS}
 
 
 @cache

@@ -17,7 +17,6 @@ from eidrive_scenario.cli.option_values import check_seconds
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
-from eidrive_scenario.library import ROADS_SUFFIX, SCENARIO_SUFFIX, definition, resolve_scenario
 from eidrive_scenario.wall_limit import LimitReached, limit_wall_time
 
 if TYPE_CHECKING:
@@ -93,6 +92,7 @@ def _check_file(path: Path, ignored: tuple[str, ...], settings: RunSettings, wal
     from eidrive_scenario.checks.catalog_checks import check_catalog
     from eidrive_scenario.checks.distribution_checks import check_distribution
     from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
+    from eidrive_scenario.library import ROADS_SUFFIX, definition
     from eidrive_scenario.simulation.attribution import report_extension
 
     with limit_wall_time(wall_limit):
@@ -120,6 +120,8 @@ def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
 
     A folder selects its scenarios, which are checked with their roads, or its road files if it has no scenarios.
     """
+    from eidrive_scenario.library import ROADS_SUFFIX, SCENARIO_SUFFIX, resolve_scenario
+
     for given in paths:
         if not given or not os.path.isdir(given):
             try:

@@ -101,8 +101,6 @@ def run(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run and nothing else.")] = False,
 ) -> None:
     """Run and evaluate a scenario, or all runs of a parameter value distribution."""
-    from eidrive_scenario.cli.batch import run_distribution
-    from eidrive_scenario.cli.rate import decision_code, rate_test
     from eidrive_scenario.cli.verdicts import show, show_warnings
     from eidrive_scenario.experiments.commands import reproduction_lines
     from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
@@ -140,7 +138,12 @@ def run(
         allow_torchscript=allow_torchscript,
     )
 
-    test = None if success_rate is None else rate_test(success_rate, confidence, repeat)
+    if success_rate is not None:
+        from eidrive_scenario.cli.rate import decision_code, rate_test
+
+        test = rate_test(success_rate, confidence, repeat)
+    else:
+        test = None
     most = repeat if test is None else test.limit
 
     def run_seeds(source: Path | ConcreteRun) -> list[int]:
@@ -193,6 +196,8 @@ def run(
     written = {"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}
     check_output_paths(written, (path, channel, weather, *stacks.values(), *(criterion or ())))
     if definition(path) == "distribution":
+        from eidrive_scenario.cli.batch import run_distribution
+
         raise typer.Exit(
             run_distribution(
                 path,

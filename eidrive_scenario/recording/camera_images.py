@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from urllib.parse import quote
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,6 +70,8 @@ class CameraImageWriter:
         """Do nothing: each image is written at once."""
 
     def _write(self, path: Path, image: Image) -> None:
+        import cv2
+
         _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         with create(path) as stream:
             stream.write(data.tobytes())
@@ -78,6 +79,9 @@ class CameraImageWriter:
 
 def draw_image_detections(image: Image, detections: ImageDetections) -> Image:
     """Return a copy of the image (H, W, 3) with boxes, classes and scores."""
+
+    import cv2
+
     canvas = image.copy()
     for box, score, name in zip(detections.boxes, detections.scores.tolist(), detections.classes, strict=True):
         left, top, right, bottom = np.rint(box).astype(int).tolist()
@@ -89,6 +93,9 @@ def draw_image_detections(image: Image, detections: ImageDetections) -> Image:
 
 def draw_projected_boxes(reading: CameraReading, detections: Detections) -> Image:
     """Return a copy of the image with projected 3D boxes, without boxes that reach behind the camera."""
+
+    import cv2
+
     canvas = reading.rgb.copy()
     height, width = canvas.shape[:2]
     boxes, scores = box_corners(detections.boxes), detections.scores.tolist()
@@ -106,6 +113,9 @@ def draw_projected_boxes(reading: CameraReading, detections: Detections) -> Imag
 
 def _label(canvas: Image, text: str, left: int, top: int, color: tuple[int, int, int]) -> None:
     """Draw a text with a dark outline above a point, or below it at the upper image border."""
+
+    import cv2
+
     font, size = cv2.FONT_HERSHEY_SIMPLEX, max(0.35, canvas.shape[1] / 1800.0)
     (wide, high), _ = cv2.getTextSize(text, font, size, 1)
     left = min(max(left, 0), max(canvas.shape[1] - wide, 0))

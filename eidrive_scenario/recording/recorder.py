@@ -6,8 +6,6 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from mcap.writer import CompressionType, Writer
-
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.codec import codec
@@ -41,6 +39,8 @@ class Recorder:
     def __init__(
         self, path: str | Path, *, metadata: Mapping[str, str], attachments: Mapping[str, bytes] | None = None
     ) -> None:
+        from mcap.writer import CompressionType, Writer
+
         self._file = create(path)
         self._seal = Seal()
         self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.ZSTD, enable_data_crcs=True)

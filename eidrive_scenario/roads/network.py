@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,11 +26,14 @@ from eidrive_scenario.roads.model.road_map import RoadMap
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.routing.costs import Cost, assumed_speed
 from eidrive_scenario.roads.routing.distance import Chain, RoadDistances
-from eidrive_scenario.roads.routing.graph import LaneGraph, build_graph, find_lanes
+from eidrive_scenario.roads.routing.graph import LaneWays, build_ways, find_lanes
 from eidrive_scenario.roads.routing.links import LaneLinks
 from eidrive_scenario.roads.routing.movement import BranchSelector, Movement, driving_direction
 from eidrive_scenario.roads.routing.nearby import locate_near
 from eidrive_scenario.roads.routing.route import Route, concatenate_routes
+
+if TYPE_CHECKING:
+    from eidrive_scenario.roads.routing.graph import LaneGraph
 
 KEPT = 2
 """Maximum number of road networks that are kept for the next run."""
@@ -74,8 +78,12 @@ class RoadNetwork(RoadAttributes):
 
     @cached_property
     def graph(self) -> LaneGraph:
-        """Lanes as a directed graph over LaneKey(road, section, lane)."""
-        return build_graph(self.tables, self.links)
+        """Lanes as a directed graph over LaneKey(road, section, lane), with the data of `LaneWays`."""
+        return self._ways.as_graph()
+
+    @cached_property
+    def _ways(self) -> LaneWays:
+        return build_ways(self.tables, self.links)
 
     @cached_property
     def geo_reference(self) -> GeoReference:
@@ -241,7 +249,7 @@ class RoadNetwork(RoadAttributes):
         stops = [start, *via, end]
         wanted = costs if costs is not None else [None] * (len(stops) - 1)
         parts = [
-            Route(self.tables, find_lanes(self.graph, self.roads, a, b, cost), a, b)
+            Route(self.tables, find_lanes(self._ways, self.roads, a, b, cost), a, b)
             for (a, b), cost in zip(pairwise(stops), wanted, strict=True)
         ]
         return parts[0] if len(parts) == 1 else concatenate_routes(parts)

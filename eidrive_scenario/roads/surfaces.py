@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.markings import Strip, lane_strips, object_strips
@@ -218,6 +217,8 @@ def _strip_part(network: RoadNetwork, road: Road, strip: Strip) -> _Part:
 def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
     """Yield the surface of junctions between and below their connecting lanes."""
     for lines in edges.values():
+        from scipy.spatial import Delaunay, QhullError
+
         points = np.concatenate(lines)
         try:
             faces: Integers = Delaunay(points[:, :2]).simplices.astype(np.int64)

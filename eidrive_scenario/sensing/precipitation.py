@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Floats
@@ -78,6 +77,9 @@ def draw_precipitation(
     velocity: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
     """Draw precipitation in front of a camera that moves at `velocity` (3,) [m/s] into its image (H, W, 3) [cd/m²]."""
+
+    import cv2
+
     if weather.precipitation == "none" or weather.precipitation_intensity <= 0.0:
         return
     drops = drops_before(weather, pinhole, draws)
@@ -109,6 +111,9 @@ def draw_precipitation(
 
 def draw_drops_on_lens(luminance: Floats, weather: Weather, draws: np.random.Generator) -> None:
     """Draw drops on the lens: each shows the scene upside down, small and blurred."""
+
+    import cv2
+
     if weather.precipitation != "rain":
         return
     height, width = luminance.shape[:2]

@@ -10,7 +10,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.traffic.lanes import TrafficLanes
@@ -50,6 +49,9 @@ class Crossings:
 
     def meeting(self, row: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
+
+        from scipy.spatial import cKDTree
+
         known = self._meeting.get(row)
         if known is not None:
             return known

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
@@ -246,6 +245,9 @@ def _same(first: Array | None, second: Array | None) -> bool:
 
 def _curve(x: float, y: float, yaw: float, waypoints: Array) -> Array:
     """Return a smooth line (K, 2) from the vehicle, along its heading, through the waypoints."""
+
+    from scipy.interpolate import PchipInterpolator
+
     nose = [x + SPACING * math.cos(yaw), y + SPACING * math.sin(yaw)]
     knots = np.array([[x, y], nose, *waypoints[:, :2].tolist()])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(knots, axis=0).T))])

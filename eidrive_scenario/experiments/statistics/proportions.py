@@ -6,9 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from scipy.optimize import brentq
-from scipy.special import betaln
-
 
 @dataclass(frozen=True)
 class Proportion:
@@ -60,6 +57,10 @@ def anytime_interval(successes: int, trials: int, confidence: float = 0.95) -> P
     nonparametric, nonasymptotic confidence sequences, Annals of Statistics 49(2), 2021). Without a run it is 0 to 1.
     Errors as for `wilson`.
     """
+
+    from scipy.optimize import brentq
+    from scipy.special import betaln
+
     if trials == 0 and successes == 0:
         _check(0, 1, confidence)
         return Proportion(0, 0, 0.0, 1.0, confidence)

@@ -16,7 +16,6 @@ from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
-from scipy.special import log_ndtr, ndtri_exp, pdtr, pdtrc
 
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import (
@@ -165,6 +164,9 @@ def _standard_normal(low: float, high: float, share: float) -> float:
 
     Probabilities are logarithms in the lower half, where they have full precision.
     """
+
+    from scipy.special import log_ndtr, ndtri_exp
+
     if low > 0:
         return -_standard_normal(-high, -low, 1 - share)
     below, above = float(log_ndtr(low)), float(log_ndtr(high))
@@ -215,6 +217,9 @@ def _less(mean: float, low: int, high: int | None, count: int | None) -> float:
 
     In the upper tail the result is lower by 1. This offset cancels out, and the precision is preserved.
     """
+
+    from scipy.special import pdtr, pdtrc
+
     if count is None:
         count = None if high is None else high + 1
     if low > mean:

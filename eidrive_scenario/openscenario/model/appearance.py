@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import CHOICE, SEQUENCE, Changed
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     ColorType,
     LightMode,
@@ -17,7 +15,7 @@ from eidrive_scenario.openscenario.model.entity_enumerations import (
 from eidrive_scenario.openscenario.model.properties import File
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ColorRgb(Element):
     """RGB color, components in [0, 1]."""
 
@@ -26,7 +24,7 @@ class ColorRgb(Element):
     blue: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ColorCmyk(Element):
     """CMYK color, components in [0, 1]."""
 
@@ -36,7 +34,7 @@ class ColorCmyk(Element):
     key: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Color(Element, content=CHOICE):
     """Color by name, optionally by components in [0, 1]."""
 
@@ -49,21 +47,21 @@ class Color(Element, content=CHOICE):
     color_cmyk: ColorCmyk | None = child(since="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VehicleLight(Element):
     """Light that the standard defines."""
 
     vehicle_light_type: VehicleLightType
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UserDefinedLight(Element):
     """Light that is specific to a tool."""
 
     user_defined_light_type: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LightType(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Choice of a light."""
 
@@ -71,7 +69,7 @@ class LightType(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     user_defined_light: UserDefinedLight | None = child(required_until="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LightState(Element):
     """State of a light; intensity [cd], durations [s]."""
 
@@ -84,7 +82,7 @@ class LightState(Element):
     color: Color | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LightStateAction(Element):
     """Action that switches a light; transition time [s]."""
 
@@ -94,21 +92,21 @@ class LightStateAction(Element):
     light_state: LightState
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VehicleComponent(Element):
     """Moving part of a vehicle."""
 
     vehicle_component_type: VehicleComponentType
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UserDefinedComponent(Element):
     """Moving part that is specific to a tool."""
 
     user_defined_component_type: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ComponentAnimation(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Choice of a moving part."""
 
@@ -116,14 +114,14 @@ class ComponentAnimation(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     user_defined_component: UserDefinedComponent | None = child(required_until="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PedestrianGesture(Element):
     """Gesture of a pedestrian."""
 
     gesture: PedestrianGestureType
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PedestrianAnimation(Element):
     """Motion and gestures of a pedestrian."""
 
@@ -132,7 +130,7 @@ class PedestrianAnimation(Element):
     pedestrian_gesture: tuple[PedestrianGesture, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AnimationFile(Element):
     """Animation from a file; time offset [s]."""
 
@@ -140,14 +138,14 @@ class AnimationFile(Element):
     file: File
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UserDefinedAnimation(Element):
     """Animation that is specific to a tool."""
 
     user_defined_animation_type: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AnimationType(Element, content=CHOICE):
     """Choice of an animation."""
 
@@ -157,14 +155,14 @@ class AnimationType(Element, content=CHOICE):
     user_defined_animation: UserDefinedAnimation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AnimationState(Element):
     """Target state of an animation in [0, 1]."""
 
     state: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AnimationAction(Element):
     """Action that plays an animation; duration [s]."""
 
@@ -175,7 +173,7 @@ class AnimationAction(Element):
     animation_state: AnimationState | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AppearanceAction(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Action that changes the appearance of an entity."""
 

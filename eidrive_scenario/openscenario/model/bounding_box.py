@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import ALL
-from eidrive_scenario.openscenario.model.element import Element
+from eidrive_scenario.openscenario.model.element import Element, element_type
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Center(Element):
     """Center of the box in the frame of the object [m]."""
 
@@ -17,7 +15,7 @@ class Center(Element):
     z: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Dimensions(Element):
     """Dimensions of the box [m]."""
 
@@ -26,7 +24,7 @@ class Dimensions(Element):
     width: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class BoundingBox(Element, content=ALL):
     """Bounding box, parallel to the axes of the object frame."""
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.content import ALL
 from eidrive_scenario.openscenario.model.declarations import ParameterAssignments
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
 from eidrive_scenario.openscenario.model.properties import Directory
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.vehicles import Vehicle
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class CatalogReference(Element):
     """Reference to a catalog entry, with values of its parameters."""
 
@@ -29,70 +28,70 @@ class CatalogReference(Element):
     parameter_assignments: ParameterAssignments | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VehicleCatalogLocation(Element, content=ALL):
     """Location of vehicle catalogs."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ControllerCatalogLocation(Element, content=ALL):
     """Location of controller catalogs."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PedestrianCatalogLocation(Element, content=ALL):
     """Location of pedestrian catalogs."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class MiscObjectCatalogLocation(Element, content=ALL):
     """Location of catalogs of miscellaneous objects."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EnvironmentCatalogLocation(Element, content=ALL):
     """Location of environment catalogs."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ManeuverCatalogLocation(Element, content=ALL):
     """Location of maneuver catalogs."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrajectoryCatalogLocation(Element, content=ALL):
     """Location of trajectory catalogs."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RouteCatalogLocation(Element, content=ALL):
     """Location of route catalogs."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SensorCatalogLocation(Element, content=ALL):
     """Location of sensor catalogs (1.2)."""
 
     directory: Directory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class CatalogLocations(Element, content=ALL):
     """Locations of the catalogs of a scenario, by kind."""
 
@@ -107,7 +106,7 @@ class CatalogLocations(Element, content=ALL):
     sensor_catalog: SensorCatalogLocation | None = child(since="1.2", until="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Catalog(Element):
     """Entries that scenarios share."""
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Changed, Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import ControllerType
 from eidrive_scenario.openscenario.model.enumerations import AutomaticGearType
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.scalars import ControllerName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Controller(Element, content=ALL):
     """Controller of an entity; its properties are specific to the tool that provides it."""
 
@@ -24,7 +22,7 @@ class Controller(Element, content=ALL):
     properties: Properties | None = child(required_until="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ObjectController(Element, content=Choice(empty_until="1.2")):
     """Controller of an entity, defined in place or in a catalog."""
 
@@ -33,7 +31,7 @@ class ObjectController(Element, content=Choice(empty_until="1.2")):
     controller: Controller | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ControllerDistributionEntry(Element, content=Choice(empty_until="1.2")):
     """Controller and its share."""
 
@@ -42,14 +40,14 @@ class ControllerDistributionEntry(Element, content=Choice(empty_until="1.2")):
     catalog_reference: CatalogReference | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ControllerDistribution(Element):
     """Controllers of background traffic, by shares."""
 
     controller_distribution_entry: tuple[ControllerDistributionEntry, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AssignControllerAction(Element, content=Choice(minimum=0)):
     """Action that assigns a controller to an entity, and optionally activates its domains."""
 
@@ -62,7 +60,7 @@ class AssignControllerAction(Element, content=Choice(minimum=0)):
     object_controller: ObjectController | None = child(since="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ActivateControllerAction(Element):
     """Action that activates or deactivates a controller per domain; an omitted domain does not change."""
 
@@ -74,7 +72,7 @@ class ActivateControllerAction(Element):
     object_controller_ref: ControllerName | None = attribute(since="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Brake(Element):
     """Brake input: share in [0, 1] or force [N]; maximum rate [1/s, N/s]."""
 
@@ -82,21 +80,21 @@ class Brake(Element):
     max_rate: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ManualGear(Element):
     """Gear by number; negative for reverse, 0 for neutral."""
 
     number: int
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AutomaticGear(Element):
     """Lever position of an automatic transmission."""
 
     gear: AutomaticGearType
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OverrideThrottleAction(Element):
     """Override of the throttle by a value in [0, 1]."""
 
@@ -105,7 +103,7 @@ class OverrideThrottleAction(Element):
     max_rate: float | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OverrideBrakeAction(Element, content=Choice(minimum=0)):
     """Override of the brake."""
 
@@ -115,7 +113,7 @@ class OverrideBrakeAction(Element, content=Choice(minimum=0)):
     brake_force: Brake | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OverrideClutchAction(Element):
     """Override of the clutch by a value in [0, 1]."""
 
@@ -124,7 +122,7 @@ class OverrideClutchAction(Element):
     max_rate: float | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OverrideParkingBrakeAction(Element, content=Choice(minimum=0)):
     """Override of the parking brake."""
 
@@ -134,7 +132,7 @@ class OverrideParkingBrakeAction(Element, content=Choice(minimum=0)):
     brake_force: Brake | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OverrideSteeringWheelAction(Element):
     """Override of the steering wheel angle [rad]; maximum rate [rad/s], torque [Nm]."""
 
@@ -144,7 +142,7 @@ class OverrideSteeringWheelAction(Element):
     max_torque: float | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OverrideGearAction(Element, content=Choice(minimum=0)):
     """Override of the gear."""
 
@@ -154,7 +152,7 @@ class OverrideGearAction(Element, content=Choice(minimum=0)):
     automatic_gear: AutomaticGear | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OverrideControllerValueAction(Element, content=ALL):
     """Action that overrides pedals, steering wheel or gear of the controller."""
 
@@ -166,7 +164,7 @@ class OverrideControllerValueAction(Element, content=ALL):
     gear: OverrideGearAction | None = child(required_until="1.0")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ControllerAction(Element, content=Changed(ALL, "1.3", CHOICE)):
     """Action that assigns, overrides or activates controllers; before 1.3 a combination is allowed."""
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from eidrive_scenario.openscenario.model.element import Element, children
+from eidrive_scenario.openscenario.model.element import Element, children, element_type
 from eidrive_scenario.openscenario.model.enumerations import ParameterType, Rule
 from eidrive_scenario.openscenario.model.scalars import ParameterName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ValueConstraint(Element):
     """Comparison that the value of a parameter must satisfy."""
 
@@ -17,14 +15,14 @@ class ValueConstraint(Element):
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ValueConstraintGroup(Element):
     """Constraints that are combined by AND; several groups of one parameter are alternatives."""
 
     value_constraint: tuple[ValueConstraint, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterDeclaration(Element):
     """Parameter with its type and default."""
 
@@ -34,14 +32,14 @@ class ParameterDeclaration(Element):
     constraint_group: tuple[ValueConstraintGroup, ...] = children(since="1.1")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterDeclarations(Element):
     """Parameters of a scope."""
 
     parameter_declaration: tuple[ParameterDeclaration, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterAssignment(Element):
     """Value of one parameter of a referenced catalog entry."""
 
@@ -49,14 +47,14 @@ class ParameterAssignment(Element):
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterAssignments(Element):
     """Values of the parameters of a referenced catalog entry."""
 
     parameter_assignment: tuple[ParameterAssignment, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableDeclaration(Element):
     """Variable, whose value may change during the run."""
 
@@ -65,14 +63,14 @@ class VariableDeclaration(Element):
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableDeclarations(Element):
     """Variables of a scenario."""
 
     variable_declaration: tuple[VariableDeclaration, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class MonitorDeclaration(Element):
     """Boolean value for external observers of the run."""
 
@@ -80,7 +78,7 @@ class MonitorDeclaration(Element):
     value: bool
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class MonitorDeclarations(Element):
     """Monitors of a scenario."""
 

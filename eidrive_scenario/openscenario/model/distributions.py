@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice, choice, sequence
 from eidrive_scenario.openscenario.model.declarations import ParameterAssignment
-from eidrive_scenario.openscenario.model.element import Element, child, text
+from eidrive_scenario.openscenario.model.element import Element, child, element_type, text
 from eidrive_scenario.openscenario.model.properties import File
 from eidrive_scenario.openscenario.model.scalars import UnsignedInt
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Range(Element):
     """Range from a lower to an upper limit."""
 
@@ -19,21 +17,21 @@ class Range(Element):
     upper_limit: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DistributionSetElement(Element):
     """Value of a distribution."""
 
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DistributionSet(Element):
     """Listed values, with one run each."""
 
     element: tuple[DistributionSetElement, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DistributionRange(Element, content=ALL):
     """Values from a range in equal steps."""
 
@@ -41,7 +39,7 @@ class DistributionRange(Element, content=ALL):
     range: Range
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UserDefinedDistribution(Element):
     """Distribution that is specific to a tool."""
 
@@ -49,7 +47,7 @@ class UserDefinedDistribution(Element):
     content: str = text()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DeterministicSingleParameterDistribution(Element, content=CHOICE):
     """Deterministic values of one parameter."""
 
@@ -59,28 +57,28 @@ class DeterministicSingleParameterDistribution(Element, content=CHOICE):
     user_defined_distribution: UserDefinedDistribution | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterValueSet(Element):
     """Values of several parameters for one run."""
 
     parameter_assignment: tuple[ParameterAssignment, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ValueSetDistribution(Element):
     """Sets of values, with one run each."""
 
     parameter_value_set: tuple[ParameterValueSet, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DeterministicMultiParameterDistribution(Element):
     """Deterministic values of several parameters together."""
 
     value_set_distribution: ValueSetDistribution
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Deterministic(Element, content=Choice(minimum=0, maximum=None)):
     """Deterministic distributions, whose combinations are the runs."""
 
@@ -88,7 +86,7 @@ class Deterministic(Element, content=Choice(minimum=0, maximum=None)):
     deterministic_single_parameter_distribution: tuple[DeterministicSingleParameterDistribution, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ProbabilityDistributionSetElement(Element):
     """Value and its weight."""
 
@@ -96,14 +94,14 @@ class ProbabilityDistributionSetElement(Element):
     weight: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ProbabilityDistributionSet(Element):
     """Values, drawn by their weights."""
 
     element: tuple[ProbabilityDistributionSetElement, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class NormalDistribution(Element):
     """Normal distribution, truncated at a range."""
 
@@ -112,7 +110,7 @@ class NormalDistribution(Element):
     range: Range | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LogNormalDistribution(Element):
     """Log-normal distribution, truncated at a range."""
 
@@ -121,14 +119,14 @@ class LogNormalDistribution(Element):
     range: Range | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UniformDistribution(Element):
     """Uniform distribution over a range."""
 
     range: Range
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PoissonDistribution(Element):
     """Poisson distribution, truncated at a range."""
 
@@ -136,7 +134,7 @@ class PoissonDistribution(Element):
     range: Range | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class HistogramBin(Element):
     """Range and its weight."""
 
@@ -144,14 +142,14 @@ class HistogramBin(Element):
     range: Range
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Histogram(Element):
     """Ranges, drawn by their weights."""
 
     bin: tuple[HistogramBin, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class StochasticDistribution(Element, content=CHOICE):
     """Stochastic distribution of one parameter."""
 
@@ -165,7 +163,7 @@ class StochasticDistribution(Element, content=CHOICE):
     user_defined_distribution: UserDefinedDistribution | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Stochastic(Element):
     """Stochastic distributions, drawn for a number of runs."""
 
@@ -174,7 +172,7 @@ class Stochastic(Element):
     stochastic_distribution: tuple[StochasticDistribution, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterValueDistribution(Element, content=sequence("scenario_file", choice("deterministic", "stochastic"))):
     """Values of the parameters over which a scenario is run."""
 

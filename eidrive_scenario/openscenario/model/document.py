@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 
 from eidrive_scenario.openscenario.model.catalogs import Catalog, CatalogLocations
@@ -13,7 +12,7 @@ from eidrive_scenario.openscenario.model.declarations import (
     VariableDeclarations,
 )
 from eidrive_scenario.openscenario.model.distributions import ParameterValueDistribution
-from eidrive_scenario.openscenario.model.element import Element, child, children, text
+from eidrive_scenario.openscenario.model.element import Element, child, children, element_type, text
 from eidrive_scenario.openscenario.model.entities import Entities
 from eidrive_scenario.openscenario.model.positions import Position
 from eidrive_scenario.openscenario.model.properties import File, Properties
@@ -22,7 +21,7 @@ from eidrive_scenario.openscenario.model.signals import TrafficSignals
 from eidrive_scenario.openscenario.model.storyboard import Storyboard
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class License(Element):
     """License of the file, optionally with its text."""
 
@@ -32,7 +31,7 @@ class License(Element):
     content: str = text()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class FileHeader(Element):
     """Author, date and revision of the standard of the file."""
 
@@ -45,14 +44,14 @@ class FileHeader(Element):
     properties: Properties | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UsedArea(Element):
     """Area of the world that the scenario uses."""
 
     position: tuple[Position, ...] = children(minimum=2)
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RoadNetwork(Element):
     """Road file, scene graph file and traffic signals."""
 
@@ -62,7 +61,7 @@ class RoadNetwork(Element):
     used_area: UsedArea | None = child(since="1.1")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OpenScenario(
     Element,
     content=sequence(

@@ -8,8 +8,9 @@ optional. `attribute`, `child` and `children` define differences between version
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar
+from dataclasses import MISSING, FrozenInstanceError, dataclass, field, fields
+from reprlib import recursive_repr
+from typing import Any, ClassVar, TypeVar, dataclass_transform
 
 from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choice, Content, Sequence
 
@@ -97,7 +98,20 @@ def visible_parameters() -> Any:
     return field(default=None, compare=False, repr=False)
 
 
-@dataclass(frozen=True, kw_only=True)
+T = TypeVar("T", bound=type)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
+def element_type(cls: T) -> T:
+    """Make a class a frozen dataclass with keyword arguments, whose methods are those of `Element`.
+
+    `dataclass` compiles six methods for each class. For all classes of the standard this takes longer than a short run.
+    """
+    dataclass(init=False, repr=False, eq=False, match_args=False, kw_only=True)(cls)
+    return cls
+
+
+@element_type
 class Element:
     """Element of a file. Comparisons ignore its location `line` and `source`."""
 
@@ -108,6 +122,35 @@ class Element:
 
     def __init_subclass__(cls, content: Content = SEQUENCE) -> None:
         cls.content_model = content
+
+    def __init__(self, **values: Any) -> None:
+        """Set the fields. Raise TypeError for an unknown field, or if a field without a default is missing."""
+        defaults = field_defaults(type(self))
+        if unknown := values.keys() - defaults.keys():
+            raise TypeError(f"{type(self).__name__} has no field {', '.join(sorted(unknown))}")
+        state = {**defaults, **values}
+        if missing := [name for name, value in state.items() if value is MISSING]:
+            raise TypeError(f"{type(self).__name__} requires {', '.join(missing)}")
+        self.__dict__.update(state)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise FrozenInstanceError(f"cannot assign to field {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise FrozenInstanceError(f"cannot delete field {name!r}")
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return _compared_values(self) == _compared_values(other)
+
+    def __hash__(self) -> int:
+        return hash(_compared_values(self))
+
+    @recursive_repr()
+    def __repr__(self) -> str:
+        shown = (f"{entry.name}={getattr(self, entry.name)!r}" for entry in fields(self) if entry.repr)
+        return f"{type(self).__qualname__}({', '.join(shown)})"
 
     def children(self) -> Iterator[Element]:
         """Yield the child elements in the order of the fields."""
@@ -149,6 +192,22 @@ def field_names(cls: type[Element]) -> tuple[str, ...]:
     return known
 
 
+def field_defaults(cls: type[Element]) -> dict[str, Any]:
+    """Return the default of each field of a class, MISSING for a required field."""
+    known = _DEFAULTS.get(cls)
+    if known is None:
+        known = _DEFAULTS[cls] = {entry.name: entry.default for entry in fields(cls)}
+    return known
+
+
+def _compared_values(element: Element) -> tuple[Any, ...]:
+    cls = type(element)
+    names = _COMPARED.get(cls)
+    if names is None:
+        names = _COMPARED[cls] = tuple(entry.name for entry in fields(cls) if entry.compare)
+    return tuple([getattr(element, name) for name in names])
+
+
 def alternatives(cls: type[Element]) -> tuple[str, ...]:
     """Return the alternatives in the choice of a class."""
     model = cls.content_model
@@ -161,3 +220,5 @@ def alternatives(cls: type[Element]) -> tuple[str, ...]:
 
 
 _FIELD_NAMES: dict[type[Element], tuple[str, ...]] = {}
+_DEFAULTS: dict[type[Element], dict[str, Any]] = {}
+_COMPARED: dict[type[Element], tuple[str, ...]] = {}

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
 from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, Choice, choice, sequence
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     MiscObjectCategory,
     ObjectType,
@@ -25,28 +24,28 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.controllers import ObjectController
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EntityRef(Element):
     """Reference to an entity by its name."""
 
     entity_ref: EntityName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ByType(Element):
     """Selection of all entities of a type."""
 
     object_type: ObjectType
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ByObjectType(Element):
     """Reference to any entity of a type."""
 
     type: ObjectType
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SelectedEntities(Element, content=Choice(empty_until="1.2")):
     """Members of a selection, by name or by type."""
 
@@ -54,7 +53,7 @@ class SelectedEntities(Element, content=Choice(empty_until="1.2")):
     by_type: tuple[ByType, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EntitySelection(Element):
     """Named group of entities."""
 
@@ -62,14 +61,14 @@ class EntitySelection(Element):
     members: SelectedEntities
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ExternalObjectReference(Element):
     """Object that the road network or another tool defines."""
 
     name: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Pedestrian(Element, content=ALL):
     """Pedestrian, animal or wheelchair. Mass [kg]."""
 
@@ -84,7 +83,7 @@ class Pedestrian(Element, content=ALL):
     properties: Properties | None = child(required_until="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class MiscObject(Element, content=ALL):
     """Miscellaneous object. Mass [kg]."""
 
@@ -97,7 +96,7 @@ class MiscObject(Element, content=ALL):
     properties: Properties | None = child(required_until="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ScenarioObject(
     Element,
     content=sequence(
@@ -125,7 +124,7 @@ class ScenarioObject(
     object_controller: tuple[ObjectController, ...] = children(single_until="1.1")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ScenarioObjectTemplate(
     Element,
     content=sequence(
@@ -143,7 +142,7 @@ class ScenarioObjectTemplate(
     object_controller: tuple[ObjectController, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Entities(Element):
     """All entities and selections."""
 

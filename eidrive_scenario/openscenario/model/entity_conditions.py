@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.entities import ByObjectType, EntityRef
 from eidrive_scenario.openscenario.model.enumerations import (
     AngleType,
@@ -20,7 +18,7 @@ from eidrive_scenario.openscenario.model.positions import Position
 from eidrive_scenario.openscenario.model.scalars import EntityName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TriggeringEntities(Element):
     """Triggering entities, and whether any or all of them must satisfy the condition."""
 
@@ -28,14 +26,14 @@ class TriggeringEntities(Element):
     entity_ref: tuple[EntityRef, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EndOfRoadCondition(Element):
     """Condition: at the end of the road for a duration [s]."""
 
     duration: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class CollisionCondition(Element, content=Choice(empty_until="1.2")):
     """Condition: collision with an entity, or with any entity of a type."""
 
@@ -43,14 +41,14 @@ class CollisionCondition(Element, content=Choice(empty_until="1.2")):
     by_type: ByObjectType | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class OffroadCondition(Element):
     """Condition: off the road for a duration [s]."""
 
     duration: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TimeHeadwayCondition(Element):
     """Condition on the time headway to another entity [s]."""
 
@@ -64,7 +62,7 @@ class TimeHeadwayCondition(Element):
     routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a time to collision."""
 
@@ -72,7 +70,7 @@ class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2"))
     entity_ref: EntityRef | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TimeToCollisionCondition(Element, content=ALL):
     """Condition on the time to collision at constant speeds [s]."""
 
@@ -86,7 +84,7 @@ class TimeToCollisionCondition(Element, content=ALL):
     time_to_collision_condition_target: TimeToCollisionConditionTarget
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AccelerationCondition(Element):
     """Condition on the acceleration [m/s²]."""
 
@@ -95,14 +93,14 @@ class AccelerationCondition(Element):
     direction: DirectionalDimension | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class StandStillCondition(Element):
     """Condition: at standstill for a duration [s]."""
 
     duration: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SpeedCondition(Element):
     """Condition on the speed [m/s]."""
 
@@ -111,7 +109,7 @@ class SpeedCondition(Element):
     direction: DirectionalDimension | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeSpeedCondition(Element):
     """Condition on the speed relative to another entity [m/s]."""
 
@@ -121,14 +119,14 @@ class RelativeSpeedCondition(Element):
     direction: DirectionalDimension | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TraveledDistanceCondition(Element):
     """Condition on the distance traveled since the start of the run [m]."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ReachPositionCondition(Element, content=ALL):
     """Condition: position reached within a tolerance [m]."""
 
@@ -136,7 +134,7 @@ class ReachPositionCondition(Element, content=ALL):
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DistanceCondition(Element, content=ALL):
     """Condition on the distance to a position [m]."""
 
@@ -150,7 +148,7 @@ class DistanceCondition(Element, content=ALL):
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeDistanceCondition(Element):
     """Condition on the distance to another entity [m]."""
 
@@ -163,7 +161,7 @@ class RelativeDistanceCondition(Element):
     routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeLaneRange(Element):
     """Range of lanes relative to the lane of the entity; an omitted limit is open."""
 
@@ -171,7 +169,7 @@ class RelativeLaneRange(Element):
     to: int | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeClearanceCondition(Element):
     """Condition: no entity in the lanes within the distances ahead and behind [m]."""
 
@@ -183,7 +181,7 @@ class RelativeClearanceCondition(Element):
     entity_ref: tuple[EntityRef, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AngleCondition(Element):
     """Condition on an angle, within a tolerance [rad]."""
 
@@ -193,7 +191,7 @@ class AngleCondition(Element):
     coordinate_system: CoordinateSystem | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeAngleCondition(Element):
     """Condition on an angle relative to another entity, within a tolerance [rad]."""
 
@@ -204,7 +202,7 @@ class RelativeAngleCondition(Element):
     coordinate_system: CoordinateSystem | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EntityCondition(Element, content=Choice(empty_until="1.2")):
     """Choice of one condition on an entity."""
 
@@ -226,7 +224,7 @@ class EntityCondition(Element, content=Choice(empty_until="1.2")):
     relative_angle_condition: RelativeAngleCondition | None = child(since="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ByEntityCondition(Element, content=ALL):
     """Condition on the state of entities."""
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 
 from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
 from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     CloudState,
     FractionalCloudCover,
@@ -19,7 +18,7 @@ from eidrive_scenario.openscenario.model.entity_enumerations import (
 from eidrive_scenario.openscenario.model.properties import File, Properties
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TimeOfDay(Element):
     """Date and time, and whether the time advances."""
 
@@ -27,7 +26,7 @@ class TimeOfDay(Element):
     date_time: datetime
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Sun(Element):
     """Sun with azimuth and elevation [rad] and illuminance [lx]."""
 
@@ -37,7 +36,7 @@ class Sun(Element):
     illuminance: float | None = attribute(since="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Fog(Element, content=ALL):
     """Fog with visual range [m], optionally in a bounding box."""
 
@@ -45,7 +44,7 @@ class Fog(Element, content=ALL):
     bounding_box: BoundingBox | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Precipitation(Element):
     """Precipitation intensity [mm/h]."""
 
@@ -54,7 +53,7 @@ class Precipitation(Element):
     precipitation_intensity: float | None = attribute(since="1.1")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Wind(Element):
     """Wind with direction of flow [rad] and speed [m/s]."""
 
@@ -62,7 +61,7 @@ class Wind(Element):
     speed: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DomeImage(Element):
     """Image of the sky; azimuth offset [rad]."""
 
@@ -70,7 +69,7 @@ class DomeImage(Element):
     dome_file: File
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Weather(Element, content=ALL):
     """Weather; pressure [Pa], temperature [K]."""
 
@@ -85,7 +84,7 @@ class Weather(Element, content=ALL):
     dome_image: DomeImage | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RoadCondition(Element):
     """Friction of the road relative to the reference friction."""
 
@@ -94,7 +93,7 @@ class RoadCondition(Element):
     properties: Properties | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Environment(Element, content=ALL):
     """Time of day, weather and road condition."""
 
@@ -105,7 +104,7 @@ class Environment(Element, content=ALL):
     road_condition: RoadCondition | None = child(required_until="1.0")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EnvironmentAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets the environment."""
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, child, text, visible_parameters
+from eidrive_scenario.openscenario.model.element import Element, child, element_type, text, visible_parameters
 from eidrive_scenario.openscenario.model.environment import EnvironmentAction
 from eidrive_scenario.openscenario.model.positions import Position
 from eidrive_scenario.openscenario.model.scalars import EntityName, MonitorName, ParameterName, VariableName
@@ -14,19 +13,19 @@ from eidrive_scenario.openscenario.model.signals import InfrastructureAction
 from eidrive_scenario.openscenario.model.traffic import TrafficAction
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AddEntityAction(Element, content=ALL):
     """Addition of an entity at a position."""
 
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DeleteEntityAction(Element):
     """Removal of an entity."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EntityAction(Element, content=Choice(empty_until="1.2")):
     """Action that adds or removes an entity."""
 
@@ -35,28 +34,28 @@ class EntityAction(Element, content=Choice(empty_until="1.2")):
     delete_entity_action: DeleteEntityAction | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterSetAction(Element):
     """Assignment to a parameter (deprecated since 1.2: use a variable)."""
 
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterAddValueRule(Element):
     """Addition to a parameter."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterMultiplyByValueRule(Element):
     """Multiplication of a parameter."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ModifyRule(Element, content=Choice(empty_until="1.2")):
     """Rule for the modification of a parameter."""
 
@@ -64,14 +63,14 @@ class ModifyRule(Element, content=Choice(empty_until="1.2")):
     multiply_by_value: ParameterMultiplyByValueRule | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterModifyAction(Element, content=ALL):
     """Modification of a parameter (deprecated since 1.2: use a variable)."""
 
     rule: ModifyRule
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets or modifies a parameter (deprecated since 1.2: use a variable)."""
 
@@ -80,28 +79,28 @@ class ParameterAction(Element, content=Choice(empty_until="1.2")):
     modify_action: ParameterModifyAction | None = child(deprecated="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableSetAction(Element):
     """Assignment to a variable."""
 
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableAddValueRule(Element):
     """Addition to a variable."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableMultiplyByValueRule(Element):
     """Multiplication of a variable."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableModifyRule(Element, content=Choice(empty_until="1.2")):
     """Rule for the modification of a variable."""
 
@@ -109,14 +108,14 @@ class VariableModifyRule(Element, content=Choice(empty_until="1.2")):
     multiply_by_value: VariableMultiplyByValueRule | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableModifyAction(Element, content=ALL):
     """Modification of a variable."""
 
     rule: VariableModifyRule
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets or modifies a variable."""
 
@@ -125,7 +124,7 @@ class VariableAction(Element, content=Choice(empty_until="1.2")):
     modify_action: VariableModifyAction | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SetMonitorAction(Element):
     """Action that sets a monitor."""
 
@@ -133,7 +132,7 @@ class SetMonitorAction(Element):
     value: bool
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class GlobalAction(Element, content=Choice(empty_until="1.2")):
     """Action that does not apply to a single entity."""
 
@@ -146,7 +145,7 @@ class GlobalAction(Element, content=Choice(empty_until="1.2")):
     variable_action: VariableAction | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class CustomCommandAction(Element):
     """Command to the engine; its type specifies the language."""
 
@@ -155,7 +154,7 @@ class CustomCommandAction(Element):
     scope: Any = visible_parameters()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UserDefinedAction(Element):
     """Action that the standard does not define."""
 

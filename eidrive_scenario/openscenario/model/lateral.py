@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, attribute
+from eidrive_scenario.openscenario.model.element import Element, attribute, element_type
 from eidrive_scenario.openscenario.model.enumerations import CoordinateSystem, DynamicsShape, LateralDisplacement
 from eidrive_scenario.openscenario.model.longitudinal import DynamicConstraints, TransitionDynamics
 from eidrive_scenario.openscenario.model.scalars import EntityName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AbsoluteTargetLane(Element):
     """Target lane by its id."""
 
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeTargetLane(Element):
     """Target lane relative to the lane of an entity."""
 
@@ -26,7 +24,7 @@ class RelativeTargetLane(Element):
     value: int
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LaneChangeTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a lane change."""
 
@@ -34,7 +32,7 @@ class LaneChangeTarget(Element, content=Choice(empty_until="1.2")):
     absolute_target_lane: AbsoluteTargetLane | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LaneChangeAction(Element, content=ALL):
     """Action that changes the lane; offset from the lane center [m]."""
 
@@ -43,14 +41,14 @@ class LaneChangeAction(Element, content=ALL):
     lane_change_target: LaneChangeTarget
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AbsoluteTargetLaneOffset(Element):
     """Target offset from the lane center [m]."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeTargetLaneOffset(Element):
     """Target offset relative to an entity [m]."""
 
@@ -58,7 +56,7 @@ class RelativeTargetLaneOffset(Element):
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LaneOffsetTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a lane offset."""
 
@@ -66,7 +64,7 @@ class LaneOffsetTarget(Element, content=Choice(empty_until="1.2")):
     absolute_target_lane_offset: AbsoluteTargetLaneOffset | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LaneOffsetActionDynamics(Element):
     """Dynamics of a lane offset; maximum lateral acceleration [m/s²]."""
 
@@ -74,7 +72,7 @@ class LaneOffsetActionDynamics(Element):
     max_lateral_acc: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LaneOffsetAction(Element, content=ALL):
     """Action that changes the lateral offset in the lane."""
 
@@ -83,7 +81,7 @@ class LaneOffsetAction(Element, content=ALL):
     lane_offset_target: LaneOffsetTarget
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LateralDistanceAction(Element, content=ALL):
     """Action that keeps a lateral distance to an entity [m]."""
 
@@ -96,7 +94,7 @@ class LateralDistanceAction(Element, content=ALL):
     dynamic_constraints: DynamicConstraints | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LateralAction(Element, content=Choice(empty_until="1.2")):
     """Lateral action of an entity."""
 

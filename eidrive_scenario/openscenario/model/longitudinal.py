@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.entities import EntityRef
 from eidrive_scenario.openscenario.model.enumerations import (
     CoordinateSystem,
@@ -18,7 +16,7 @@ from eidrive_scenario.openscenario.model.enumerations import (
 from eidrive_scenario.openscenario.model.scalars import EntityName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DynamicConstraints(Element):
     """Limits of speed [m/s], acceleration and deceleration [m/s²] and their rates [m/s³]."""
 
@@ -29,7 +27,7 @@ class DynamicConstraints(Element):
     max_deceleration_rate: float | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TransitionDynamics(Element):
     """Dynamics of a transition: shape, and time [s], distance [m] or rate."""
 
@@ -39,14 +37,14 @@ class TransitionDynamics(Element):
     following_mode: FollowingMode | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AbsoluteTargetSpeed(Element):
     """Target speed [m/s]."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeTargetSpeed(Element):
     """Target speed relative to an entity: difference [m/s] or factor."""
 
@@ -56,7 +54,7 @@ class RelativeTargetSpeed(Element):
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SpeedActionTarget(Element, content=Choice(empty_until="1.2")):
     """Target of a speed action."""
 
@@ -64,7 +62,7 @@ class SpeedActionTarget(Element, content=Choice(empty_until="1.2")):
     absolute_target_speed: AbsoluteTargetSpeed | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SpeedAction(Element, content=ALL):
     """Action that changes the speed of an entity."""
 
@@ -72,7 +70,7 @@ class SpeedAction(Element, content=ALL):
     speed_action_target: SpeedActionTarget
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SpeedProfileEntry(Element):
     """Speed [m/s] and duration of the transition to it [s]."""
 
@@ -80,7 +78,7 @@ class SpeedProfileEntry(Element):
     time: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SpeedProfileAction(Element):
     """Action with a series of speeds."""
 
@@ -91,7 +89,7 @@ class SpeedProfileAction(Element):
     speed_profile_entry: tuple[SpeedProfileEntry, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LongitudinalDistanceAction(Element, content=ALL):
     """Action that keeps a distance [m] or a time gap [s] to an entity."""
 
@@ -105,7 +103,7 @@ class LongitudinalDistanceAction(Element, content=ALL):
     dynamic_constraints: DynamicConstraints | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LongitudinalAction(Element, content=Choice(empty_until="1.2")):
     """Longitudinal action of an entity."""
 

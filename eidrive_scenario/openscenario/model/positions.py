@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.enumerations import ReferenceContext
 from eidrive_scenario.openscenario.model.scalars import EntityName
 
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.routing import Route, Trajectory
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Orientation(Element):
     """Heading, pitch and roll [rad], absolute or relative to the reference of the position."""
 
@@ -25,7 +24,7 @@ class Orientation(Element):
     type: ReferenceContext | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class WorldPosition(Element):
     """Point [m] and orientation [rad] in the world frame."""
 
@@ -37,7 +36,7 @@ class WorldPosition(Element):
     z: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeWorldPosition(Element, content=ALL):
     """Point with an offset from an entity along the world axes [m]."""
 
@@ -48,7 +47,7 @@ class RelativeWorldPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeObjectPosition(Element, content=ALL):
     """Point with an offset from an entity along its axes [m]."""
 
@@ -59,7 +58,7 @@ class RelativeObjectPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RoadPosition(Element, content=ALL):
     """Point in road coordinates [m]."""
 
@@ -69,7 +68,7 @@ class RoadPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeRoadPosition(Element, content=ALL):
     """Point with an offset from an entity in road coordinates [m]."""
 
@@ -79,7 +78,7 @@ class RelativeRoadPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class LanePosition(Element, content=ALL):
     """Point in a lane: s along the road, offset from the lane center [m]."""
 
@@ -90,7 +89,7 @@ class LanePosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeLanePosition(Element, content=ALL):
     """Point relative to the lane of an entity; ds along the road, dsLane along the lane center [m]."""
 
@@ -102,14 +101,14 @@ class RelativeLanePosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PositionOfCurrentEntity(Element):
     """Point on the route at the current position of an entity."""
 
     entity_ref: EntityName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PositionInRoadCoordinates(Element):
     """Point on the route: distance along it and lateral offset [m]."""
 
@@ -117,7 +116,7 @@ class PositionInRoadCoordinates(Element):
     t: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PositionInLaneCoordinates(Element):
     """Point on the route: distance along it, lane, offset from the lane center [m]."""
 
@@ -126,7 +125,7 @@ class PositionInLaneCoordinates(Element):
     lane_offset: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class InRoutePosition(Element, content=Choice(empty_until="1.2")):
     """Choice of coordinates of a point on a route."""
 
@@ -135,7 +134,7 @@ class InRoutePosition(Element, content=Choice(empty_until="1.2")):
     from_lane_coordinates: PositionInLaneCoordinates | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RouteRef(Element, content=Choice(empty_until="1.2")):
     """Route, defined in place or in a catalog."""
 
@@ -143,7 +142,7 @@ class RouteRef(Element, content=Choice(empty_until="1.2")):
     catalog_reference: CatalogReference | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RoutePosition(Element, content=ALL):
     """Point on a route."""
 
@@ -152,7 +151,7 @@ class RoutePosition(Element, content=ALL):
     in_route_position: InRoutePosition
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrajectoryRef(Element, content=CHOICE):
     """Trajectory, defined in place or in a catalog."""
 
@@ -160,7 +159,7 @@ class TrajectoryRef(Element, content=CHOICE):
     catalog_reference: CatalogReference | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrajectoryPosition(Element, content=ALL):
     """Point relative to a trajectory: s along it, t to its left [m]."""
 
@@ -170,7 +169,7 @@ class TrajectoryPosition(Element, content=ALL):
     trajectory_ref: TrajectoryRef
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class GeoPosition(Element, content=ALL):
     """Geodetic point in degrees and meters; the older attributes are in radians."""
 
@@ -184,7 +183,7 @@ class GeoPosition(Element, content=ALL):
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Position(Element, content=Choice(empty_until="1.2")):
     """Position in one of the coordinate systems."""
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.appearance import AppearanceAction
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
 from eidrive_scenario.openscenario.model.controllers import ActivateControllerAction, ControllerAction
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.enumerations import SpeedTargetValueType
 from eidrive_scenario.openscenario.model.lateral import LateralAction
 from eidrive_scenario.openscenario.model.longitudinal import LongitudinalAction
@@ -17,7 +15,7 @@ from eidrive_scenario.openscenario.model.scalars import EntityName
 from eidrive_scenario.openscenario.model.sensors import SensorReferenceSet
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VisibilityAction(Element):
     """Action that sets the visibility of an entity in graphics, for traffic and for sensors."""
 
@@ -27,7 +25,7 @@ class VisibilityAction(Element):
     sensor_reference_set: SensorReferenceSet | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AbsoluteSpeed(Element, content=Choice(minimum=0)):
     """Final speed [m/s]."""
 
@@ -36,7 +34,7 @@ class AbsoluteSpeed(Element, content=Choice(minimum=0)):
     target_time_steady_state: TargetTimeSteadyState | None = child(since="1.1")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RelativeSpeedToMaster(Element, content=Choice(minimum=0)):
     """Final speed relative to the master: difference [m/s] or factor."""
 
@@ -46,21 +44,21 @@ class RelativeSpeedToMaster(Element, content=Choice(minimum=0)):
     target_time_steady_state: TargetTimeSteadyState | None = child(since="1.1")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TargetDistanceSteadyState(Element):
     """Distance of the steady state at the final speed [m]."""
 
     distance: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TargetTimeSteadyState(Element):
     """Duration of the steady state at the final speed [s]."""
 
     time: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class FinalSpeed(Element, content=Choice(empty_until="1.2")):
     """Final speed of a synchronization."""
 
@@ -68,7 +66,7 @@ class FinalSpeed(Element, content=Choice(empty_until="1.2")):
     relative_speed_to_master: RelativeSpeedToMaster | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SynchronizeAction(Element, content=ALL):
     """Action that reaches a position at the arrival time of the master; tolerances [m]."""
 
@@ -80,26 +78,26 @@ class SynchronizeAction(Element, content=ALL):
     final_speed: FinalSpeed | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TeleportAction(Element):
     """Action that teleports an entity to a position."""
 
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ConnectTrailerAction(Element):
     """Connection of a trailer."""
 
     trailer_ref: EntityName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DisconnectTrailerAction(Element):
     """Disconnection of the trailer."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrailerAction(Element, content=CHOICE):
     """Action that connects or disconnects a trailer."""
 
@@ -107,7 +105,7 @@ class TrailerAction(Element, content=CHOICE):
     disconnect_trailer_action: DisconnectTrailerAction | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class PrivateAction(Element, content=Choice(empty_until="1.2")):
     """Choice of one private action."""
 

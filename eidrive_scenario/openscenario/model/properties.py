@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
-from eidrive_scenario.openscenario.model.element import Element, children, text, visible_parameters
+from eidrive_scenario.openscenario.model.element import Element, children, element_type, text, visible_parameters
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Property(Element):
     """Name and value of a property."""
 
@@ -17,28 +16,28 @@ class Property(Element):
     scope: Any = visible_parameters()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class File(Element):
     """File by its path."""
 
     filepath: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Directory(Element):
     """Folder by its path."""
 
     path: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class CustomContent(Element):
     """Free text for specific tools."""
 
     content: str = text()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Properties(Element):
     """Properties of an object beyond the standard."""
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
 from eidrive_scenario.openscenario.model.enumerations import FollowingMode, ReferenceContext, RouteStrategy
 from eidrive_scenario.openscenario.model.positions import Position, TrajectoryRef
 from eidrive_scenario.openscenario.model.scalars import UnsignedInt
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Waypoint(Element):
     """Point of a route and the strategy of the routing to it."""
 
@@ -21,7 +19,7 @@ class Waypoint(Element):
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Route(Element):
     """Route as ordered waypoints."""
 
@@ -31,7 +29,7 @@ class Route(Element):
     waypoint: tuple[Waypoint, ...] = children(minimum=2)
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Vertex(Element):
     """Vertex of a polyline; time [s]."""
 
@@ -39,14 +37,14 @@ class Vertex(Element):
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Polyline(Element):
     """Polyline between vertices."""
 
     vertex: tuple[Vertex, ...] = children(minimum=2)
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Clothoid(Element):
     """Curve with linearly changing curvature [1/m]; length [m], times [s]."""
 
@@ -59,7 +57,7 @@ class Clothoid(Element):
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ClothoidSplineSegment(Element):
     """Segment of a clothoid spline: curvatures [1/m], length [m], heading offset [rad], time [s]."""
 
@@ -71,7 +69,7 @@ class ClothoidSplineSegment(Element):
     position_start: Position | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ClothoidSpline(Element):
     """Sequence of clothoids; end time [s]."""
 
@@ -79,7 +77,7 @@ class ClothoidSpline(Element):
     clothoid_spline_segment: tuple[ClothoidSplineSegment, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ControlPoint(Element):
     """Control point of a NURBS; time [s]."""
 
@@ -88,14 +86,14 @@ class ControlPoint(Element):
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Knot(Element):
     """Value of the knot vector."""
 
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Nurbs(Element):
     """Non-uniform rational B-spline."""
 
@@ -104,7 +102,7 @@ class Nurbs(Element):
     knot: tuple[Knot, ...] = children(minimum=2)
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Shape(Element, content=Choice(empty_until="1.2")):
     """Choice of the shape of a trajectory."""
 
@@ -114,7 +112,7 @@ class Shape(Element, content=Choice(empty_until="1.2")):
     nurbs: Nurbs | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Trajectory(Element):
     """Curve in space, optionally with times."""
 
@@ -124,12 +122,12 @@ class Trajectory(Element):
     shape: Shape
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class None_(Element):
     """Time reference of a trajectory without timing."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Timing(Element):
     """Timing of a trajectory: absolute or relative, with scale and offset [s]."""
 
@@ -138,7 +136,7 @@ class Timing(Element):
     scale: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TimeReference(Element, content=Choice(empty_until="1.2")):
     """Choice whether the times of a trajectory apply."""
 
@@ -146,14 +144,14 @@ class TimeReference(Element, content=Choice(empty_until="1.2")):
     timing: Timing | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrajectoryFollowingMode(Element):
     """Mode of following: exactly, or within the limits of the vehicle."""
 
     following_mode: FollowingMode
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AssignRouteAction(Element, content=Choice(empty_until="1.2")):
     """Action that assigns a route to an entity."""
 
@@ -161,7 +159,7 @@ class AssignRouteAction(Element, content=Choice(empty_until="1.2")):
     catalog_reference: CatalogReference | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class FollowTrajectoryAction(Element, content=ALL):
     """Action that moves an entity along a trajectory; initial offset [m]."""
 
@@ -173,19 +171,19 @@ class FollowTrajectoryAction(Element, content=ALL):
     trajectory_ref: TrajectoryRef | None = child(since="1.1")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AcquirePositionAction(Element, content=ALL):
     """Action that routes an entity to a position."""
 
     position: Position
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RandomRouteAction(Element):
     """Action that lets the engine choose the route."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RoutingAction(Element, content=Choice(empty_until="1.2")):
     """Routing action of an entity."""
 

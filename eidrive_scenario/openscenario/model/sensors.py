@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute
+from eidrive_scenario.openscenario.model.element import Element, attribute, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import SensorCategory
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.scalars import SensorName
@@ -15,7 +14,7 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.positions import RelativeObjectPosition
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Sensor(Element):
     """Sensor and its field of view [rad]."""
 
@@ -27,7 +26,7 @@ class Sensor(Element):
     properties: Properties
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SensorAttachment(Element):
     """Mounting position of a sensor on the vehicle."""
 
@@ -35,21 +34,21 @@ class SensorAttachment(Element):
     mounting_position: RelativeObjectPosition
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SensorAttachments(Element):
     """Sensors of a vehicle."""
 
     sensor_attachment: tuple[SensorAttachment, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SensorReference(Element):
     """Reference to a sensor by its name."""
 
     name: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SensorReferenceSet(Element):
     """References to sensors by their names."""
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, child
+from eidrive_scenario.openscenario.model.element import Element, child, element_type
 from eidrive_scenario.openscenario.model.scalars import SignalControllerName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalState(Element):
     """State of one signal."""
 
@@ -17,14 +15,14 @@ class TrafficSignalState(Element):
     traffic_signal_id: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalGroupState(Element):
     """State of all signals of a controller."""
 
     state: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Phase(Element):
     """Phase of a controller; duration [s]."""
 
@@ -35,7 +33,7 @@ class Phase(Element):
     traffic_signal_group_state: TrafficSignalGroupState | None = child(since="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalController(Element):
     """Controller of signals; delay after the referenced controller [s]."""
 
@@ -45,14 +43,14 @@ class TrafficSignalController(Element):
     phase: tuple[Phase, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignals(Element):
     """Signal controllers of a scenario."""
 
     traffic_signal_controller: tuple[TrafficSignalController, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalStateAction(Element):
     """Action that sets the state of a signal."""
 
@@ -60,7 +58,7 @@ class TrafficSignalStateAction(Element):
     state: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalControllerAction(Element):
     """Action that sets the phase of a controller."""
 
@@ -68,7 +66,7 @@ class TrafficSignalControllerAction(Element):
     phase: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalAction(Element, content=Choice(empty_until="1.2")):
     """Action that sets a signal or a controller."""
 
@@ -76,14 +74,14 @@ class TrafficSignalAction(Element, content=Choice(empty_until="1.2")):
     traffic_signal_state_action: TrafficSignalStateAction | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class InfrastructureAction(Element, content=ALL):
     """Action of the infrastructure."""
 
     traffic_signal_action: TrafficSignalAction
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalCondition(Element):
     """Condition on the state of a signal."""
 
@@ -91,7 +89,7 @@ class TrafficSignalCondition(Element):
     state: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSignalControllerCondition(Element):
     """Condition on the phase of a controller."""
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, child, children
+from eidrive_scenario.openscenario.model.element import Element, child, children, element_type
 from eidrive_scenario.openscenario.model.entities import EntityRef
 from eidrive_scenario.openscenario.model.enumerations import Priority
 from eidrive_scenario.openscenario.model.global_actions import GlobalAction, UserDefinedAction
@@ -16,7 +14,7 @@ from eidrive_scenario.openscenario.model.scalars import EntityName, UnsignedInt
 from eidrive_scenario.openscenario.model.triggers import Trigger
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Action(Element, content=Choice(empty_until="1.2")):
     """Named action of an event."""
 
@@ -26,7 +24,7 @@ class Action(Element, content=Choice(empty_until="1.2")):
     private_action: PrivateAction | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Event(Element):
     """Actions with a common start trigger."""
 
@@ -37,7 +35,7 @@ class Event(Element):
     start_trigger: Trigger | None = child(required_until="1.0")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Maneuver(Element):
     """Group of events."""
 
@@ -46,7 +44,7 @@ class Maneuver(Element):
     event: tuple[Event, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Actors(Element):
     """Actors of a maneuver group."""
 
@@ -54,7 +52,7 @@ class Actors(Element):
     entity_ref: tuple[EntityRef, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ManeuverGroup(Element):
     """Maneuvers and their actors."""
 
@@ -65,7 +63,7 @@ class ManeuverGroup(Element):
     maneuver: tuple[Maneuver, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Act(Element):
     """Part of a story with start and stop triggers."""
 
@@ -75,7 +73,7 @@ class Act(Element):
     stop_trigger: Trigger | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Story(Element):
     """Group of acts."""
 
@@ -84,7 +82,7 @@ class Story(Element):
     act: tuple[Act, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Private(Element):
     """Initial actions of one entity."""
 
@@ -92,7 +90,7 @@ class Private(Element):
     private_action: tuple[PrivateAction, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class InitActions(Element):
     """Actions before the start of the run."""
 
@@ -101,14 +99,14 @@ class InitActions(Element):
     private: tuple[Private, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Init(Element):
     """Initialization of the storyboard."""
 
     actions: InitActions
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Storyboard(Element):
     """Initialization, stories, and stop trigger of the run."""
 

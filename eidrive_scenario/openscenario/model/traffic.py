@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
 from eidrive_scenario.openscenario.model.controllers import ControllerDistribution
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
 from eidrive_scenario.openscenario.model.entities import ScenarioObjectTemplate
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
 from eidrive_scenario.openscenario.model.positions import Position
@@ -18,14 +17,14 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.distributions import Range
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class CentralSwarmObject(Element):
     """Central entity of a swarm."""
 
     entity_ref: EntityName
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VehicleCategoryDistributionEntry(Element):
     """Category of vehicles and its share."""
 
@@ -33,14 +32,14 @@ class VehicleCategoryDistributionEntry(Element):
     weight: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VehicleCategoryDistribution(Element):
     """Categories of vehicles, by shares."""
 
     vehicle_category_distribution_entry: tuple[VehicleCategoryDistributionEntry, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VehicleRoleDistributionEntry(Element):
     """Role of vehicles and its share."""
 
@@ -48,14 +47,14 @@ class VehicleRoleDistributionEntry(Element):
     weight: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VehicleRoleDistribution(Element):
     """Roles of vehicles, by shares."""
 
     vehicle_role_distribution_entry: tuple[VehicleRoleDistributionEntry, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficDefinition(Element, content=ALL):
     """Composition of traffic (before 1.3)."""
 
@@ -65,7 +64,7 @@ class TrafficDefinition(Element, content=ALL):
     controller_distribution: ControllerDistribution
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EntityDistributionEntry(Element):
     """Entity template and its share."""
 
@@ -73,14 +72,14 @@ class EntityDistributionEntry(Element):
     scenario_object_template: ScenarioObjectTemplate
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class EntityDistribution(Element):
     """Entity templates, by shares."""
 
     entity_distribution_entry: tuple[EntityDistributionEntry, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficDistributionEntry(Element):
     """Kind of traffic and its share."""
 
@@ -89,14 +88,14 @@ class TrafficDistributionEntry(Element):
     properties: Properties | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficDistribution(Element):
     """Composition of traffic, by shares."""
 
     traffic_distribution_entry: tuple[TrafficDistributionEntry, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class AreaDistribution(Element):
     """Shares of a swarm in front, behind, left and right (1.2)."""
 
@@ -106,7 +105,7 @@ class AreaDistribution(Element):
     right: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class DirectionOfTravelDistribution(Element):
     """Shares of a swarm in the same and in the opposite direction."""
 
@@ -114,7 +113,7 @@ class DirectionOfTravelDistribution(Element):
     opposite: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSourceAction(Element, content=ALL):
     """Source of traffic at a position: radius [m], rate [1/s], speed [m/s]."""
 
@@ -127,7 +126,7 @@ class TrafficSourceAction(Element, content=ALL):
     traffic_distribution: TrafficDistribution | None = child(since="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSinkAction(Element, content=ALL):
     """Sink of traffic at a position: radius [m], rate [1/s]."""
 
@@ -137,7 +136,7 @@ class TrafficSinkAction(Element, content=ALL):
     traffic_definition: TrafficDefinition | None = child(deprecated="1.3")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficSwarmAction(Element, content=ALL):
     """Swarm of traffic around an entity, between two ellipses [m]."""
 
@@ -156,14 +155,14 @@ class TrafficSwarmAction(Element, content=ALL):
     direction_of_travel_distribution: DirectionOfTravelDistribution | None = child(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Lane(Element):
     """Lane by its id."""
 
     id: int
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RoadCursor(Element):
     """Position along a road [m], and the lanes there."""
 
@@ -172,7 +171,7 @@ class RoadCursor(Element):
     lane: tuple[Lane, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class RoadRange(Element):
     """Road section between cursors; length [m]."""
 
@@ -180,14 +179,14 @@ class RoadRange(Element):
     road_cursor: tuple[RoadCursor, ...] = children(minimum=2)
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Polygon(Element):
     """Area by the corners of a polygon."""
 
     position: tuple[Position, ...] = children(minimum=3)
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficArea(Element, content=CHOICE):
     """Area of traffic."""
 
@@ -195,7 +194,7 @@ class TrafficArea(Element, content=CHOICE):
     road_range: tuple[RoadRange, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficAreaAction(Element, content=ALL):
     """Action that keeps a number of entities in an area."""
 
@@ -205,12 +204,12 @@ class TrafficAreaAction(Element, content=ALL):
     traffic_area: TrafficArea
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficStopAction(Element):
     """Stop of the traffic of a name."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrafficAction(Element, content=Choice(empty_until="1.2")):
     """Action that starts or stops background traffic."""
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from eidrive_scenario.openscenario.model.content import Choice
-from eidrive_scenario.openscenario.model.element import Element
+from eidrive_scenario.openscenario.model.element import Element, element_type
 from eidrive_scenario.openscenario.model.entity_conditions import ByEntityCondition
 from eidrive_scenario.openscenario.model.enumerations import ConditionEdge
 from eidrive_scenario.openscenario.model.value_conditions import ByValueCondition
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Condition(Element, content=Choice(empty_until="1.2")):
     """Condition with its edge and delay [s]."""
 
@@ -22,14 +20,14 @@ class Condition(Element, content=Choice(empty_until="1.2")):
     by_value_condition: ByValueCondition | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ConditionGroup(Element):
     """Conditions that must hold at the same time."""
 
     condition: tuple[Condition, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Trigger(Element):
     """Trigger, which is fulfilled if one of its groups holds; without groups it never is."""
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 
 from eidrive_scenario.openscenario.model.content import Choice
-from eidrive_scenario.openscenario.model.element import Element, child
+from eidrive_scenario.openscenario.model.element import Element, child, element_type
 from eidrive_scenario.openscenario.model.enumerations import Rule, StoryboardElementState, StoryboardElementType
 from eidrive_scenario.openscenario.model.scalars import ParameterName, StoryboardElementName, VariableName
 from eidrive_scenario.openscenario.model.signals import TrafficSignalCondition, TrafficSignalControllerCondition
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ParameterCondition(Element):
     """Condition on the value of a parameter."""
 
@@ -21,7 +20,7 @@ class ParameterCondition(Element):
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class VariableCondition(Element):
     """Condition on the value of a variable."""
 
@@ -30,7 +29,7 @@ class VariableCondition(Element):
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TimeOfDayCondition(Element):
     """Condition on the simulated date and time."""
 
@@ -38,7 +37,7 @@ class TimeOfDayCondition(Element):
     rule: Rule
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class SimulationTimeCondition(Element):
     """Condition on the time since the start of the run [s]."""
 
@@ -46,7 +45,7 @@ class SimulationTimeCondition(Element):
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class StoryboardElementStateCondition(Element):
     """Condition on a state or transition of a storyboard element."""
 
@@ -55,7 +54,7 @@ class StoryboardElementStateCondition(Element):
     storyboard_element_type: StoryboardElementType
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class UserDefinedValueCondition(Element):
     """Condition on a value from outside the engine."""
 
@@ -64,7 +63,7 @@ class UserDefinedValueCondition(Element):
     value: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class ByValueCondition(Element, content=Choice(empty_until="1.2")):
     """Choice of one condition on a value."""
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
-from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
 from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.sensors import SensorAttachments
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.entities import EntityRef, ScenarioObject
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Axle(Element):
     """Axle: maximum steering angle [rad], position, track width and wheel diameter [m]."""
 
@@ -28,7 +27,7 @@ class Axle(Element):
     wheel_diameter: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Axles(Element):
     """Axles of a vehicle."""
 
@@ -37,7 +36,7 @@ class Axles(Element):
     additional_axle: tuple[Axle, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Performance(Element):
     """Limits of a vehicle: speed [m/s], acceleration and deceleration [m/s²], their rates [m/s³]."""
 
@@ -48,7 +47,7 @@ class Performance(Element):
     max_deceleration_rate: float | None = attribute(since="1.2")
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrailerHitch(Element):
     """Position of the trailer hitch relative to the reference point [m]."""
 
@@ -56,7 +55,7 @@ class TrailerHitch(Element):
     dz: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class TrailerCoupler(Element):
     """Position of the trailer coupler relative to the reference point [m]."""
 
@@ -64,7 +63,7 @@ class TrailerCoupler(Element):
     dz: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Trailer(Element, content=CHOICE):
     """Trailer of a vehicle."""
 
@@ -72,7 +71,7 @@ class Trailer(Element, content=CHOICE):
     trailer_ref: EntityRef | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@element_type
 class Vehicle(Element, content=ALL):
     """Vehicle with bounding box, limits and axles. Mass [kg]."""
 

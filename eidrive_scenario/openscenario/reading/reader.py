@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import MISSING, dataclass, replace
 from typing import Any, cast
 
 from lxml import etree
@@ -23,6 +23,7 @@ from eidrive_scenario.openscenario.model import (
     ParameterDeclarations,
     Property,
 )
+from eidrive_scenario.openscenario.model.element import field_defaults
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
 from eidrive_scenario.openscenario.reading.structure import check_children
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
@@ -283,7 +284,8 @@ def make(cls: type[Element], values: Mapping[str, Any]) -> Element:
     """Return an element with these values and its defaults; it may be incomplete, as errors are reported separately."""
     defaults = _DEFAULTS.get(cls)
     if defaults is None:
-        defaults = {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}
+        given = field_defaults(cls)
+        defaults = {name: None if value is MISSING else value for name, value in given.items()}
         _DEFAULTS[cls] = defaults
     element = object.__new__(cls)
     element.__dict__.update(defaults)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import cv2
 import numpy as np
 
 from eidrive_scenario.arrays import Array
@@ -21,6 +20,9 @@ def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
 
     Positions of points that are not in front of the camera are NaN. The distortion is Brown's, as in OpenCV.
     """
+
+    import cv2
+
     inverse = camera.pose[:3, :3].T
     in_camera = (points - camera.pose[:3, 3]) @ inverse.T
     found = np.full((len(points), 2), np.nan)
@@ -39,6 +41,9 @@ def straight_boxes(boxes: Array, camera: CameraReading) -> Array:
 
     The middle of each edge is transformed.
     """
+
+    import cv2
+
     x0, y0, x1, y1 = boxes.T
     x, y = (x0 + x1) / 2.0, (y0 + y1) / 2.0
     middles = np.stack([np.stack([x0, y], 1), np.stack([x, y0], 1), np.stack([x1, y], 1), np.stack([x, y1], 1)], 1)

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
@@ -49,7 +48,7 @@ class Tracker(TrackingMethod):
         if settings.kind == NO_TRACKER:
             raise ValueError("tracker settings: kind 'none' disables tracking (expected cv or ctrv)")
         self._model = MODELS[settings.kind]()
-        self._gate = float(chdtri(2, 1.0 - settings.gate))
+        self._gate = -2.0 * math.log1p(-settings.gate)
         self._time: float | None = None
         self._tracks = Estimates(np.empty((0, self._model.size)), np.empty((0, self._model.size, self._model.size)))
         self._shape = np.empty((0, 5))

@@ -6,9 +6,9 @@ from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.geometry.overlaps import Overlaps
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneLocations
@@ -39,18 +39,18 @@ class Locator:
         self.sample_points: Array = np.column_stack([poses.x, poses.y])
         self._from_samples = tables.widest_lane + NARROW + SPACING
         """Maximum distance of a point on a road from the nearest of its samples [m]."""
-        self._flat = cKDTree(self.sample_points)
-        self._solid = cKDTree(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
+        self._flat = NearestPoints(self.sample_points)
+        self._solid = NearestPoints(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
 
     def locate(self, x: Array, y: Array, z: Array | None, reach: float = REACH) -> LaneLocations:
         """Return road and lane coordinates of points (N,). Without z, the nearest road in plan view is selected."""
-        tree, points, distance, nearest = self._nearest_samples(x, y, z, reach)
+        samples, points, distance, nearest = self._nearest_samples(x, y, z, reach)
         if len(points) <= MANY and distance.max(initial=0.0) < np.inf:
-            return self._located(tree, points, nearest, reach)
+            return self._located(samples, points, nearest, reach)
         # Sorted points make the lookup in the tables faster.
         order = np.flatnonzero(distance < np.inf)
         order = order[np.argsort(nearest[order])]
-        some = self._located(tree, points[order], nearest[order], reach)
+        some = self._located(samples, points[order], nearest[order], reach)
         found = LaneLocations(self._tables.ids, *_nowhere(len(points)))
         for entry in fields(found)[1:]:
             getattr(found, entry.name)[order] = getattr(some, entry.name)
@@ -58,22 +58,22 @@ class Locator:
 
     def _nearest_samples(
         self, x: Array, y: Array, z: Array | None, reach: float
-    ) -> tuple[cKDTree, Array, Array, Integers]:
-        """Return the tree of samples, the points in its coordinates, and distance and index of their nearest samples.
+    ) -> tuple[NearestPoints, Array, Array, Integers]:
+        """Return the set of samples, the points in its coordinates, and distance and index of their nearest samples.
 
         The distance is inf for a point that is farther than `reach` from all roads.
         """
         solid = z is not None and self._solid is not None
-        tree = self._solid if solid and self._solid is not None else self._flat
+        samples = self._solid if solid and self._solid is not None else self._flat
         points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
         # A point that is far from all samples is outside the reach of every road.
         hopeless = np.inf if solid else reach + self._from_samples
-        distance, nearest = (np.asarray(part) for part in tree.query(points, k=1, distance_upper_bound=hopeless))
-        return tree, points, distance, nearest
+        distance, nearest = samples.nearest(points, within=hopeless)
+        return samples, points, distance, nearest
 
-    def _located(self, tree: cKDTree, points: Array, nearest: Integers, reach: float) -> LaneLocations:
-        """Return locations of points (N, 2), or (N, 3) with heights, by the nearest samples of `tree`."""
-        road, s, t, row, outside = self._best_roads(tree, points, nearest, np.inf)
+    def _located(self, samples: NearestPoints, points: Array, nearest: Integers, reach: float) -> LaneLocations:
+        """Return locations of points (N, 2), or (N, 3) with heights, by the nearest samples of `samples`."""
+        road, s, t, row, outside = self._best_roads(samples, points, nearest, np.inf)
         heading = self._tables.curves.at(road, s)[2]
         far = outside > reach
         center, _ = self._tables.lane_t(row, s)
@@ -89,9 +89,9 @@ class Locator:
         )
 
     def _best_roads(
-        self, tree: cKDTree, points: Array, nearest: Integers, reach: float
+        self, samples: NearestPoints, points: Array, nearest: Integers, reach: float
     ) -> tuple[Integers, Array, Array, Integers, Array]:
-        """Return roads, s, t, lane rows and distances from the road of points, by the nearest samples of `tree`.
+        """Return roads, s, t, lane rows and distances from the road of points, by the nearest samples of `samples`.
 
         The result may be another road than the nearest one for a point farther than `reach` from all roads.
         """
@@ -105,15 +105,15 @@ class Locator:
             height = None if z is None else z[uncertain]
             limit = np.minimum(outside[uncertain], reach) + self._from_samples
             limit = limit if z is None else np.full(len(uncertain), np.inf)
-            best = self._compare(tree, points[uncertain], x[uncertain], y[uncertain], height, limit)
+            best = self._compare(samples, points[uncertain], x[uncertain], y[uncertain], height, limit)
             road[uncertain], s[uncertain], t[uncertain], row[uncertain], outside[uncertain] = best
         return road, s, t, row, outside
 
     def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
         """Return all lanes that overlap points (N,): lane rows, s on their roads, and indices of the points."""
-        tree, places, distance, nearest = self._nearest_samples(x, y, z, reach=0.0)
+        samples, places, distance, nearest = self._nearest_samples(x, y, z, reach=0.0)
         near = (distance < np.inf).nonzero()[0]
-        road, s, _, _, outside = self._best_roads(tree, places[near], nearest[near], reach=0.0)
+        road, s, _, _, outside = self._best_roads(samples, places[near], nearest[near], reach=0.0)
         inside = (outside <= 0.0).nonzero()[0]
         on, road, s = near[inside], road[inside], s[inside]
         pair, other, guess = self._overlaps.beneath(road, x[on], y[on])
@@ -129,20 +129,19 @@ class Locator:
         return Overlaps(self._tables, self.sample_points, self._road, self._s, self._from_samples)
 
     def _compare(
-        self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None, limit: Array
+        self, samples: NearestPoints, points: Array, x: Array, y: Array, z: Array | None, limit: Array
     ) -> tuple[Integers, Array, Array, Integers, Array]:
         """Return the best road of the nearest samples: the one with the nearest surface.
 
         limit  (N,) distance of a sample from which on its road cannot be nearer than the best road so far [m]
         """
         k = min(CANDIDATES, len(self._s))
-        distance, nearest = (np.asarray(part) for part in tree.query(points, k=k))
-        nearest = nearest.reshape(len(points), k)
+        distance, nearest = samples.several(points, k)
         road = self._road[nearest]
         first = np.ones_like(road, dtype=bool)
         for k_th in range(1, k):
             first[:, k_th] = ~np.any(road[:, :k_th] == road[:, k_th : k_th + 1], axis=1)
-        first[:, 1:] &= distance.reshape(len(points), k)[:, 1:] <= limit[:, None]
+        first[:, 1:] &= distance[:, 1:] <= limit[:, None]
         point, column = np.nonzero(first)
         road, s = road[point, column], self._s[nearest[point, column]]
         s, t, beyond = self._refine(road, s, x[point], y[point])

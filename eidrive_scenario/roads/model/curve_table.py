@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import fresnel
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.model.curves import Cubic, Curve, ReferenceLine, Spiral
+from eidrive_scenario.roads.model.fresnel import fresnel
 from eidrive_scenario.roads.model.polynomials import spread
 
 EPSILON = float(np.finfo(np.float64).eps)

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import fresnel
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.roads.model.fresnel import fresnel
 
 FLAT_PHASE = 1e7
 """Maximum phase k²/(2c) of a spiral. Above it the spiral is an arc to less than a millimeter, and Fresnel integrals

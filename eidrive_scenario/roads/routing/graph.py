@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Mapping
+from heapq import heappop, heappush
+from itertools import count, pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import networkx as nx
 import numpy as np
 
 from eidrive_scenario.errors import Diagnostic, InputError
@@ -20,9 +20,12 @@ from eidrive_scenario.roads.routing.links import LaneLinks
 from eidrive_scenario.roads.routing.movement import driving_direction
 
 if TYPE_CHECKING:
+    import networkx as nx
+
     LaneGraph = nx.DiGraph[LaneKey]
-else:
-    LaneGraph = nx.DiGraph
+
+Successors = Mapping[LaneKey, Mapping[LaneKey, Mapping[str, Any]]]
+"""Data of the edges of each lane, by the lane that they lead to."""
 
 LANE_CHANGE_COST = 10.0
 """Detour that is equivalent to a lane change [m]."""
@@ -38,13 +41,34 @@ class RouteError(InputError):
     """No route over the lanes from one location to another exists."""
 
 
-def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
-    """Return the graph of lanes: nodes LaneKey with `length` [m], `end` (x, y) and `drivable`.
+class LaneWays(NamedTuple):
+    """Lanes and the edges between them as dictionaries, for the search of routes.
 
-    Edges have `weight` [m] and `kind`, 'successor' or 'change'. Lengths and ends are those of the center lines. An edge
-    leads from a lane to its successors in the driving direction and to its neighbors of the same direction.
+    nodes       `length` of each lane [m], its `end` (x, y) and `drivable`
+    successors  data of the edges of each lane, by the lane that they lead to: `weight` [m] and `kind`, 'successor' or
+                'change'
+
+    Lengths and ends are those of the center lines. An edge leads from a lane to its successors in the driving
+    direction and to its neighbors of the same direction.
     """
-    graph: LaneGraph = LaneGraph()
+
+    nodes: dict[LaneKey, dict[str, Any]]
+    successors: dict[LaneKey, dict[LaneKey, dict[str, Any]]]
+
+    def as_graph(self) -> LaneGraph:
+        """Return the same as a graph with the data of nodes and edges."""
+        import networkx as nx
+
+        graph: LaneGraph = nx.DiGraph()
+        graph.add_nodes_from(self.nodes.items())
+        graph.add_edges_from(
+            (one, other, data) for one, ways in self.successors.items() for other, data in ways.items()
+        )
+        return graph
+
+
+def build_ways(tables: RoadTables, links: LaneLinks) -> LaneWays:
+    """Return the lanes of a road network and the edges between them."""
     roads = {road.id: road for road in tables.roads}
     directions = {
         (road.id, number): driving_direction(road, number)
@@ -52,40 +76,41 @@ def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
         for section in road.sections
         for number in section.lanes
     }
-    for key, row in tables.lane_keys():
-        if key.lane:
-            graph.add_node(key, drivable=bool(tables.lane_drivable[row]), row=row)
-    _measure(graph, tables, directions)
-    for key in list(graph):
-        length = graph.nodes[key]["length"]
+    rows = {key: row for key, row in tables.lane_keys() if key.lane}
+    nodes = _measure(rows, tables, directions)
+    successors: dict[LaneKey, dict[LaneKey, dict[str, Any]]] = {key: {} for key in nodes}
+    for key, data in nodes.items():
         for other, direction in links.beyond(key, directions[key.road, key.lane]):
-            if other in graph and directions[other.road, other.lane] == direction:
-                graph.add_edge(key, other, weight=length, kind="successor")
+            if other in nodes and directions[other.road, other.lane] == direction:
+                successors[key][other] = {"weight": data["length"], "kind": "successor"}
     for road in roads.values():
         for section in road.sections:
             for one, two in _neighbors(section):
                 if directions[road.id, one] == directions[road.id, two]:
                     cost = LANE_CHANGE_COST + SHORT_SECTION_COST / max(section.length, 1.0)
-                    keys = LaneKey(road.id, section.index, one), LaneKey(road.id, section.index, two)
-                    graph.add_edge(*keys, weight=cost, kind="change")
-                    graph.add_edge(*reversed(keys), weight=cost, kind="change")
-    return graph
+                    left, right = LaneKey(road.id, section.index, one), LaneKey(road.id, section.index, two)
+                    successors[left][right] = {"weight": cost, "kind": "change"}
+                    successors[right][left] = {"weight": cost, "kind": "change"}
+    return LaneWays(nodes, successors)
 
 
-def _measure(graph: LaneGraph, tables: RoadTables, directions: Mapping[tuple[str, int], int]) -> None:
-    """Set the length of the center line by Gauss-Legendre quadrature and the exit point of each node."""
-    keys = list(graph)
-    row = np.array([graph.nodes[key].pop("row") for key in keys], dtype=np.int64)
+def _measure(
+    rows: Mapping[LaneKey, int], tables: RoadTables, directions: Mapping[tuple[str, int], int]
+) -> dict[LaneKey, dict[str, Any]]:
+    """Return the data of lanes; the length of the center line is found by Gauss-Legendre quadrature."""
+    row = np.array(list(rows.values()), dtype=np.int64)
     section = tables.lane_section[row]
     start, span = tables.section_start[section], tables.section_length[section]
     nodes, weights = np.polynomial.legendre.leggauss(7)
     length = np.zeros(len(row))
     for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
         length += 0.5 * weight * span * tables.stretch(row, start + 0.5 * (1.0 + node) * span)
-    forward = np.array([directions[key.road, key.lane] > 0 for key in keys], dtype=bool)
+    forward = np.array([directions[key.road, key.lane] > 0 for key in rows], dtype=bool)
     ends = tables.lane_poses(row, np.where(forward, start + span, start), np.zeros(len(row)))
-    for key, meters, x, y in zip(keys, length.tolist(), ends.x.tolist(), ends.y.tolist(), strict=True):
-        graph.nodes[key].update(length=meters, end=(x, y))
+    measured = zip(
+        rows, tables.lane_drivable[row].tolist(), length.tolist(), ends.x.tolist(), ends.y.tolist(), strict=True
+    )
+    return {key: {"drivable": drivable, "length": meters, "end": (x, y)} for key, drivable, meters, x, y in measured}
 
 
 def _neighbors(section: LaneSection) -> Iterator[tuple[int, int]]:
@@ -101,53 +126,90 @@ def _usable(lane: Lane, section: LaneSection) -> bool:
 
 
 def find_lanes(
-    graph: LaneGraph, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation, cost: Cost | None = None
+    ways: LaneWays, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation, cost: Cost | None = None
 ) -> tuple[LaneKey, ...]:
     """Return the lanes of the cheapest route: by A* with the straight distance to the end, by Dijkstra with a `cost`.
 
     Raise RouteError if there is none.
     """
     source, target = _key(roads, start), _key(roads, end)
-    goal = graph.nodes[target]["end"] if target in graph else (0.0, 0.0)
-    last = graph.nodes[target]["length"] if target in graph else 0.0
+    successors: Successors = ways.successors
+    goal = ways.nodes[target]["end"] if target in ways.nodes else (0.0, 0.0)
+    last = ways.nodes[target]["length"] if target in ways.nodes else 0.0
 
-    def bound(key: LaneKey, _: LaneKey) -> float:
+    def bound(key: LaneKey) -> float:
         # The cost counts up to the start of the target; lanes of real maps meet within a few centimeters.
-        x, y = graph.nodes[LaneKey(*key[:3])]["end"]
+        x, y = ways.nodes[LaneKey(*key[:3])]["end"]
         return max(0.99 * (math.hypot(goal[0] - x, goal[1] - y) - last) - 1.0, 0.0)
 
     behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < -REACHED_DISTANCE
-    if source[:2] == target[:2] and behind and source in graph:
-        graph, source = _with_start_copy(graph, source)
-    try:
-        found: Sequence[LaneKey]
-        if cost is None:
-            found = nx.astar_path(graph, source, target, heuristic=bound, weight="weight")
-        else:
-            found = nx.dijkstra_path(graph, source, target, weight=cost)
-    except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
+    if source[:2] == target[:2] and behind and source in successors:
+        successors, source = _with_start_copy(successors, source)
+    found = None
+    if source in successors and target in successors:
+        found = cheapest_path(successors, source, target, cost, bound if cost is None else None)
+    if found is None:
         raise RouteError(
             Diagnostic(
                 f"no route over the lanes leads from road {start.road!r} lane {start.lane} s {start.s:.1f} "
                 f"to road {end.road!r} lane {end.lane} s {end.s:.1f}",
                 "check the direction of the lanes and the links between them",
             )
-        ) from error
+        )
     return tuple(LaneKey(*key[:3]) for key in found)
 
 
-def _with_start_copy(graph: LaneGraph, source: LaneKey) -> tuple[LaneGraph, LaneKey]:
-    """Return a graph with a copy of the section of the source, which has exits but no entries."""
-    copy: LaneGraph = LaneGraph(graph)
-    group = [key for key in graph if key[:2] == source[:2]]
+def cheapest_path(
+    successors: Successors,
+    source: LaneKey,
+    target: LaneKey,
+    cost: Cost | None = None,
+    bound: Callable[[LaneKey], float] | None = None,
+) -> list[LaneKey] | None:
+    """Return the cheapest path by A* (Hart, Nilsson and Raphael 1968); None if no path exists.
+
+    cost   cost of an edge; by default its weight
+    bound  lower bound of the cost from a node to the target; None: 0, as by Dijkstra
+
+    Of the paths with equal estimates, the one that was found first is continued first.
+    """
+    numbers = count()
+    waiting: list[tuple[float, int, float, LaneKey, LaneKey | None]] = [(0.0, next(numbers), 0.0, source, None)]
+    least = {source: 0.0}
+    origins: dict[LaneKey, LaneKey | None] = {}
+    while waiting:
+        _, _, length, key, origin = heappop(waiting)
+        if length > least[key]:
+            continue
+        origins[key] = origin
+        if key == target:
+            path: list[LaneKey] = []
+            step: LaneKey | None = key
+            while step is not None:
+                path.append(step)
+                step = origins[step]
+            return path[::-1]
+        for other, data in successors[key].items():
+            longer = length + (data["weight"] if cost is None else cost(key, other, data))
+            if longer < least.get(other, math.inf):
+                least[other] = longer
+                estimate = longer if bound is None else longer + bound(other)
+                heappush(waiting, (estimate, next(numbers), longer, other, key))
+    return None
+
+
+def _with_start_copy(successors: Successors, source: LaneKey) -> tuple[Successors, LaneKey]:
+    """Return the edges with a copy of the section of the source, which has exits but no entries."""
 
     def twin(key: LaneKey) -> LaneKey:
         return _StartLane(*key)
 
-    for key in group:
-        for _, other, data in graph.out_edges(key, data=True):
-            copy.add_edge(twin(key), twin(other) if data["kind"] == "change" else other, **data)
-    return copy, twin(source)
+    copies = {
+        twin(key): {twin(other) if data["kind"] == "change" else other: data for other, data in edges.items()}
+        for key, edges in successors.items()
+        if key[:2] == source[:2]
+    }
+    return {**successors, **copies}, twin(source)
 
 
 class _StartLane(LaneKey):

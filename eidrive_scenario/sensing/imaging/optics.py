@@ -6,7 +6,6 @@ import math
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Floats
@@ -41,6 +40,9 @@ class Optics:
 
     def distort(self, radiance: Radiance) -> Radiance:
         """Return the image of the lens; depth and segmentation are those of the nearest ray, not interpolated."""
+
+        import cv2
+
         luminance: Any
         luminance, depth, segmentation = radiance
         if self._supersampling > 1:
@@ -62,6 +64,9 @@ def _distortion(settings: CameraSettings) -> _Distortion:
 
     Raise SettingError if the iteration does not converge, as with strong coefficients that compensate each other.
     """
+
+    import cv2
+
     lens = lens_of(settings)
     columns, rows = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
     pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
@@ -79,6 +84,9 @@ def _distortion(settings: CameraSettings) -> _Distortion:
 
 def _check_convergence(rays: Array, pixels: Array, lens: Pinhole, settings: CameraSettings) -> None:
     """Raise SettingError unless each direction (N, 2) projects within a tenth of a pixel of its position (N, 2)."""
+
+    import cv2
+
     along = np.column_stack([rays, np.ones(len(rays))])
     none = np.zeros(3)
     projected = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0][:, 0]

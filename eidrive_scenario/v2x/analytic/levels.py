@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import erf
 
 from eidrive_scenario.arrays import Array
 
@@ -27,6 +26,9 @@ REACH, FARTHEST_INTERFERER = 1500, 1000
 
 def sensed_share(power: Array, threshold: float, spread: float) -> Array:
     """Return the share of packets above the threshold, by mean power and spread of the shadowing [dBm, dB]."""
+
+    from scipy.special import erf
+
     share: Array = 0.5 * (1.0 + erf((power - threshold) / (spread * math.sqrt(2.0))))
     return share
 

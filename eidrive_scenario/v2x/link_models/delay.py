@@ -10,7 +10,6 @@ import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
-from scipy.special import gammaincinv, ndtr, ndtri
 
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.link_models.delay_trace import TraceDelay
@@ -75,12 +74,17 @@ class TruncatedNormalDelay(_RandomDelay):
 
     @property
     def _mass(self) -> tuple[float, float]:
+        from scipy.special import ndtr
+
         low = float(ndtr((self.minimum - self.mean) / self.sd))
         high = 1.0 if self.maximum is None else float(ndtr((self.maximum - self.mean) / self.sd))
         return low, high
 
     def quantile(self, u: float) -> float:
         """Return the quantile of the delay at probability `u` [s]."""
+
+        from scipy.special import ndtri
+
         low, high = self._mass
         delay = self.mean + self.sd * float(ndtri(low + u * (high - low)))
         return min(max(delay, self.minimum), math.inf if self.maximum is None else self.maximum)
@@ -104,6 +108,9 @@ class ShiftedGammaDelay(_RandomDelay):
 
     def quantile(self, u: float) -> float:
         """Return the quantile of the delay at probability `u` [s]."""
+
+        from scipy.special import gammaincinv
+
         return self.minimum + (self.mean - self.minimum) / 2.0 * float(gammaincinv(2.0, u))
 
 
@@ -117,6 +124,9 @@ class LognormalDelay(_RandomDelay):
 
     def quantile(self, u: float) -> float:
         """Return the quantile of the delay at probability `u` [s]."""
+
+        from scipy.special import ndtri
+
         variance = math.log1p((self.sd / self.mean) ** 2)
         exponent = math.log(self.mean) - variance / 2.0 + math.sqrt(variance) * float(ndtri(u))
         return self.minimum + math.exp(exponent)

@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
-from scipy.special import gammaincinv
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
@@ -46,6 +45,9 @@ class Nakagami(Settings):
 
     def gain_db(self, distance: Array, draws: Array) -> Array:
         """Return the fading gain (N,) [dB] at these distances [m]; `draws` (N,) in (0, 1)."""
+
+        from scipy.special import gammaincinv
+
         shape = np.array(self.m)[np.searchsorted(self.distances, distance, side="right")]
         gain: Array = 10.0 * np.log10(np.maximum(gammaincinv(shape, draws) / shape, 1e-30))
         return gain

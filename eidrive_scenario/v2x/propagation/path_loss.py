@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
-from scipy.special import ndtri
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.settings import Settings
@@ -102,6 +101,8 @@ class Tr37885(Settings):
     def _blockage_loss(self, mean: Array, spread: Array, draws: Array | float) -> Array:
         if self.blockage == "mean":
             return mean
+        from scipy.special import ndtri
+
         if self.blockage == "normal":
             return np.maximum(0.0, mean + spread * ndtri(draws))
         positive = np.where(mean > 0.0, mean, 1.0)

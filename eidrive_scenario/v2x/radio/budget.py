@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
@@ -90,6 +89,8 @@ class LinkBudget:
         return self._at_scalar(surroundings) if 0 < len(self._pairs) <= MAX_SCALAR else self._at_array(surroundings)
 
     def _at_array(self, surroundings: RadioEnvironment) -> Budget:
+        from scipy.special import ndtr
+
         names, positions = surroundings.names, surroundings.positions
         first, second = self._first, self._second
         distance = np.linalg.norm(positions[first] - positions[second], axis=1)
@@ -105,6 +106,9 @@ class LinkBudget:
 
     def _at_scalar(self, surroundings: RadioEnvironment) -> Budget:
         """Return the link budget, evaluated pair by pair."""
+
+        from scipy.special import ndtr
+
         names = surroundings.names
         places = [surroundings.places[name] for name in names]
         moved = [math.dist(here, there) for here, there in zip(self._places.tolist(), places, strict=True)]
@@ -152,6 +156,9 @@ class LinkBudget:
 
     def _update_pair(self, pair: int, covered: float, state: int) -> tuple[float, float]:
         """Return `_update_shadowing` of one pair of stations after the covered distance [m]."""
+
+        from scipy.special import ndtri
+
         shadow, blockage = self._normals[:, pair].tolist()
         if covered == 0.0:
             return shadow, blockage
@@ -229,6 +236,9 @@ class LinkBudget:
 
     def _update_shadowing(self, positions: Array, states: Integers) -> Array:
         """Return the standard normal numbers of shadowing and blockage (2, M), updated by the covered distance."""
+
+        from scipy.special import ndtri
+
         step = positions - self._places
         moved = np.sqrt(np.einsum("ni,ni->n", step, step))
         covered = moved[self._first] + moved[self._second]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,6 +120,9 @@ class Renderer:
         `ground` is the height of the road below it, for reflections [m]. Scenery is cached from the second image with
         the same content on.
         """
+
+        import cv2
+
         light = daylight(weather)
         view = CameraView(pose, pinhole)
         grid = shadow_grid(light.towards, view) if light.sun.any() else None
@@ -284,6 +286,9 @@ def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circu
 
 def _with_glare(image: Floats) -> Floats:
     """Return the image with light of bright lamps scattered into their surroundings."""
+
+    import cv2
+
     height, width = image.shape[:2]
     small = cv2.resize(image, (max(width // 4, 1), max(height // 4, 1)), interpolation=cv2.INTER_AREA)
     spread = cv2.GaussianBlur(small, (0, 0), max(width / 4 / 50.0, 0.8)) * 0.7

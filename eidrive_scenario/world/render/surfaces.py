@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import cv2
 import numpy as np
 
 from eidrive_scenario.arrays import Floats
@@ -15,6 +14,9 @@ SIZE = 512
 
 def _blurred(draws: Floats, deviation: float) -> Floats:
     """Return a periodic table (SIZE, SIZE) blurred by a Gaussian of this deviation without a seam."""
+
+    import cv2
+
     margin = int(np.ceil(4.5 * deviation)) + 1
     blurred = np.asarray(cv2.GaussianBlur(np.pad(draws, margin, mode="wrap"), (0, 0), deviation), dtype=np.float32)
     return blurred[margin:-margin, margin:-margin]

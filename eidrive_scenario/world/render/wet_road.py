@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +30,9 @@ def add_reflections(
 
     `ground` is the height of the road below the camera [m].
     """
+
+    import cv2
+
     if not len(on_road):
         return
     numbers = np.arange(planes.shape[1]).reshape(view.shape)[::2, ::2]
@@ -87,6 +89,9 @@ def mirrored(
 
 def blurred(image: Floats) -> Floats:
     """Return the image (H, W, 3) as reflected by a rough surface: blurred mainly vertically."""
+
+    import cv2
+
     height, width = image.shape[:2]
     tall = max(3, round(height / 24)) | 1
     wide = max(1, round(width / 160)) | 1

@@ -26,6 +26,27 @@ def test_elements_are_frozen_and_picklable() -> None:
     assert again.world_position.line == 7
 
 
+def test_element_requires_its_fields_and_no_other() -> None:
+    with pytest.raises(TypeError, match="WorldPosition requires y"):
+        model.WorldPosition(x=1.0)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="WorldPosition has no field w"):
+        model.WorldPosition(x=1.0, y=2.0, w=3.0)  # type: ignore[call-arg]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        del model.WorldPosition(x=1.0, y=2.0).x
+
+
+def test_elements_of_different_content_or_class_are_unequal() -> None:
+    position = model.WorldPosition(x=1.0, y=2.0)
+    assert position != dataclasses.replace(position, y=3.0)
+    assert dataclasses.replace(position, y=3.0) == model.WorldPosition(x=1.0, y=3.0)
+    assert model.AbsoluteSpeed(value=1.0) != model.AbsoluteTargetSpeed(value=1.0)
+
+
+def test_text_of_element_omits_its_location() -> None:
+    distance = model.TargetDistanceSteadyState(distance=2.0, line=7, source="a.xosc")
+    assert repr(distance) == "TargetDistanceSteadyState(distance=2.0)"
+
+
 def test_chosen_returns_the_set_alternative() -> None:
     world = model.WorldPosition(x=0.0, y=0.0)
     assert model.Position(world_position=world).chosen() is world

@@ -9,6 +9,7 @@ import pytest
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, ring_xml, road_xml, section_xml
 
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, RouteError
+from eidrive_scenario.roads.routing.graph import cheapest_path
 
 
 @pytest.fixture
@@ -171,3 +172,30 @@ def test_route_through_a_junction_twice_selects_the_branch_of_each_visit() -> No
             passed.append(place.road)
     assert passed == ["a", "to_b", "b", "a", "to_c", "c"]
     assert visit == 5
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_cheapest_path_has_cost_of_networkx(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    keys = [LaneKey(str(number), 0, -1) for number in range(40)]
+    edges = {
+        key: {
+            keys[other]: {"weight": float(generator.integers(1, 9))} for other in generator.integers(0, 40, 2).tolist()
+        }
+        for key in keys
+    }
+    graph: nx.DiGraph[LaneKey] = nx.DiGraph()
+    graph.add_nodes_from(keys)
+    graph.add_edges_from((one, other, data) for one, ways in edges.items() for other, data in ways.items())
+    costs = nx.single_source_dijkstra_path_length(graph, keys[0])
+    to_target = nx.single_source_dijkstra_path_length(graph.reverse(), keys[1])
+    found = cheapest_path(edges, keys[0], keys[1])
+    bounded = cheapest_path(edges, keys[0], keys[1], bound=lambda key: 0.9 * to_target.get(key, 1e9))
+    squared = cheapest_path(edges, keys[0], keys[1], cost=lambda one, other, data: data["weight"] ** 2)
+    if keys[1] not in costs:
+        assert (found, bounded, squared) == (None, None, None)
+        return
+    assert found is not None
+    assert bounded is not None
+    assert nx.path_weight(graph, found, "weight") == nx.path_weight(graph, bounded, "weight") == costs[keys[1]]
+    assert squared == nx.dijkstra_path(graph, keys[0], keys[1], weight=lambda one, other, data: data["weight"] ** 2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -59,6 +58,9 @@ def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats
     A pixel whose sample is empty uses the maximum of its neighbors. A pixel at another depth than the sample uses the
     minimum, so that light does not leak over edges.
     """
+
+    import cv2
+
     grid = np.full(seen.shape, np.float32(-1.0))
     grid[seen] = values
     greatest = np.asarray(cv2.dilate(grid, _SQUARE), dtype=np.float32)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-import cv2
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Floats
@@ -26,6 +25,9 @@ _NIGHT_CLOUDS = 0.3
 
 def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
     """Return the light (…, 3) of the dome in directions of unit vector components (H, W), at least at the horizon."""
+
+    import cv2
+
     level = np.maximum(z, np.float32(0.0))
     scale = np.float32((SIZE - 2) / 2) / (np.float32(1.0) + level)
     middle = np.float32((SIZE - 1) / 2)
@@ -144,6 +146,9 @@ def _clouds(cover: float) -> tuple[Array, Array]:
 
 def _noise(u: Array, v: Array) -> Array:
     """Return smooth noise of zero mean: octaves of a table, periodic without a seam."""
+
+    import cv2
+
     total = np.zeros_like(u)
     for octave in range(5):
         scale = 3.2 * 2.1**octave

@@ -1,0 +1,38 @@
+"""Nearest points of small and large sets, compared with the k-d tree of scipy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from eidrive_scenario.roads.geometry.nearest import FEW, NearestPoints
+
+
+@pytest.mark.parametrize("size", [1, 40, FEW, FEW + 1])
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_nearest_points_equal_those_of_tree(size: int, dimensions: int) -> None:
+    generator = np.random.default_rng(size)
+    points, to = (generator.uniform(-100.0, 100.0, (count, dimensions)) for count in (size, 700))
+    tree, found = cKDTree(points), NearestPoints(points)
+    for within in (np.inf, 5.0):
+        distance, index = found.nearest(to, within)
+        expected, number = tree.query(to, k=1, distance_upper_bound=within)
+        np.testing.assert_array_equal(distance, expected)
+        np.testing.assert_array_equal(index, number)
+    several = min(size, 12)
+    distance, index = found.several(to, several)
+    expected, number = tree.query(to, k=list(range(1, several + 1)))
+    np.testing.assert_array_equal(distance, expected)
+    np.testing.assert_array_equal(index, number)
+
+
+def test_nearest_points_at_same_distance_start_with_lowest_index() -> None:
+    points = NearestPoints(np.array([[9.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]))
+    assert points.nearest(np.zeros((1, 2)))[1].tolist() == [1]
+    assert points.several(np.zeros((1, 2)), 4)[1].tolist() == [[1, 2, 3, 4]]
+
+
+def test_nearest_points_of_no_point_are_empty() -> None:
+    points = NearestPoints(np.zeros((3, 2)))
+    assert [len(part) for part in (*points.nearest(np.empty((0, 2))), *points.several(np.empty((0, 2)), 2))] == [0] * 4
