@@ -266,7 +266,6 @@ CHANNELS: Mapping[str, Mapping[str, Any]] = {
 }
 """Channel profiles that are right."""
 
-
 WEATHER: Mapping[str, Mapping[str, Any]] = {
     "weather": {
         "name": "all",
