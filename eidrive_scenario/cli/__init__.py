@@ -16,6 +16,7 @@ from eidrive_scenario.cli.error_output import Guarded, print_error
 from eidrive_scenario.cli.init import init
 from eidrive_scenario.cli.reproduce import reproduce
 from eidrive_scenario.cli.run import run
+from eidrive_scenario.cli.short_help import ShortHelp
 from eidrive_scenario.cli.show import list_names, report, tree, view
 from eidrive_scenario.cli.streams import make_writable
 from eidrive_scenario.cli.supervision import allow
@@ -25,18 +26,19 @@ from eidrive_scenario.exit_codes import ABORTED
 app = typer.Typer(
     name="eidrive",
     cls=Guarded,
-    help="Run OpenSCENARIO files with cooperative perception, and evaluate them.",
+    help="Run OpenSCENARIO files with cooperative perception, and evaluate them.\n\n"
+    "Example: eidrive run coop/scenario_1",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(run)
+app.command(cls=ShortHelp)(run)
 app.command()(check)
 app.command(name="list")(list_names)
 app.command()(tree)
 app.command()(view)
 app.command()(report)
-app.command()(sweep)
+app.command(cls=ShortHelp)(sweep)
 app.command()(results)
 app.command()(compare)
 app.command()(reproduce)

@@ -10,13 +10,11 @@ Drive = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME[=STACK]",
-        help="Give entity NAME a driving stack, with the properties in a YAML file or mapping STACK; repeatable.",
+        help="Give entity NAME a driving stack with the properties STACK (YAML or file).",
     ),
 ]
-Planner = Annotated[str | None, typer.Option(help="Planner of all driven stations.", show_default="the file's")]
+Planner = Annotated[str | None, typer.Option(help="Planner of all driven stations.", show_default=False)]
 Criteria = Annotated[
     list[str] | None,
-    typer.Option(
-        metavar="YAML|FILE", help="Add criteria, such as '{collision: {of: Ego}}', or those of a file; repeatable."
-    ),
+    typer.Option(metavar="YAML|FILE", help="Add criteria, such as '{collision: {of: Ego}}'; repeatable."),
 ]

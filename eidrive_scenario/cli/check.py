@@ -41,6 +41,8 @@ def check(
 ) -> None:
     """Print all diagnostics of scenarios, distributions and roads as `file:line: problem; hint`.
 
+    Example: eidrive check scenarios --strict
+
     A diagnostic of a rule ends with the name of the rule; `eidrive list rules` lists all rules.
     """
     from eidrive_scenario.checks.distribution_checks import DistributionCheckReport

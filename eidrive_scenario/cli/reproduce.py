@@ -40,7 +40,10 @@ def reproduce(
         bool, typer.Option("--restart", help="Repeat the runs of the record, too; without it they are kept.")
     ] = False,
 ) -> None:
-    """Reproduce the experiments of the EI-Drive paper, and write reports with its numbers beside the measured ones."""
+    """Reproduce the experiments of the EI-Drive paper, and write reports with its numbers beside the measured ones.
+
+    Example: eidrive reproduce table2 --episodes 5 --out reports/paper
+    """
     from rich.console import Console
 
     from eidrive_scenario.experiments.reproduction.parts import ALL, selected_detectors, selected_parts

@@ -12,6 +12,7 @@ from eidrive_scenario.cli.added_options import Criteria, Drive, Planner
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
+from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.cli.streams import has_all_characters
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import ConstraintError, Diagnostic, EidriveError, InputError, SettingError
@@ -26,81 +27,101 @@ def run(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="An .xosc file, or a library name such as coop/scenario_1. All runs of a distribution are executed."
+            help="An .xosc file, or a library name; all runs of a distribution.",
         ),
     ],
     channel: Annotated[
         str | None,
         typer.Option(
-            help="Channel profile: name, file or YAML mapping; none: no cooperation.",
-            show_default="the file's",
+            help="Channel profile: name, file or YAML; none: no cooperation.",
+            show_default=False,
         ),
     ] = None,
-    detector: Annotated[str | None, typer.Option(help="Detector of all stations.", show_default="the file's")] = None,
+    detector: Annotated[str | None, typer.Option(help="Detector of all stations.", show_default=False)] = None,
     planner: Planner = None,
-    weather: Annotated[
-        str | None, typer.Option(help="Weather preset: name or file.", show_default="the file's")
-    ] = None,
+    weather: Annotated[str | None, typer.Option(help="Weather preset: name or file.", show_default=False)] = None,
     cooperate: Annotated[
         str | None,
-        typer.Option(metavar="A,B|none", help="Senders whose messages are used.", show_default="the file's"),
+        typer.Option(metavar="A,B|none", help="Senders whose messages are used.", show_default=False),
     ] = None,
     param: Annotated[
-        list[str] | None, typer.Option(metavar="K=V", help="Value of a parameter of the scenario; repeatable.")
+        list[str] | None, typer.Option(metavar="K=V", help="Parameter of the scenario; repeatable.")
     ] = None,
     user_value: Annotated[
-        list[str] | None, typer.Option(metavar="K=V", help="Value for UserDefinedValueConditions; repeatable.")
+        list[str] | None,
+        rare(metavar="K=V", help="Value for UserDefinedValueConditions; repeatable."),
     ] = None,
     controller: Annotated[
         list[str] | None,
-        typer.Option(metavar="K=V", help="Model V, such as alks, of controller K of another tool; repeatable."),
+        rare(
+            metavar="K=V",
+            help="Model V, such as alks, of controller K of another tool; repeatable.",
+        ),
     ] = None,
     drive: Drive = None,
     criterion: Criteria = None,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
-    repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with consecutive seeds from --seed.")] = 1,
+    repeat: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs; seeds from --seed on.")] = 1,
     success_rate: Annotated[
         float | None,
         typer.Option(
             metavar="RATE",
-            help="Run seeds until they show whether the success rate is at least RATE; at most --repeat, or 500.",
+            help="Run seeds until it is shown whether the success rate is RATE; at most --repeat, or 500.",
         ),
     ] = None,
-    confidence: Annotated[float, typer.Option(help="Confidence of --success-rate.")] = 0.95,
+    confidence: Annotated[float, rare(help="Confidence of --success-rate.")] = 0.95,
     max_runs: Annotated[
         int | None,
-        typer.Option(min=1, help="Maximum runs of a distribution, spread over its values.", show_default="all"),
+        rare(
+            min=1,
+            help="Maximum runs of a distribution, spread over its values.",
+            show_default="all",
+        ),
     ] = None,
-    dt: Annotated[float, typer.Option(help="Time step in seconds.")] = 0.05,
+    dt: Annotated[float, rare(help="Time step in seconds.")] = 0.05,
     wall_limit: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Maximum wall time of each run with loading.", show_default="none"),
+        rare(
+            metavar="SECONDS",
+            help="Maximum wall time of each run with loading.",
+            show_default="none",
+        ),
     ] = None,
-    time_limit: Annotated[float, typer.Option(help="Maximum simulated time in seconds.")] = 120.0,
+    time_limit: Annotated[float, rare(help="Maximum simulated time in seconds.")] = 120.0,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for one subfolder per run: recording, camera images, result.json."),
+        typer.Option(help="Folder of a subfolder per run: recording, result.json."),
     ] = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Omit recording.mcap and camera images.")] = False,
-    csv: Annotated[Path | None, typer.Option(help="File for one row per actor and tick.")] = None,
+    no_record: Annotated[bool, rare("--no-record", help="Omit recording.mcap and camera images.")] = False,
+    csv: Annotated[Path | None, rare(help="File for one row per actor and tick.")] = None,
     log: Annotated[
-        str | None, typer.Option(metavar="FILE|-", help="File for storyboard transitions and reasons; -: stdout.")
+        str | None,
+        rare(metavar="FILE|-", help="File for storyboard transitions and reasons; -: stdout."),
     ] = None,
     explain: Annotated[
         list[str] | None,
-        typer.Option(metavar="EVENT", help="Explain the start of an event or act, or its absence; repeatable."),
+        rare(
+            metavar="EVENT",
+            help="Explain the start of an event or act, or its absence; repeatable.",
+        ),
     ] = None,
     allow_torchscript: Annotated[
         bool,
-        typer.Option(
+        rare(
             "--allow-torchscript",
             envvar="EIDRIVE_ALLOW_TORCHSCRIPT",
             help="Load TorchScript weights, which can execute any code with your permissions.",
         ),
     ] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run and nothing else.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run only.")] = False,
+    help_all: HelpAll = False,
 ) -> None:
-    """Run and evaluate a scenario, or all runs of a parameter value distribution."""
+    """Run and evaluate a scenario, or all runs of a parameter value distribution.
+
+    Example: eidrive run coop/scenario_1 --channel latency_300ms --repeat 10 --out reports
+
+    Without an option, the scenario file decides.
+    """
     from eidrive_scenario.cli.verdicts import show, show_warnings
     from eidrive_scenario.experiments.commands import reproduction_lines
     from eidrive_scenario.experiments.single_run import as_json_text, run_and_save

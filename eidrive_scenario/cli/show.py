@@ -34,7 +34,10 @@ class Names(StrEnum):
 
 
 def list_names(what: Annotated[Names, typer.Argument(help="Kind of the names.")] = Names.scenarios) -> None:
-    """List names of the library or of installed extensions."""
+    """List names of the library or of installed extensions.
+
+    Example: eidrive list channels
+    """
     from eidrive_scenario import library
     from eidrive_scenario.registry import registry
 
@@ -96,7 +99,10 @@ def tree(
     scenario: Annotated[str, typer.Argument(help="An .xosc file, or a library name.")],
     svg: Annotated[Path | None, typer.Option(metavar="FILE", help="SVG file for a diagram instead of text.")] = None,
 ) -> None:
-    """Print the storyboard of a scenario as a tree with its triggers, or draw it as a diagram."""
+    """Print the storyboard of a scenario as a tree with its triggers, or draw it as a diagram.
+
+    Example: eidrive tree coop/scenario_1 --svg storyboard.svg
+    """
     from eidrive_scenario.cli.storyboard_tree import storyboard_tree
     from eidrive_scenario.cli.verdicts import console
     from eidrive_scenario.library import resolve_scenario
@@ -123,7 +129,10 @@ def view(
     ] = None,
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
-    """Write a recorded run as an HTML replay."""
+    """Write a recorded run as an HTML replay.
+
+    Example: eidrive view reports/scenario_1 --browser
+    """
     from eidrive_scenario.recording.recording import open_recording
     from eidrive_scenario.recording.run_files import RESULT, is_partial, recording_in, result_of
     from eidrive_scenario.reporting.replay import make_replay
@@ -151,6 +160,8 @@ def report(
     ] = None,
 ) -> None:
     """Write an HTML report of many runs.
+
+    Example: eidrive report reports --out reports/report.html
 
     Below folders, damaged results and runs that did not end are omitted with a warning; the page lists them.
     """

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
+from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.exit_codes import ABORTED, PASSED
 
@@ -22,57 +23,62 @@ USUAL_LIMIT = 1800.0
 
 def sweep(
     scenario: Annotated[str, typer.Argument(help="An .xosc file or a library name; all runs of a distribution.")],
-    store: Annotated[Path, typer.Option(help="SQLite file of the results. A file with results is continued.")],
+    store: Annotated[Path, typer.Option(help="SQLite file of results, which is continued.")],
     vary: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUES",
-            help="Parameter, channel, channel.KEY, detector, planner, weather or cooperate (A+B), over A,B, "
-            "LOW:HIGH:STEP or LOW:HIGH; repeatable.",
+            help="Parameter, channel, channel.KEY, detector, planner, weather or cooperate (A+B), over "
+            "A,B, LOW:HIGH:STEP or LOW:HIGH; repeatable.",
         ),
     ] = None,
     design: Annotated[str, typer.Option(help="grid, lhs (Latin hypercube) or sobol.")] = "grid",
     samples: Annotated[
-        int | None, typer.Option(min=1, help="Combinations of lhs or sobol.", show_default="none")
+        int | None, typer.Option(min=1, metavar="N", help="Combinations of lhs or sobol.", show_default="none")
     ] = None,
     seeds: Annotated[
         str | None, typer.Option(metavar="A-B|A,B", help="Seeds of each combination.", show_default="1")
     ] = None,
-    runs: Annotated[int | None, typer.Option(min=1, help="Total number of runs.", show_default="all")] = None,
-    channel: Annotated[str | None, typer.Option(help="Channel profile of all runs.", show_default="the file's")] = None,
+    runs: Annotated[int | None, rare(min=1, help="Total number of runs.", show_default="all")] = None,
+    channel: Annotated[str | None, typer.Option(help="Channel profile of all runs.", show_default=False)] = None,
     param: Annotated[list[str] | None, typer.Option(metavar="K=V", help="Parameter of all runs; repeatable.")] = None,
-    criterion: Annotated[list[str] | None, typer.Option(metavar="YAML|FILE", help="Add criteria; repeatable.")] = None,
-    time_limit: Annotated[float, typer.Option(help="Maximum simulated time in seconds.")] = 120.0,
-    wall_limit: Annotated[float, typer.Option(help="Maximum wall time of each run in seconds.")] = USUAL_LIMIT,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="number of cores")] = None,
+    criterion: Annotated[list[str] | None, rare(metavar="YAML|FILE", help="Add criteria; repeatable.")] = None,
+    time_limit: Annotated[float, rare(help="Maximum simulated time in seconds.")] = 120.0,
+    wall_limit: Annotated[float, rare(help="Maximum wall time of each run in seconds.")] = USUAL_LIMIT,
+    workers: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processes.", show_default="number of cores")
+    ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS|slurm|kubernetes", help="Dask cluster.", show_default="processes"),
+        rare(metavar="ADDRESS|slurm|kubernetes", help="Dask cluster.", show_default="processes"),
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="I/N", help="Part I of N, for job arrays; a store for each.")
+        str | None,
+        rare(metavar="I/N", help="Part I of N, for job arrays; a store for each."),
     ] = None,
     find_boundary: Annotated[
         str | None,
         typer.Option(metavar="NAME=LOW:HIGH", help="Find the value at which the success rate crosses --bound."),
     ] = None,
-    bound: Annotated[float, typer.Option(help="Success rate of --find-boundary.")] = 0.5,
+    bound: Annotated[float, rare(help="Success rate of --find-boundary.")] = 0.5,
     tolerance: Annotated[
-        float | None, typer.Option(help="Accuracy of --find-boundary.", show_default="2 % of the range")
+        float | None,
+        rare(help="Accuracy of --find-boundary.", show_default="2 % of the range"),
     ] = None,
     falsify: Annotated[
-        bool, typer.Option("--falsify", help="Search the space of --vary for failures, and print different ones.")
+        bool, typer.Option("--falsify", help="Search the space of --vary for different failures.")
     ] = False,
     objective: Annotated[
         str | None,
-        typer.Option(metavar="METRIC", help="Metric that --falsify minimizes instead of margins."),
+        rare(metavar="METRIC", help="Metric that --falsify minimizes instead of margins."),
     ] = None,
-    retry: Annotated[bool, typer.Option("--retry", help="Repeat aborted and crashed runs of the store.")] = False,
+    retry: Annotated[bool, rare("--retry", help="Repeat aborted and crashed runs of the store.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would run.")] = False,
+    help_all: HelpAll = False,
 ) -> None:
     """Run a scenario over parameters, settings and seeds; a killed sweep continues with the same command.
 
-    Example: eidrive sweep coop/scenario_1 --vary channel.delay.seconds=0:1:0.1 --seeds 1-10 --store s.db
+    Example: eidrive sweep coop/scenario_1 --vary channel.delay.seconds=0:1:0.1 --store s.db
     """
     from eidrive_scenario.cli.sweep_progress import ProgressDisplay
     from eidrive_scenario.cli.sweep_search import Search
