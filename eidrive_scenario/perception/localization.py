@@ -225,7 +225,7 @@ def _moved(boxes: Array, rigid: Array, turn: float) -> Array:
 
 
 def _camera(reading: CameraReading, rigid: Array) -> CameraReading:
-    return replace(reading, pose=rigid @ reading.pose)
+    return reading.at(rigid @ reading.pose)
 
 
 def _lidar(reading: LidarReading, rigid: Array) -> LidarReading:

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import ClassVar
+from functools import cached_property
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.imaging.exposure import develop, meter_exposure
 from eidrive_scenario.sensing.imaging.optics import Optics, lens_of
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading
-from eidrive_scenario.sensing.scene import Scene
+from eidrive_scenario.sensing.scene import Scene, UndrawnImage
 from eidrive_scenario.sensing.sensor import Sensor
 from eidrive_scenario.sensing.settings import CameraSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.camera import CameraImage, Radiance
 from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.weather import Weather
 
 DROPS_STAY = 2.0
 """Time that drops stay on a lens before others replace them [s]."""
@@ -49,15 +53,57 @@ class Camera(Sensor):
 
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
         """Return an image from the actor in this row."""
-        seed, *key = self._key
-        return self._image_sensor.capture(
-            scene,
-            self.mounting.camera_pose(view, row),
-            generator(seed, *key, view.tick),
-            ignore=(*view.unseen_by.get(self.name, ()), *self._ignored),
-            velocity=view.velocity[row],
-            lens=generator(seed, *key, "lens", int(view.time / DROPS_STAY)),
+        sensor, pose = self._image_sensor, self.mounting.camera_pose(view, row)
+        ignored = (*view.unseen_by.get(self.name, ()), *self._ignored)
+        exposure = _Exposure(
+            sensor,
+            scene.image(pose, sensor.pinhole, ignore=ignored),
+            _Conditions(
+                self.settings,
+                scene.weather,
+                pose,
+                view.velocity[row],
+                (*self._key, view.tick),
+                (*self._key, "lens", int(view.time / DROPS_STAY)),
+            ),
         )
+        return CameraReading.of(exposure, sensor.intrinsics, pose, np.array(self.settings.distortion))
+
+
+class _Conditions(NamedTuple):
+    """Inputs that determine an image in addition to the light in front of the lens.
+
+    velocity     (3,) of the camera [m/s]
+    noise, lens  keys of the random numbers of the noise and falling drops, and of the drops on the lens
+    """
+
+    settings: CameraSettings
+    weather: Weather
+    pose: Array
+    velocity: Array
+    noise: tuple[int, *tuple[str | int, ...]]
+    lens: tuple[int, *tuple[str | int, ...]]
+
+
+class _Exposure:
+    """Image of a camera that is drawn when its pixels are read."""
+
+    def __init__(self, sensor: ImageSensor, undrawn: UndrawnImage, conditions: _Conditions) -> None:
+        self.size = conditions.settings.width, conditions.settings.height
+        self._sensor = sensor
+        self._undrawn: UndrawnImage | None = undrawn
+        self._conditions = conditions
+
+    @cached_property
+    def digest(self) -> bytes | None:
+        return None if self._undrawn is None else content_digest(self._undrawn.digest, self._conditions)
+
+    @cached_property
+    def image(self) -> CameraImage:
+        assert self._undrawn is not None
+        _, weather, pose, velocity, noise, lens = self._conditions
+        radiance, self._undrawn = self._undrawn.draw(), None  # the content is not needed any more
+        return self._sensor.develop(radiance, weather, pose, generator(*noise), velocity, generator(*lens))
 
 
 class ImageSensor:
@@ -68,6 +114,8 @@ class ImageSensor:
         self._lens = lens_of(settings)
         self.intrinsics = self._lens.intrinsics
         self._optics = Optics(settings)
+        self.pinhole = self._optics.pinhole
+        """Camera of the light that `develop` expects."""
 
     def capture(
         self,
@@ -85,13 +133,25 @@ class ImageSensor:
         `draws` generates noise and falling drops, `lens` the drops on the lens (None: no drops); velocity (3,) of the
         camera [m/s]. Equal scenes, poses and generator states give equal images.
         """
+        radiance = scene.radiance(pose, self.pinhole, ignore=ignore)
+        image = self.develop(radiance, scene.weather, pose, draws, velocity, lens)
+        return CameraReading(*image, self.intrinsics, pose, np.array(self.settings.distortion))
+
+    def develop(
+        self,
+        radiance: Radiance,
+        weather: Weather,
+        pose: Array,
+        draws: np.random.Generator,
+        velocity: Array | tuple[float, float, float],
+        lens: np.random.Generator | None,
+    ) -> CameraImage:
+        """Return the image of the light that reaches the camera `pinhole`, with the arguments of `capture`."""
         settings = self.settings
-        radiance = self._optics.distort(scene.radiance(pose, self._optics.pinhole, ignore=ignore))
-        draw_precipitation(radiance.luminance, scene.weather, pose, self._lens, draws, velocity)
+        radiance = self._optics.distort(radiance)
+        draw_precipitation(radiance.luminance, weather, pose, self._lens, draws, velocity)
         if lens is not None and settings.lens_drops:
-            draw_drops_on_lens(radiance.luminance, scene.weather, lens)
+            draw_drops_on_lens(radiance.luminance, weather, lens)
         exposure = meter_exposure(radiance.luminance, settings)
         rgb = develop(radiance.luminance, exposure, settings.noise, draws)
-        return CameraReading(
-            rgb, radiance.depth, radiance.segmentation, self.intrinsics, pose, np.array(settings.distortion)
-        )
+        return CameraImage(rgb, radiance.depth, radiance.segmentation)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.world.camera import CameraImage
 
 NOTHING_ATTACHED: Array = np.empty((0, 7))
 """Boxes of the trailers of a station without one."""
@@ -47,20 +48,99 @@ class TruthReading(msgspec.Struct, frozen=True):
     visibility: Array
 
 
-class CameraReading(msgspec.Struct, frozen=True):
+class Exposure(Protocol):
+    """Image of a camera that is drawn when its pixels are read."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+
+    @property
+    def digest(self) -> bytes | None:
+        """Digest of everything that determines the image, None if it is unknown. Equal digests mean equal images."""
+
+    @property
+    def image(self) -> CameraImage:
+        """The image, drawn by the first access."""
+
+
+class CameraReading:
     """Image and camera pose.
 
     rgb (H, W, 3) uint8, depth (H, W) float32 along the optical axis [m], segmentation (H, W) int32: row of the actor in
     the view of the world, -1 for everything else; intrinsics (3, 3) [px], where pixel (j, i) covers [j, j + 1) x [i, i
     + 1); pose (4, 4) camera to world, camera frame x right, y down, z forward; distortion (5,) k1, k2, p1, p2, k3
+
+    The image of a simulated camera is drawn by the first access to its pixels, so that an image that nothing reads
+    takes no time.
     """
 
-    rgb: NDArray[np.uint8]
-    depth: NDArray[np.float32]
-    segmentation: NDArray[np.int32]
-    intrinsics: Array
-    pose: Array
-    distortion: Array = msgspec.field(default_factory=lambda: np.zeros(5))
+    __slots__ = ("_exposure", "distortion", "intrinsics", "pose")
+
+    def __init__(
+        self,
+        rgb: NDArray[np.uint8],
+        depth: NDArray[np.float32],
+        segmentation: NDArray[np.int32],
+        intrinsics: Array,
+        pose: Array,
+        distortion: Array | None = None,
+    ) -> None:
+        self._exposure: Exposure = _Drawn(CameraImage(rgb, depth, segmentation))
+        self.intrinsics, self.pose = intrinsics, pose
+        self.distortion: Array = np.zeros(5) if distortion is None else distortion
+
+    @classmethod
+    def of(cls, exposure: Exposure, intrinsics: Array, pose: Array, distortion: Array) -> CameraReading:
+        """Return a reading whose image is drawn when its pixels are read."""
+        found = cls.__new__(cls)
+        found._exposure = exposure
+        found.intrinsics, found.pose, found.distortion = intrinsics, pose, distortion
+        return found
+
+    def at(self, pose: Array) -> CameraReading:
+        """Return the same image with another pose (4, 4) of the camera."""
+        return CameraReading.of(self._exposure, self.intrinsics, pose, self.distortion)
+
+    @property
+    def rgb(self) -> NDArray[np.uint8]:
+        """Image (H, W, 3)."""
+        return self._exposure.image.rgb
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Distance of each pixel along the optical axis (H, W) [m]."""
+        return self._exposure.image.depth
+
+    @property
+    def segmentation(self) -> NDArray[np.int32]:
+        """Row of the actor in each pixel (H, W), -1 for everything else."""
+        return self._exposure.image.segmentation
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        return self._exposure.size
+
+    @property
+    def image_digest(self) -> bytes | None:
+        """Digest of everything that determines the image, None if it is unknown. Equal digests mean equal images."""
+        return self._exposure.digest
+
+
+class _Drawn(NamedTuple):
+    """Image that was given as arrays."""
+
+    image: CameraImage
+
+    @property
+    def size(self) -> tuple[int, int]:
+        height, width = self.image.rgb.shape[:2]
+        return width, height
+
+    @property
+    def digest(self) -> None:
+        return None
 
 
 class LidarReading(msgspec.Struct, frozen=True):

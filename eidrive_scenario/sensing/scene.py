@@ -33,6 +33,17 @@ class RayHitsView(Protocol):
         """Normals (M, 3) of the surfaces, zero without a hit."""
 
 
+class UndrawnImage(Protocol):
+    """Image whose content is fixed, but that is not drawn yet."""
+
+    @property
+    def digest(self) -> bytes:
+        """Digest of everything that determines the image: equal digests mean equal images."""
+
+    def draw(self) -> Radiance:
+        """Return the light that reaches the camera."""
+
+
 class Scene(Protocol):
     """Part of the world that sensors measure."""
 
@@ -48,3 +59,6 @@ class Scene(Protocol):
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """Return the light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""
+
+    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> UndrawnImage:
+        """Return the same image before it is drawn. It shows the current time, also if it is drawn later."""

@@ -29,7 +29,7 @@ from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
 from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.scene.roadside import FIRST_LABEL
-from eidrive_scenario.world.scene.visuals import DisplayState, Visuals
+from eidrive_scenario.world.scene.visuals import DisplayState, UndrawnImage, Visuals
 from eidrive_scenario.world.view import Contact, WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -262,24 +262,27 @@ class World:
         *,
         ignore: Iterable[str] = (),
     ) -> CameraImage:
-        """Return the image of a camera: rgb, depth and segmentation.
+        """Return the image of an ideal camera: automatic exposure, no noise (see `radiance` for others).
 
-        The camera is ideal, with automatic exposure and without noise (see `radiance` for others). pose (4, 4) camera
-        to world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in `ignore` are not drawn.
-        The first image of a world creates all meshes; a world without images never does.
+        pose (4, 4) camera to world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in
+        `ignore` are not drawn. The first image creates all meshes.
         """
         seen = self.radiance(pose, Pinhole.of_fov(width, height, fov, near, far), ignore=ignore)
         rgb = tone_map(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))
         return CameraImage(rgb, seen.depth, seen.segmentation)
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
-        """Return the light that a camera at this pose (4, 4) receives in the current weather, with depth and labels."""
-        if self._visuals is None:
-            self._visuals = Visuals(self._scenery)
-        rows = self.view().rows
-        bodies = {rows[name]: body for name, body in self._bodies.items()}
-        shown = DisplayState(self.time, self._signals, self._appearances)
-        return self._visuals.radiance(bodies, ignore, np.asarray(pose, dtype=float), pinhole, self._weather, shown)
+        """Return the light that a camera at this pose (4, 4) receives now, with depth and labels."""
+        return self.image(pose, pinhole, ignore=ignore).draw()
+
+    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> UndrawnImage:
+        """Return the same image before it is drawn. It shows the current time, also if it is drawn later."""
+        self._visuals = self._visuals or Visuals(self._scenery)
+        shown, bodies = (
+            DisplayState(self.time, self._signals, self._appearances),
+            dict(enumerate(self._bodies.values())),
+        )
+        return self._visuals.image(bodies, ignore, np.array(pose, dtype=float), pinhole, self._weather, shown)
 
     def _body(self, name: str) -> Body:
         body = self._bodies.get(name)

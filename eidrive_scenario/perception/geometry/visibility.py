@@ -25,7 +25,7 @@ def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
     if not len(boxes):
         return np.empty(0)
     points = points_of_boxes(boxes, POINTS)
-    height, width = camera.rgb.shape[:2]
+    width, height = camera.size
     places, _ = pixels(points.reshape(-1, 3), camera)
     places = places.reshape(len(boxes), -1, 2)
     x, y = places[..., 0], places[..., 1]

@@ -95,8 +95,7 @@ class LightsOnMap:
         tops = self._feet[rows] + self._heights[rows, None] * (0.0, 0.0, 1.0)
         low, high = pixels(self._feet[rows], camera)[0], pixels(tops, camera)[0]
         centers, heights = (low + high) / 2.0, np.abs(low - high)[:, 1]
-        size = camera.rgb.shape[1], camera.rgb.shape[0]
-        inside = ((centers >= 0.0) & (centers < size)).all(axis=1) & (heights >= LEAST_HEIGHT)
+        inside = ((centers >= 0.0) & (centers < camera.size)).all(axis=1) & (heights >= LEAST_HEIGHT)
         return [
             LightView(int(rows[k]), self._ids[rows[k]], (float(centers[k, 0]), float(centers[k, 1])), float(heights[k]))
             for k in np.flatnonzero(inside).tolist()

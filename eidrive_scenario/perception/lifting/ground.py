@@ -268,7 +268,7 @@ class _View:
 
 def edges_in_image(boxes: Array, camera: CameraReading) -> Bools:
     """Return whether (N, 4) the edges of image boxes (N, 4) are those of objects, not of the image."""
-    height, width = camera.rgb.shape[:2]
+    width, height = camera.size
     inside = np.concatenate([boxes[:, :2], (width, height) - boxes[:, 2:]], axis=1)
     return np.asarray(inside > (AT_BORDER + EDGE_SHARE * _largest_sides(boxes))[:, None])
 

@@ -110,7 +110,7 @@ def _fit_points(
     behind = np.isnan(places[:, 0])
     aside = (world[behind] - camera.pose[:3, 3]) @ camera.pose[:3, 0]
     places[behind, 0] = np.where(aside < 0.0, -math.inf, math.inf)
-    places[behind, 1] = camera.rgb.shape[0] / 2.0
+    places[behind, 1] = camera.size[1] / 2.0
     away = np.hypot(*(world[:, :2] - camera.pose[:2, 3]).T)
     in_image = edges_in_image(boxes, camera).tolist()
     found: list[Fit | None] = []
@@ -264,7 +264,7 @@ def _image_overlap(fit: Fit, scan: Scan, box: Sequence[float], camera: CameraRea
     outline, _ = pixels(box_corners(scan.frame.boxes_to_world(np.array([fit.box])))[0], camera)
     if np.isnan(outline).any():
         return 1.0
-    height, width = camera.rgb.shape[:2]
+    width, height = camera.size
     left, top = np.clip(outline.min(axis=0), 0.0, (width, height)).tolist()
     right, bottom = np.clip(outline.max(axis=0), 0.0, (width, height)).tolist()
     across, down = min(right, box[2]) - max(left, box[0]), min(bottom, box[3]) - max(top, box[1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Floats, Integers
+from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.world.meshes.palette import MATERIALS, Color
 from eidrive_scenario.world.render.materials import finish_of
 
@@ -49,6 +50,11 @@ class Model:
     radius: float
 
     cells: Cells | None = None
+
+    @cached_property
+    def digest(self) -> bytes:
+        """Digest of the content, which is equal for the same model of another run."""
+        return content_digest(*(getattr(self, each.name) for each in fields(self)))
 
     @cached_property
     def is_coarse(self) -> NDArray[np.bool_]:

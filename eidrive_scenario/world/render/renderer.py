@@ -47,6 +47,21 @@ class Subjects(NamedTuple):
         return (*self.ground, *self.standing)
 
 
+class ImageContent(NamedTuple):
+    """Inputs that determine the light in the pixels of an image.
+
+    pose    (4, 4) camera to world, x right, y down, z forward
+    ground  height of the road below the camera, for reflections [m]
+    """
+
+    subjects: Subjects
+    beams: Sequence[Beam]
+    weather: Weather
+    pose: Array
+    pinhole: Pinhole
+    ground: float
+
+
 class _Circumstances(NamedTuple):
     """Properties that all pixels share."""
 
@@ -106,23 +121,14 @@ class Renderer:
         """Keys of previous images."""
         self._kept: dict[object, _Kept] = {}
 
-    def render(
-        self,
-        subjects: Subjects,
-        beams: Sequence[Beam],
-        weather: Weather,
-        pose: Array,
-        pinhole: Pinhole,
-        ground: float,
-    ) -> Radiance:
-        """Return the light that reaches a camera at `pose`.
+    def render(self, content: ImageContent) -> Radiance:
+        """Return the light that reaches a camera.
 
-        `ground` is the height of the road below it, for reflections [m]. Scenery is cached from the second image with
-        the same content on.
+        Scenery is cached from the second image with the same scenery on.
         """
-
         import cv2
 
+        subjects, beams, weather, pose, pinhole, ground = content
         light = daylight(weather)
         view = CameraView(pose, pinhole)
         grid = shadow_grid(light.towards, view) if light.sun.any() else None

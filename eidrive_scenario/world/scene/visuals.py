@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.roads import surface_meshes
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle
@@ -25,7 +26,7 @@ from eidrive_scenario.world.physics.ground import GroundUnder
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.render.illumination.lamps import Beam
 from eidrive_scenario.world.render.model import Light, MeshInstance, Model, gridded, merged, model, placed
-from eidrive_scenario.world.render.renderer import Renderer, Subjects
+from eidrive_scenario.world.render.renderer import ImageContent, Renderer, Subjects
 from eidrive_scenario.world.road_objects import Building, signal_heads
 from eidrive_scenario.world.scene.roadside import Roadside
 from eidrive_scenario.world.scene.vehicle_lamps import beam, glow
@@ -49,6 +50,23 @@ class DisplayState(NamedTuple):
     appearances: Mapping[str, Appearance] = MappingProxyType({})
 
 
+class UndrawnImage:
+    """Image of a camera that is not drawn yet. Its content is fixed: it does not follow the world."""
+
+    def __init__(self, renderer: Renderer, content: ImageContent) -> None:
+        self._renderer = renderer
+        self._content = content
+
+    @property
+    def digest(self) -> bytes:
+        """Digest of everything that determines the image: equal digests mean equal images."""
+        return content_digest(self._content)
+
+    def draw(self) -> Radiance:
+        """Return the light that reaches the camera."""
+        return self._renderer.render(self._content)
+
+
 class Visuals:
     """Drawable models, placed for each image."""
 
@@ -62,7 +80,7 @@ class Visuals:
         self._buildings: Model | None = None
         self._below: GroundUnder | None = None if scenery.level else GroundUnder(scenery.roads)
 
-    def radiance(
+    def image(
         self,
         bodies: Mapping[int, Body],
         hidden: Iterable[str],
@@ -70,8 +88,8 @@ class Visuals:
         pinhole: Pinhole,
         weather: Weather,
         shown: DisplayState = DisplayState(),  # noqa: B008 - it is immutable
-    ) -> Radiance:
-        """Return the light that reaches a camera; `bodies` are in the order of their rows.
+    ) -> UndrawnImage:
+        """Return the image of a camera; `bodies` are in the order of their rows.
 
         Bodies in `hidden` are not drawn, but cast shadows and emit light. Bodies that the scenario makes invisible do
         neither.
@@ -106,7 +124,7 @@ class Visuals:
             [each for name, each in actors.items() if name in left_out],
         )
         ground = self._below.at(float(pose[0, 3]), float(pose[1, 3]), 0.0)[0] if self._below is not None else 0.0
-        return self._renderer.render(subjects, beams, weather, pose, pinhole, ground)
+        return UndrawnImage(self._renderer, ImageContent(subjects, beams, weather, pose, pinhole, ground))
 
     def _ground_parts(self) -> list[MeshInstance]:
         """Return roads, markings and surrounding land, split by a grid."""

@@ -58,12 +58,27 @@ class BoxScene:
         rows: list[int] = self.raycast(np.array(origins), np.array(targets)).rows.tolist()
         return rows
 
-    def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
+    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> PlainImage:
         self.images.append((pose, pinhole))
-        shape = (pinhole.height, pinhole.width)
-        return Radiance(
-            np.full((*shape, 3), 1000.0, np.float32), np.full(shape, 50.0, np.float32), np.full(shape, -1, np.int32)
-        )
+        return PlainImage((pinhole.height, pinhole.width))
+
+    def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
+        return self.image(pose, pinhole).draw()
+
+
+@dataclass(frozen=True)
+class PlainImage:
+    """Evenly bright image of one distance."""
+
+    shape: tuple[int, int]
+
+    @property
+    def digest(self) -> bytes:
+        return repr(self.shape).encode()
+
+    def draw(self) -> Radiance:
+        light = np.full((*self.shape, 3), 1000.0, np.float32)
+        return Radiance(light, np.full(self.shape, 50.0, np.float32), np.full(self.shape, -1, np.int32))
 
 
 def hit_share(origin: list[float], target: list[float], box: tuple[float, ...]) -> float | None:

@@ -1,0 +1,131 @@
+"""Digests of values: equal digests mean equal content, to the last bit of each number."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from typing import Any, Protocol
+
+import numpy as np
+import pydantic
+
+_NUMBER = struct.Struct("<d")
+
+
+class _Hash(Protocol):
+    def update(self, data: bytes, /) -> object: ...
+
+
+_Encoder = Callable[[_Hash, Any], object]
+
+
+def content_digest(*values: object) -> bytes:
+    """Return a digest (32 bytes) of the types and the content of values.
+
+    Values are None, booleans, numbers, texts, bytes, enumerations, arrays, and mappings, sequences, dataclasses and
+    pydantic models of them. Each field of a dataclass, named tuple or model counts. The order of mappings counts too.
+    A class with a property `digest` (bytes) is represented by it. Raise TypeError for any other value.
+    """
+    found = hashlib.sha256()
+    for value in values:
+        _encode(found, value)
+    return found.digest()
+
+
+def _encode(found: _Hash, value: object) -> None:
+    kind: Any = type(value)
+    _encoder(kind)(found, value)
+
+
+@cache
+def _encoder(kind: type[Any]) -> _Encoder:
+    """Return the function that adds a value of this type to a hash."""
+    if hasattr(kind, "digest"):
+        return lambda found, value: found.update(b"#" + value.digest)
+    for types, encoder in _ENCODERS:
+        if issubclass(kind, types):
+            return encoder
+    name = f"{kind.__module__}.{kind.__qualname__}".encode()
+    names: tuple[str, ...] = ()
+    if is_dataclass(kind):
+        names = tuple(field.name for field in fields(kind))
+    elif issubclass(kind, pydantic.BaseModel):
+        names = tuple(kind.model_fields)
+    else:
+        raise TypeError(f"{kind.__name__}: a value of this type has no digest")
+
+    def add_fields(found: _Hash, value: object) -> None:
+        found.update(b"C%d %b%d " % (len(name), name, len(names)))
+        for field in names:
+            _encode(found, getattr(value, field))
+
+    return add_fields
+
+
+def _none(found: _Hash, value: None) -> None:
+    found.update(b"N")
+
+
+def _boolean(found: _Hash, value: bool) -> None:
+    found.update(b"T" if value else b"F")
+
+
+def _integer(found: _Hash, value: int) -> None:
+    found.update(b"i%d " % value)
+
+
+def _number(found: _Hash, value: float) -> None:
+    found.update(b"d" + _NUMBER.pack(value))
+
+
+def _text(found: _Hash, value: str) -> None:
+    data = value.encode()
+    found.update(b"s%d " % len(data) + data)
+
+
+def _bytes(found: _Hash, value: bytes) -> None:
+    found.update(b"b%d " % len(value) + value)
+
+
+def _member(found: _Hash, value: Enum) -> None:
+    _text(found, f"{type(value).__qualname__}.{value.name}")
+
+
+def _array(found: _Hash, value: Any) -> None:
+    array = np.asarray(value)
+    if array.dtype.hasobject:
+        raise TypeError("an array of objects has no digest")
+    found.update(f"a{array.dtype.str} {array.shape} ".encode())
+    found.update(array.tobytes())
+
+
+def _mapping(found: _Hash, value: Mapping[object, object]) -> None:
+    found.update(b"m%d " % len(value))
+    for key, entry in value.items():
+        _encode(found, key)
+        _encode(found, entry)
+
+
+def _sequence(found: _Hash, value: tuple[object, ...] | list[object]) -> None:
+    found.update(b"q%d " % len(value))
+    for entry in value:
+        _encode(found, entry)
+
+
+_ENCODERS: tuple[tuple[type | tuple[type, ...], _Encoder], ...] = (
+    (type(None), _none),
+    (Enum, _member),
+    (bool, _boolean),
+    ((np.ndarray, np.generic), _array),
+    (int, _integer),
+    (float, _number),
+    (str, _text),
+    (bytes, _bytes),
+    (Mapping, _mapping),
+    ((tuple, list), _sequence),
+)
+"""Types in the order of the search: numpy's float64 is a float, and booleans are integers."""
