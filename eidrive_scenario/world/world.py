@@ -278,11 +278,8 @@ class World:
     def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> UndrawnImage:
         """Return the same image before it is drawn. It shows the current time, also if it is drawn later."""
         self._visuals = self._visuals or Visuals(self._scenery)
-        shown, bodies = (
-            DisplayState(self.time, self._signals, self._appearances),
-            dict(enumerate(self._bodies.values())),
-        )
-        return self._visuals.image(bodies, ignore, np.array(pose, dtype=float), pinhole, self._weather, shown)
+        shown, fixed = DisplayState(self.time, self._signals, self._appearances), np.array(pose, dtype=float)
+        return self._visuals.image(self._bodies.values(), ignore, fixed, pinhole, self._weather, shown)
 
     def _body(self, name: str) -> Body:
         body = self._bodies.get(name)

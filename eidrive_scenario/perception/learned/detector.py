@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 from pydantic import Field, model_validator
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.detector import Detector, DetectorContext
@@ -20,8 +22,10 @@ from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.visibility import in_camera
 from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.classes import misspelt, object_category
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork, Layout
+from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.runtimes import runtime_versions
@@ -35,6 +39,7 @@ from eidrive_scenario.perception.learned.weight_files import (
     torchscript_is_allowed,
 )
 from eidrive_scenario.perception.lifting.lifting import lift
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.settings import Settings
@@ -111,6 +116,7 @@ class LearnedDetector(Detector):
         self._map_context = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
+        self._roads: weakref.ref[RoadNetwork] | None = None
 
     def load_weights(self, *, allow_torchscript: bool = False) -> None:
         """Create the network. Raise SettingError if its weights are not suitable."""
@@ -122,6 +128,7 @@ class LearnedDetector(Detector):
         """Store the map and the ray patterns of the lidars."""
         self._map_context = MapContext(context.roads)
         self._lights = LightsOnMap(context.roads)
+        self._roads = None if context.roads is None else weakref.ref(context.roads)
         for name, sensor in context.sensors.items():
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
@@ -130,12 +137,38 @@ class LearnedDetector(Detector):
         """Return the road users in the images of all cameras with a reading."""
         self.load_weights()
         assert self._network is not None
-        self.image_detections = {
-            camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()
-        }
-        self._signals = self._lights.read(self.image_detections, readings.cameras)
-        parts = [self._lift_image(found, readings, camera) for camera, found in self.image_detections.items()]
-        return merge_duplicates(parts, readings.time)
+        memory = image_memory.active()
+        key = None if memory is None else self._key_of(self._network, readings)
+        found = None if memory is None or key is None else memory.stations.get(key)
+        if found is None:
+            found = self._process(self._network, readings)
+            if memory is not None and key is not None:
+                objects = found.objects
+                image_memory.read_only(objects.boxes, objects.scores, objects.velocity, objects.covariance)
+                memory.stations.add(key, found)
+        self.image_detections, self._signals, objects = found
+        return objects
+
+    def _process(self, network: ImageNetwork, readings: Readings) -> StationDetections:
+        images = {camera: network.find_in(reading) for camera, reading in readings.cameras.items()}
+        signals = self._lights.read(images, readings.cameras)
+        parts = [self._lift_image(found, readings, camera) for camera, found in images.items()]
+        return StationDetections(images, signals, merge_duplicates(parts, readings.time))
+
+    def _key_of(self, network: ImageNetwork, readings: Readings) -> Key | None:
+        """Return everything that determines the result of these readings; None if a part of it is unknown."""
+        images = {name: reading.image_digest for name, reading in readings.cameras.items()}
+        if network.identity is None or None in images.values():
+            return None
+        digest = content_digest(
+            images,
+            [(one.size, one.intrinsics, one.pose, one.distortion) for one in readings.cameras.values()],
+            [(name, astuple(cloud)) for name, cloud in readings.lidars.items()],
+            readings.time,
+            float(readings.ego.position[2]),
+            self._patterns,
+        )
+        return type(self), network.identity, self._roads, digest
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the cameras can show."""

@@ -1,4 +1,4 @@
-"""Detections of earlier images, so that a series of runs processes equal images once.
+"""Results of earlier images, so that a series of runs draws and processes equal images once.
 
 Runs of one seed that differ by messages have equal images until the vehicles drive differently.
 """
@@ -7,42 +7,71 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
+from collections.abc import Hashable, Mapping
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.image_detections import ImageDetections
+from eidrive_scenario.sensing.readings import SignalReading
 
 CAPACITY = 8192
-"""Maximum number of images; the least recently used one is removed. One takes about a kilobyte."""
+"""Maximum number of stored results of each kind; the least recently used one is removed. One takes about a kilobyte."""
 
-Key = tuple[str, tuple[int, ...], bytes]
+Key = tuple[Hashable, ...]
+R = TypeVar("R")
 
 
-class ImageMemory:
-    """Detections by network and image."""
+class StationDetections(NamedTuple):
+    """Result of a detector in one tick of a station."""
 
-    def __init__(self, capacity: int = CAPACITY) -> None:
+    images: Mapping[str, ImageDetections]
+    signals: tuple[SignalReading, ...]
+    objects: Detections
+
+
+class RecentResults(Generic[R]):
+    """Results by key; the least recently used one is removed when there are more than `capacity`."""
+
+    def __init__(self, capacity: int) -> None:
         self._capacity = capacity
-        self._found: OrderedDict[Key, ImageDetections] = OrderedDict()
+        self._found: OrderedDict[Key, R] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._found)
 
-    def get(self, key: Key) -> ImageDetections | None:
-        """Return the detections of an image; None if they are not stored."""
+    def get(self, key: Key) -> R | None:
+        """Return a result; None if it is not stored."""
         found = self._found.get(key)
         if found is not None:
             self._found.move_to_end(key)
         return found
 
-    def add(self, key: Key, found: ImageDetections) -> None:
-        """Store the detections of an image, whose arrays become read-only."""
-        for array in (found.boxes, found.scores):
-            array.flags.writeable = False
+    def add(self, key: Key, found: R) -> None:
+        """Store a result."""
         self._found[key] = found
         if len(self._found) > self._capacity:
             self._found.popitem(last=False)
+
+
+class ImageMemory:
+    """Results of images, all with read-only arrays.
+
+    images    detections by network and pixels, and by network and digest of the image before it is drawn
+    stations  result of a detector by everything that determines it
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self.images: RecentResults[ImageDetections] = RecentResults(capacity)
+        self.stations: RecentResults[StationDetections] = RecentResults(capacity)
+
+
+def read_only(*arrays: NDArray[Any]) -> None:
+    """Make the arrays of a result read-only, as several runs share it."""
+    for array in arrays:
+        array.flags.writeable = False
 
 
 _active: ImageMemory | None = None

@@ -14,6 +14,7 @@ from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import suppression_groups
 from eidrive_scenario.perception.learned.networks.suppression import suppress
+from eidrive_scenario.sensing.readings import CameraReading
 
 LARGEST_OVERLAP = 0.5
 """Overlap above which only the best of several boxes of one group is kept."""
@@ -37,6 +38,7 @@ class ImageNetwork(ABC):
 
     classes  names in the order of the outputs;  input_size  width and height of the network input [px]
     letterbox  whether images keep their aspect ratio, with gray margins; otherwise they are stretched
+    identity   text that determines weights and settings, if equal images give equal results; else None
     """
 
     def __init__(
@@ -46,7 +48,12 @@ class ImageNetwork(ABC):
         self.input_size = input_size
         self.confidence = confidence
         self.letterbox = letterbox
+        self.identity: str | None = None
         self._groups = suppression_groups(self.classes)
+
+    def find_in(self, reading: CameraReading) -> ImageDetections:
+        """Return the objects in the image of a camera."""
+        return self.find(reading.rgb)
 
     def find(self, image: NDArray[np.uint8]) -> ImageDetections:
         """Return the objects in an image (H, W, 3), red green blue. Boxes without an area in the image are removed."""

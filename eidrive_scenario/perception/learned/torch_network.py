@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,11 @@ from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.networks.blocks import fold
 from eidrive_scenario.perception.learned.networks.boxes import corners
-from eidrive_scenario.perception.learned.networks.ssd import decode, default_boxes
+from eidrive_scenario.perception.learned.networks.ssd import Ssd, decode, default_boxes
 from eidrive_scenario.perception.learned.networks.yolov5 import STRIDES, YoloV5
 from eidrive_scenario.perception.learned.weight_files import read_weights
-from eidrive_scenario.perception.learned.weights import load
+from eidrive_scenario.perception.learned.weights import Description, load
+from eidrive_scenario.sensing.readings import CameraReading
 
 
 class TorchNetwork(ImageNetwork):
@@ -30,26 +32,39 @@ class TorchNetwork(ImageNetwork):
     """
 
     def __init__(self, path: Path, confidence: float | None = None, threads: int = 1) -> None:
-        description, network = load(path)
+        digest = hashlib.sha256(read_weights(path)).hexdigest()
+        description, network = _loaded(path, digest)
         super().__init__(description.classes, description.input_size, confidence or description.confidence)
         torch.set_num_threads(threads)
-        fold(network)
         self.name = description.network
-        digest = hashlib.sha256(read_weights(path)).hexdigest()
-        self._identity = f"{digest} {self.confidence!r} {threads}"
+        self.identity: str = f"{digest} {self.confidence!r} {threads}"
         self._network = network
         width, height = description.input_size
         self._defaults = default_boxes(height, width)
+
+    def find_in(self, reading: CameraReading) -> ImageDetections:
+        """Return the objects in the image of a camera; an image whose detections are stored is not drawn."""
+        memory = image_memory.active()
+        digest = None if memory is None else reading.image_digest
+        if memory is None or digest is None:
+            return self.find(reading.rgb)
+        key = self.identity, reading.size, digest
+        found = memory.images.get(key)
+        if found is None:
+            found = self.find(reading.rgb)
+            memory.images.add(key, found)
+        return found
 
     def find(self, image: NDArray[np.uint8]) -> ImageDetections:
         memory = image_memory.active()
         if memory is None:
             return super().find(image)
-        key = image_memory.key_of(self._identity, image)
-        found = memory.get(key)
+        key = image_memory.key_of(self.identity, image)
+        found = memory.images.get(key)
         if found is None:
             found = super().find(image)
-            memory.add(key, found)
+            image_memory.read_only(found.boxes, found.scores)
+            memory.images.add(key, found)
         return found
 
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
@@ -61,6 +76,14 @@ class TorchNetwork(ImageNetwork):
             else:
                 boxes, scores, classes = ssd_candidates(outputs, self._defaults, self.confidence)
             return Candidates(boxes.double().numpy(), scores.double().numpy(), classes.numpy())
+
+
+@lru_cache(maxsize=4)
+def _loaded(path: Path, digest: str) -> tuple[Description, YoloV5 | Ssd]:
+    """Return the network of a weight file with this digest for inference, which stations and runs share."""
+    description, network = load(path)
+    fold(network)
+    return description, network
 
 
 def yolo_candidates(anchors: Tensor, outputs: list[Tensor], confidence: float) -> tuple[Tensor, Tensor, Tensor]:

@@ -82,25 +82,26 @@ class Visuals:
 
     def image(
         self,
-        bodies: Mapping[int, Body],
+        actors: Iterable[Body],
         hidden: Iterable[str],
         pose: Array,
         pinhole: Pinhole,
         weather: Weather,
         shown: DisplayState = DisplayState(),  # noqa: B008 - it is immutable
     ) -> UndrawnImage:
-        """Return the image of a camera; `bodies` are in the order of their rows.
+        """Return the image of a camera; `actors` are in the order of their rows.
 
         Bodies in `hidden` are not drawn, but cast shadows and emit light. Bodies that the scenario makes invisible do
         neither.
         """
-        looks = {body.name: shown.appearances.get(body.name, _USUAL) for body in bodies.values()}
-        bodies = {row: body for row, body in bodies.items() if looks[body.name].visibility.graphics}
+        all_bodies = dict(enumerate(actors))
+        looks = {body.name: shown.appearances.get(body.name, _USUAL) for body in all_bodies.values()}
+        bodies = {row: body for row, body in all_bodies.items() if looks[body.name].visibility.graphics}
         if self._shown_buildings < len(self._scenery.buildings):
             self._shown_buildings = len(self._scenery.buildings)
             self._buildings = gridded(merged(_building_model(each) for each in self._scenery.buildings))
         dark = weather.lamps_on
-        actors = {
+        instances = {
             body.name: _actor_instance(
                 row, body, glow(body.spec, looks[body.name], weather, shown.time), looks[body.name].motion
             )
@@ -120,8 +121,8 @@ class Visuals:
         subjects = Subjects(
             self._ground,
             [*houses, *roadside],
-            [each for name, each in actors.items() if name not in left_out],
-            [each for name, each in actors.items() if name in left_out],
+            [each for name, each in instances.items() if name not in left_out],
+            [each for name, each in instances.items() if name in left_out],
         )
         ground = self._below.at(float(pose[0, 3]), float(pose[1, 3]), 0.0)[0] if self._below is not None else 0.0
         return UndrawnImage(self._renderer, ImageContent(subjects, beams, weather, pose, pinhole, ground))
