@@ -11,6 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, quoted, suggestion
+from eidrive_scenario.project import project_entry_points
 
 GROUPS = (
     "actions",
@@ -47,7 +48,7 @@ _loaded: dict[type, Registration] = {}
 
 
 class Registry:
-    """Extensions of one kind, found by their entry points `eidrive_scenario.<kind>`.
+    """Extensions of one kind, found by their entry points `eidrive_scenario.<kind>`, installed or of the project.
 
     An extension is imported on its first use. Raise RegistryError if two extensions have the same name.
     """
@@ -55,7 +56,7 @@ class Registry:
     def __init__(self, kind: str, found: list[EntryPoint] | None = None) -> None:
         self.kind = kind
         self._points: dict[str, EntryPoint] = {}
-        for point in _installed(tuple(sys.path)).get(kind, ()) if found is None else found:
+        for point in _declared(kind) if found is None else found:
             other = self._points.get(point.name)
             if other is not None and other.value != point.value:
                 raise RegistryError(
@@ -138,6 +139,12 @@ class Registry:
 
 _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
 """Extensions that passed all checks, by kind, name and base class."""
+
+
+def _declared(kind: str) -> tuple[EntryPoint, ...]:
+    """Return the entry points of one kind, of installed packages and of the selected project."""
+    own = project_entry_points().get(kind, ())
+    return (*_installed(tuple(sys.path)).get(kind, ()), *own)
 
 
 @cache

@@ -6,6 +6,8 @@ Exit codes: 0 passed, 1 a criterion failed, 2 invalid input, 3 the run was abort
 from __future__ import annotations
 
 import gc
+from contextlib import suppress
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -62,7 +64,11 @@ def _options(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Define the options before the command, which `Guarded` and `_show_version` evaluate."""
+    """Select the project of the current folder. `Guarded` and `_show_version` evaluate the options."""
+    from eidrive_scenario.project import select_project
+
+    with suppress(FileNotFoundError):  # The current folder is deleted
+        select_project(Path.cwd())
 
 
 _COLLECT_AFTER = 50_000

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shlex
+from contextlib import suppress
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -15,6 +17,8 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 TEMPLATE = "project_template"
 """Folder of the template in the package. Files are written without the suffix `.template`."""
 _SUFFIX = ".template"
+_LONGEST = 60
+"""Maximum number of characters of the name of the package."""
 _NAMES = {
     "criteria.py": "{package}_criteria.py",
     "gitignore": ".gitignore",
@@ -24,39 +28,58 @@ _NAMES = {
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the project; it must not have files yet.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the project, without files except .git.")],
 ) -> None:
     """Write a project with a scenario, its road, a criterion, tests and a workflow, which pass at once.
 
     Example: eidrive init demo && cd demo && pytest
     """
-    name = folder.resolve().name
-    package = re.sub(r"\W+", "_", name.lower(), flags=re.ASCII).strip("_")
-    if not package or package[0].isdigit():
-        package = f"project_{package}".strip("_")
+    written: list[Path] = []
     try:
-        if folder.exists() and any(folder.iterdir()):
+        package = _package(folder.resolve().name)
+        if folder.exists() and any(path.name != ".git" for path in folder.iterdir()):
             raise SettingError(Diagnostic("the folder is not empty", "give a new folder", str(folder)))
-        written = _write(files("eidrive_scenario") / TEMPLATE, folder, package)
+        above = [path for path in (folder, *folder.parents) if not path.exists()]
+        try:
+            _write(files("eidrive_scenario") / TEMPLATE, folder, package, written)
+        except OSError:
+            _remove(written, folder, above)
+            raise
     except OSError as error:
         raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "give a new folder", str(folder))) from error
     for path in sorted(written):
         typer.echo(path.relative_to(folder))
-    typer.echo(f"next: cd {folder} && pytest", err=True)
+    start = f"./{folder}" if str(folder).startswith("-") else str(folder)
+    typer.echo("next: " + ("pytest" if folder == Path() else f"cd {shlex.quote(start)} && pytest"), err=True)
 
 
-def _write(source: Traversable, folder: Path, package: str) -> list[Path]:
-    """Write the files of a folder of the template, and return their paths."""
-    written = []
+def _package(name: str) -> str:
+    """Return the name of the Python package of a folder."""
+    package = re.sub(r"\W+", "_", name.lower(), flags=re.ASCII).strip("_")[:_LONGEST].strip("_")
+    return package if package and not package[0].isdigit() else f"project_{package}".strip("_")
+
+
+def _write(source: Traversable, folder: Path, package: str, written: list[Path]) -> None:
+    """Write the files of a folder of the template, and append their paths to `written`."""
     for entry in sorted(source.iterdir(), key=lambda one: one.name):
         if entry.is_dir():
             if entry.name != "__pycache__":
-                written += _write(entry, folder / entry.name, package)
+                _write(entry, folder / entry.name, package, written)
             continue
         bare = entry.name.removesuffix(_SUFFIX)
         path = folder / _NAMES.get(bare, bare).format(package=package)
         path.parent.mkdir(parents=True, exist_ok=True)
         text = entry.read_text(encoding="utf-8").replace("@package@", package)
-        path.write_text(text.replace("@name@", package.replace("_", "-")), encoding="utf-8")
         written.append(path)
-    return written
+        path.write_text(text.replace("@name@", package.replace("_", "-")), encoding="utf-8")
+
+
+def _remove(written: list[Path], folder: Path, above: list[Path]) -> None:
+    """Remove the files of an incomplete project, and the folders that were made for them."""
+    with suppress(OSError):
+        for path in written:
+            path.unlink(missing_ok=True)
+    below = {parent for path in written for parent in path.parents if folder in parent.parents}
+    for path in (*sorted(below, key=lambda one: -len(one.parts)), *above):
+        with suppress(OSError):
+            path.rmdir()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_fixtures import Eidrive
@@ -61,6 +64,88 @@ def test_folder_with_files_is_refused(eidrive: Eidrive, tmp_path: Path) -> None:
     assert "not empty" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
     assert eidrive("init", tmp_path / "notes.txt").exit_code == 2
+
+
+def test_folder_with_git_only_becomes_project(eidrive: Eidrive, tmp_path: Path) -> None:
+    (tmp_path / ".git").mkdir()
+    assert eidrive("init", tmp_path).exit_code == 0
+    assert (tmp_path / "pyproject.toml").is_file()
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("a b", "cd 'a b' && pytest"),
+        ("-dash", "cd ./-dash && pytest"),
+        ("x" * 255, f"cd {'x' * 255} && pytest"),
+        ("con", "cd con && pytest"),
+        ("a/b", "cd a/b && pytest"),
+        (".", "pytest"),
+    ],
+    ids=["space", "dash", "long", "reserved", "nested", "current"],
+)
+def test_next_command_of_init_is_valid_in_shell(
+    eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, command: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = eidrive("init", "--", name)
+    assert done.stderr == f"next: {command}\n"
+    shown = subprocess.run(command.replace("pytest", "ls"), shell=True, capture_output=True, text=True, check=True)
+    assert "pyproject.toml" in shown.stdout.split()
+
+
+def test_full_disk_leaves_no_part_of_project(eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write = Path.write_text
+
+    def fail_later(path: Path, *arguments: Any, **keywords: Any) -> int:
+        if path.name == "cut_in.xosc":
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        return write(path, *arguments, **keywords)
+
+    monkeypatch.setattr(Path, "write_text", fail_later)
+    done = eidrive("init", tmp_path / "outer" / "demo")
+    assert done.exit_code == 2
+    assert "cannot write: No space left on device" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.timeout(300)
+def test_commands_use_criterion_of_project_without_installation(eidrive: Eidrive, tmp_path: Path) -> None:
+    folder = tmp_path / "demo"
+    assert eidrive("init", folder).exit_code == 0
+    environment = {key: value for key, value in os.environ.items() if key != "EIDRIVE_PROJECT"}
+    for arguments, place in (
+        (["check", "scenarios"], folder),
+        (["run", "cut_in.xosc"], folder / "scenarios"),
+        (["sweep", "scenarios/cut_in.xosc", "--vary", "Gap=40,50", "--workers", "2", "--store", "s.db"], folder),
+    ):
+        command = [sys.executable, "-m", "eidrive_scenario", *arguments]
+        done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False, env=environment)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert ("keep_gap        passed" in done.stdout) == (arguments[0] == "run")
+    outside = [sys.executable, "-m", "eidrive_scenario", "check", str(folder / "scenarios")]
+    done = subprocess.run(outside, cwd=tmp_path, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 2
+    assert "unknown criterion 'keep_gap'" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[tool.eidrive]\npythonpath = 3\n", "tool.eidrive.pythonpath"),
+        ('[tool.eidrive]\n[project.entry-points."eidrive_scenario.criteria"]\ngap = "no object"\n', "entry point gap"),
+        ("[tool.eidrive\n", "is not TOML"),
+        ("[project]\nname = 3\n", ""),
+    ],
+    ids=["pythonpath", "entry point", "syntax", "other"],
+)
+def test_invalid_table_of_project_is_reported(tmp_path: Path, text: str, expected: str) -> None:
+    (tmp_path / "pyproject.toml").write_text(text)
+    environment = {key: value for key, value in os.environ.items() if key != "EIDRIVE_PROJECT"}
+    command = [sys.executable, "-m", "eidrive_scenario", "list", "criteria"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == (2 if expected else 0)
+    assert expected in done.stderr
 
 
 @pytest.mark.parametrize(

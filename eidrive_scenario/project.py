@@ -1,0 +1,94 @@
+"""Extensions of a project that is not installed, by the table `tool.eidrive` of its pyproject.toml.
+
+    [tool.eidrive]
+    pythonpath = ["."]                                  # folders with the modules of the project
+
+    [project.entry-points."eidrive_scenario.criteria"]
+    keep_gap = "demo_criteria:KeepGap"
+
+A file without this table is not used, so that nothing of other projects is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import cache
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.files.bounded import MIB, read_regular_file
+
+VARIABLE = "EIDRIVE_PROJECT"
+"""Environment variable with the folder of the project, which other processes of a command inherit."""
+_FILE = "pyproject.toml"
+_GROUP = "eidrive_scenario."
+
+
+def select_project(folder: Path) -> None:
+    """Use the project of a folder: the nearest pyproject.toml there or above, if it has the table `tool.eidrive`.
+
+    A folder that `VARIABLE` already names stays. Raise SettingError if the file cannot be read or is invalid.
+    """
+    if VARIABLE in os.environ:
+        return
+    path = next((path for above in (folder, *folder.parents) if (path := above / _FILE).is_file()), None)
+    if path is not None and _table(path) is not None:
+        os.environ[VARIABLE] = str(path.parent)
+
+
+def project_entry_points() -> dict[str, tuple[EntryPoint, ...]]:
+    """Return the entry points of the selected project by kind, and put its folders on the path of imports.
+
+    Raise SettingError if its pyproject.toml cannot be read or is invalid.
+    """
+    folder = os.environ.get(VARIABLE)
+    return _entry_points(Path(folder)) if folder else {}
+
+
+@cache
+def _entry_points(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
+    path = folder / _FILE
+    content = _table(path) or {}
+    folders = content.get("tool", {}).get("eidrive", {}).get("pythonpath", [])
+    if not isinstance(folders, list) or not all(isinstance(entry, str) for entry in folders):
+        raise _error(path, f"tool.eidrive.pythonpath: {quoted(str(folders))}", 'write a list of folders, such as ["."]')
+    groups = content.get("project", {}).get("entry-points", {})
+    found: dict[str, tuple[EntryPoint, ...]] = {}
+    for group, points in groups.items() if isinstance(groups, dict) else ():
+        if not group.startswith(_GROUP) or not isinstance(points, dict):
+            continue
+        for name, value in points.items():
+            if not isinstance(value, str) or ":" not in value or EntryPoint.pattern.match(value) is None:
+                raise _error(path, f"entry point {name}: {quoted(str(value))}", "write package.module:Object")
+        found[group.removeprefix(_GROUP)] = tuple(EntryPoint(name, value, group) for name, value in points.items())
+    for entry in reversed(folders):
+        if (place := str((folder / entry).resolve())) not in sys.path:
+            sys.path.insert(0, place)
+    return found
+
+
+def _table(path: Path) -> dict[str, Any] | None:
+    """Return the content of a pyproject.toml; None if it has no table `tool.eidrive`."""
+    try:
+        text = read_regular_file(path, MIB).decode()
+    except OSError as error:
+        raise _error(path, f"cannot be read: {error.strerror}", "check its permissions") from error
+    except UnicodeDecodeError as error:
+        raise _error(path, "is not UTF-8", "save it as UTF-8") from error
+    if "eidrive" not in text:
+        return None
+    import tomllib
+
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _error(path, f"is not TOML: {error}", "correct it") from error
+    tools = content.get("tool")
+    return content if isinstance(tools, dict) and isinstance(tools.get("eidrive"), dict) else None
+
+
+def _error(path: Path, message: str, hint: str) -> SettingError:
+    return SettingError(Diagnostic(message, hint, str(path)))
