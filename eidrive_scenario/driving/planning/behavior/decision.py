@@ -8,11 +8,11 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.driving.planning.behavior.bounds import FREE, WALL, Course
+from eidrive_scenario.driving.planning.behavior.bounds import FREE, Course
 from eidrive_scenario.driving.planning.behavior.lateral import ROUTE, Body, LateralProfile, towards
 from eidrive_scenario.driving.planning.behavior.maneuvers import passing_profiles
 from eidrive_scenario.driving.planning.behavior.oncoming import OncomingTraffic
-from eidrive_scenario.driving.planning.behavior.options import Options
+from eidrive_scenario.driving.planning.behavior.options import URGENT, Options
 from eidrive_scenario.driving.planning.behavior.proposals import (
     Precedence,
     Proposal,
@@ -29,6 +29,7 @@ from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
+from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace, moves_safely
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -42,10 +43,6 @@ PERSISTENT = 0.5
 """Time for which another maneuver has to be the best one before it starts [s]."""
 RELEASE = 0.75
 """Share of the hard deceleration below which a proposal ends emergency braking."""
-URGENT = 4.0
-"""Time before a collision at which the emergency brake may act [s]."""
-
-
 VIEWED = 10.0
 """Distance ahead at which the oncoming lane is determined [m]."""
 HARDER = 0.3
@@ -87,6 +84,7 @@ class Decider:
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
         """Another maneuver than the current one that has been best, and the time since when [s]."""
         self._oncoming = OncomingTraffic(view)
+        self._walking_pace = WalkingPace(settings, len(times))
         self._held_up = False
         self._brakes = False
         """Whether the last decision was emergency braking."""
@@ -106,34 +104,55 @@ class Decider:
     def decide(self, situation: Situation) -> Decision:
         """Return the best proposal."""
         settings = self._settings
-        body = (situation.s + self._center, situation.d, self._half_length, self._half_width)
-        scene = surroundings(
-            situation.objects,
-            situation.prediction,
-            situation.line,
-            situation.window,
-            settings,
-            body,
-            situation.gives_way,
-        )
+        scene = self._scene(situation, settings)
         current = self._continued(situation)
         profiles = [current]
         if current.name != ROUTE or abs(current.last) > 0.05:
             profiles.append(self._towards(situation, ROUTE, 0.0))
         expects = self._held_up and settings.lane_changes
-        options = self._options(situation, scene, profiles, body[:2], with_maneuvers=expects)
+        options = self._options(situation, scene, profiles, with_maneuvers=expects)
         best = options.best(len(profiles))
         self._held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
-        self._oncoming.observe(scene, body[0], situation.now, held_up=self._held_up)
+        self._oncoming.observe(scene, situation.s + self._center, situation.now, held_up=self._held_up)
         if self._held_up:
             if not expects:
-                options = self._options(situation, scene, profiles, body[:2], with_maneuvers=True)
+                options = self._options(situation, scene, profiles, with_maneuvers=True)
             best = options.best()
         best = self._with_brake(options, self._kept(options, best, situation.now))
-        threat = -1 if bool(scene.certain.all()) else self._uncertain_threat(scene, options, best)
+        threat = -1
+        if not bool(scene.certain.all()):
+            is_hard = self._acceleration(options, best) < -settings.comfortable_deceleration - HARDER
+            threat = options.uncertain_threat(best, scene.certain, is_hard=is_hard)
         if threat >= 0:
             return self._without_hard_braking(situation, scene, options, threat)
+        if self._walking_pace.is_due(situation, options, best):
+            slow = self._at_walking_pace(situation, profiles)
+            if slow is not None:
+                return slow
         return self._decision(situation, options, best)
+
+    def _scene(self, situation: Situation, settings: BehaviorSettings) -> Surroundings:
+        return surroundings(
+            situation.objects,
+            situation.prediction,
+            situation.line,
+            situation.window,
+            settings,
+            (situation.s + self._center, situation.d, self._half_length, self._half_width),
+            situation.gives_way,
+        )
+
+    def _at_walking_pace(self, situation: Situation, profiles: list[LateralProfile]) -> Decision | None:
+        """Return the decision to drive on at walking pace, with less clearance; None if that is not possible."""
+        pace = self._walking_pace
+        scene = pace.scene(situation, self._scene(situation, pace.settings))
+        slow = pace.situation(situation)
+        options = self._options(slow, scene, profiles, with_maneuvers=self._settings.lane_changes)
+        best = options.best()
+        if not moves_safely(options, best):
+            return None
+        decision = self._decision(slow, options, best)
+        return msgspec.structs.replace(decision, reason=f"walking pace: {decision.reason}", is_free=False)
 
     def _with_brake(self, options: Options, best: int) -> int:
         """Return the best proposal, or emergency braking if it was active and the best one still brakes hard."""
@@ -144,28 +163,11 @@ class Decider:
         self._brakes = options.proposals[best].is_emergency
         return best
 
-    def _uncertain_threat(self, scene: Surroundings, options: Options, best: int) -> int:
-        """Return the hypothesis of an object of uncertain existence for which the vehicle would brake hard; or -1."""
-        brakes_hard = self._acceleration(options, best) < -self._settings.comfortable_deceleration - HARDER
-        collides = float(options.evaluation.collision[best]) < URGENT
-        if not (brakes_hard or collides):
-            return -1
-        gentle = options.gentle
-        causes = [options.evaluation.cause[best], options.evaluation.cause[gentle], *options.rolled.cause[best]]
-        for cause in causes:
-            row = int(cause)
-            if row <= WALL:
-                owner = options.walls[best][WALL - row].owner
-                row = -1 if owner is None else owner
-            if row >= 0 and not scene.certain[row]:
-                return row
-        return -1
-
     def _without_hard_braking(
         self, situation: Situation, scene: Surroundings, options: Options, threat: int
     ) -> Decision:
         """Return the decision if a hypothesis of uncertain existence is no reason for more than a gentle stop."""
-        certain = self._options(situation, only_certain(scene), options.profiles[:1], (situation.s, situation.d))
+        certain = self._options(situation, only_certain(scene), options.profiles[:1])
         choice, stop = int(np.argmax(certain.evaluation.score)), certain.gentle
         if self._acceleration(certain, choice) < self._acceleration(certain, stop):
             return self._decision(situation, certain, choice)
@@ -203,19 +205,16 @@ class Decider:
         situation: Situation,
         scene: Surroundings,
         profiles: list[LateralProfile],
-        ego: tuple[float, float],
         *,
         with_maneuvers: bool = False,
     ) -> Options:
-        """Return the proposals along profiles, the first of which is the current one, and along new maneuvers.
-
-        ego  distance of the center of the vehicle along the line, and its offset [m]
-        """
+        """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
         hidden = math.inf
         more = passing_profiles(situation, scene, self._settings, self._body) if with_maneuvers else []
         if more:
             beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
-            hidden = self._oncoming.first_hidden(scene, beside, ego, situation.now)
+            center = (situation.s + self._center, situation.d)
+            hidden = self._oncoming.first_hidden(scene, beside, center, situation.now)
             profiles = profiles + more
         proposals: list[Proposal] = []
         walls: list[list[Wall]] = []

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.detections import VULNERABLE
-from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, passing, towards
+from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, change_length, passing, towards
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
@@ -28,6 +28,8 @@ ASIDE = 0.8
 """Offset from the route from which on a standing vehicle is parked at the edge of the lane [m]."""
 SETTING_OFF = 5.0
 """Time for which a vehicle may still accelerate after it starts [s]; it is not passed meanwhile."""
+SWUNG = 0.3
+"""Offset from the route from which on the vehicle is beside it [m]."""
 SPARE = 0.2
 """Clearance beside a passed obstacle in addition to the lateral margin [m], so that rounding does not block it."""
 LEAST_CLEARANCE = 0.25
@@ -57,10 +59,13 @@ def passing_profiles(
     head_on = _head_on(situation, scene, body)
     if head_on is not None:
         return _evasions(situation, scene, settings, body, head_on)
+    found = []
+    held_out = _behind_neighbor(situation, scene, settings, body)
+    if held_out is not None:
+        found.append(held_out)
     blocker = _blocker(situation, scene, body.center, body.half_width)
     if blocker is None or _queues(situation, scene, blocker):
-        return []
-    found = []
+        return found
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
     if not math.isnan(faster) and _rear_is_free(situation, scene, faster, body.center):
@@ -99,6 +104,34 @@ def _evasions(
             start = (*situation.steered, situation.speed)
             found.append(towards(name, offset, *start, settings.lateral_acceleration, side=side))
     return found
+
+
+def _behind_neighbor(
+    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body
+) -> LateralProfile | None:
+    """Return the motion back to the route behind what stands between it and the vehicle; None if nothing does.
+
+    The maneuver past an obstacle ends where its end was when the maneuver began, and the estimate may have changed.
+    """
+    s, d, slope = situation.steered
+    if abs(d) < SWUNG:
+        return None
+    side = 1 if d > 0.0 else -1
+    ends = scene.s[:, 0] + scene.half_length[:, 0]
+    is_beside = (ends > situation.s - body.rear) & (scene.s[:, 0] - scene.half_length[:, 0] < situation.s + body.front)
+    between = side * scene.d[:, 0] - scene.half_width[:, 0] < side * d
+    in_way = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < body.half_width + scene.margin
+    rows = np.flatnonzero(is_beside & between & in_way & ~scene.crosses[:, 0] & (np.abs(scene.speed[:, 0]) < WAITING))
+    if not rows.size:
+        return None
+    last = int(rows[np.argmax(ends[rows])])
+    end = max(float(ends[last]) + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
+    back = change_length(d, max(situation.speed, 2.0), settings.lateral_acceleration)
+    name = f"pass {situation.kind_of(scene.owner[last])} on the {'left' if side > 0 else 'right'}"
+    own, _ = situation.line.lanes_beside(situation.lanes_at(end)).room(side)
+    return LateralProfile(
+        name, (s, end, end + back), (d, d, 0.0), slope, side, uses_oncoming=abs(d) + body.half_width > own
+    )
 
 
 def _blocker(situation: Situation, scene: Surroundings, center: float, half_width: float) -> int | None:

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
@@ -26,6 +26,8 @@ LARGEST_ERROR = 3.0
 """Maximum standard deviation that is considered [m]; above it the position says nothing."""
 SMOOTHING = 0.4
 """Weight of the newest difference quotient in the velocity of an object whose detector estimates none."""
+VELOCITY_ERROR = 1.5
+"""Assumed standard deviation of a velocity per standard deviation of the position [1/s]."""
 LASTING = 1.0
 """Time constant of the mean speed [s], with which a lost object moves on."""
 ALONG = math.cos(math.radians(40.0))
@@ -58,6 +60,8 @@ class KnownObject(msgspec.Struct):
     """Time of the last observation [s]."""
     still_since: float | None = None
     """Time since which the object stands [s]; None while it moves."""
+    stands_at: tuple[float, float] = (0.0, 0.0)
+    """Place at which the object has come to stand [m]."""
     moving_since: float | None = None
     """Time since which the object moves [s]; None while it stands."""
     hidden_since: float | None = None
@@ -71,6 +75,16 @@ class KnownObject(msgspec.Struct):
     def speed(self) -> float:
         """Speed [m/s]."""
         return math.hypot(self.vx, self.vy)
+
+    @property
+    def speed_error(self) -> float:
+        """Assumed standard deviation of the velocity [m/s]. The direction of a slower motion is unknown."""
+        return VELOCITY_ERROR * self.error
+
+    @property
+    def seems_to_stand(self) -> bool:
+        """Whether it stood and its speed is within the error; a road user on foot or on two wheels may set off."""
+        return self.still_since is not None and self.speed < self.speed_error and self.kind not in VULNERABLE
 
 
 class ObjectMemory:
@@ -112,7 +126,9 @@ class ObjectMemory:
                 known.error = min(known.error + SPEED_ERROR * step, LARGEST_ERROR)
         self._objects = found + lost
         for known in self._objects:
-            is_still = known.speed < STILL
+            is_still = known.speed < STILL or _still_stands(known, self._settings.uncertainty)
+            if is_still and known.still_since is None:
+                known.stands_at = known.x, known.y
             known.still_since = (now if known.still_since is None else known.still_since) if is_still else None
             known.moving_since = None if is_still else now if known.moving_since is None else known.moving_since
         return self._objects
@@ -183,6 +199,15 @@ def nearest_rows(detections: Detections, places: Array) -> tuple[int, ...]:
     nearest = np.argmin(gap, axis=1)
     near = gap[np.arange(len(places)), nearest] < GATE
     return tuple(dict.fromkeys(nearest[near].tolist()))
+
+
+def _still_stands(known: KnownObject, uncertainty: float) -> bool:
+    """Return whether an object that stood has moved no farther and no faster than the errors of its place and velocity
+    explain."""
+    if not known.seems_to_stand:
+        return False
+    moved = math.hypot(known.x - known.stands_at[0], known.y - known.stands_at[1])
+    return moved <= uncertainty * known.error
 
 
 def _is_among(lost: KnownObject, found: list[KnownObject]) -> bool:

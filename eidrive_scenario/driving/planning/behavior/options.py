@@ -5,10 +5,15 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
+from eidrive_scenario.arrays import Bools
+from eidrive_scenario.driving.planning.behavior.bounds import WALL
 from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
 from eidrive_scenario.driving.planning.behavior.proposals import Proposal, Wall
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import Evaluation
+
+URGENT = 4.0
+"""Time before a collision at which the emergency brake may act [s]."""
 
 
 class Options(msgspec.Struct, frozen=True):
@@ -40,3 +45,21 @@ class Options(msgspec.Struct, frozen=True):
         if profiles is not None:
             count = sum(proposal.profile < profiles for proposal in self.proposals)
         return int(np.argmax(self.evaluation.score[:count]))
+
+    def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int:
+        """Return the hypothesis of an object of uncertain existence for which a proposal brakes hard; -1 without one.
+
+        certain  (N,) whether the existence of each hypothesis is certain
+        is_hard  whether the proposal brakes hard; a collision soon counts as well
+        """
+        if not (is_hard or float(self.evaluation.collision[best]) < URGENT):
+            return -1
+        causes = [self.evaluation.cause[best], self.evaluation.cause[self.gentle], *self.rolled.cause[best]]
+        for cause in causes:
+            row = int(cause)
+            if row <= WALL:
+                owner = self.walls[best][WALL - row].owner
+                row = -1 if owner is None else owner
+            if row >= 0 and not certain[row]:
+                return row
+        return -1

@@ -24,9 +24,6 @@ LEAVING_RATE = 0.3
 LEAVING_ERROR = 3.5
 """Lateral speed of a vehicle that leaves its lane per standard deviation of its position [1/s], if that is larger: with
 a velocity from noisy positions."""
-SPEED_ERROR = 1.5
-"""Assumed standard deviation of the velocity of a vehicle per standard deviation of its position [1/s]. Below it the
-direction of its motion is unknown: it is that of its lane."""
 LANE_WIDTH = 3.5
 """Lateral distance after which a lane change is predicted to end [m]."""
 NOTICEABLE, GREATEST = 0.8, 4.0
@@ -115,14 +112,14 @@ class Predictor:
     def _hypotheses(self, known: KnownObject, courses: list[Course]) -> list[Hypothesis]:
         times = self._times
         travelled, speed = longitudinal_motion(known.speed, known.acceleration, times)
-        if known.speed < STANDING:
+        if known.speed < STANDING or known.seems_to_stand:
             x, y, yaw = (np.full(len(times), value) for value in (known.x, known.y, known.yaw))
-            return [Hypothesis((x, y, yaw), speed)]
+            return [Hypothesis((x, y, yaw), np.zeros(len(times)))]
         found: list[Hypothesis] = []
         too_fast: list[Hypothesis] = []
         """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         direction = math.atan2(known.vy, known.vx)
-        noise = SPEED_ERROR * known.error
+        noise = known.speed_error
         is_unknown = known.speed < noise
         for course in courses:
             along, left, heading = course.place(known.x, known.y)
@@ -144,10 +141,7 @@ class Predictor:
             if len(found) == MOST_HYPOTHESES:
                 break
         found = found or too_fast
-        if not found:
-            x, y = known.x + math.cos(direction) * travelled, known.y + math.sin(direction) * travelled
-            found.append(Hypothesis((x, y, np.full(len(times), direction)), speed))
-        return found
+        return found or [_straight_on(known, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
         """Return the courses of the lanes on which each moving vehicle is."""
@@ -162,6 +156,20 @@ class Predictor:
             if drivable[row]:
                 found[moving[owner]] += self._courses.ahead(row)
         return found
+
+
+def _straight_on(known: KnownObject, travelled: Array, speed: Array) -> Hypothesis:
+    """Return the motion of an object that follows no lane.
+
+    The direction of a velocity within its error is noise: a vehicle then moves along its axis.
+    """
+    direction = math.atan2(known.vy, known.vx)
+    if known.speed < known.speed_error and known.kind not in ON_FOOT:
+        ahead = math.cos(direction - known.yaw)
+        direction = known.yaw if ahead >= 0.0 else known.yaw + math.pi
+        travelled, speed = travelled * abs(ahead), speed * abs(ahead)
+    x, y = known.x + math.cos(direction) * travelled, known.y + math.sin(direction) * travelled
+    return Hypothesis((x, y, np.full(len(travelled), direction)), speed)
 
 
 def longitudinal_motion(speed: float, acceleration: float, times: Array) -> tuple[Array, Array]:

@@ -1,0 +1,137 @@
+"""Parked vehicles of uncertain place and velocity: the vehicle neither stands before them forever nor touches them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detections, two_lane_road
+from signal_street import CAR
+
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
+from eidrive_scenario.driving.planning.behavior.prediction import Predictor
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.roads import RoadNetwork
+
+TIMES = np.arange(0.0, 8.01, 0.25)
+PARKED = KnownBox(60.0, LANE - 2.75, kind="van", size=(5.9, 2.0), deviation=0.6)
+"""Its side is 0.83 m beside that of the car; with 1.645 standard deviations, at most 0.75 m, 0.08 m are left."""
+OPPOSITE = KnownBox(61.0, LANE + 2.75, size=(5.0, 2.0), deviation=0.6)
+"""Leaves as little on the other side."""
+
+
+@pytest.fixture(scope="module")
+def roads() -> RoadNetwork:
+    return two_lane_road()
+
+
+def observed(kind: str, deviation: float, speed: float, seconds: float) -> KnownObject:
+    """Return an object that stands for a second and then moves along x."""
+    objects = ObjectMemory(BehaviorSettings())
+    found: list[KnownObject] = []
+    for tick in range(round((1.0 + seconds) / 0.1) + 1):
+        now = 0.1 * tick
+        moved = speed * max(now - 1.0, 0.0)
+        box = KnownBox(60.0 + moved, vx=speed if now > 1.0 else 0.0, kind=kind, deviation=deviation)
+        found = objects.update(detections(now, box), now)
+    return found[0]
+
+
+def drive(
+    roads: RoadNetwork, objects: Callable[[float], Sequence[KnownBox]], seconds: float, **settings: float | bool
+) -> PlannedDrive:
+    run = PlannedDrive(behavior(roads, **settings), roads)
+    run.run(seconds, objects)
+    run.world.close()
+    return run
+
+
+@pytest.mark.parametrize(
+    ("kind", "deviation", "speed", "seconds", "stands"),
+    [
+        ("car", 1.0, 0.9, 1.5, True),  # 0.9 m/s is within 1.5 m/s, and 1.35 m within 1.645 m.
+        ("car", 1.0, 0.9, 2.2, False),  # It has moved 2 m.
+        ("car", 1.0, 1.6, 0.1, False),  # Its speed exceeds the error.
+        ("car", 0.1, 0.9, 0.1, False),
+        ("pedestrian", 1.0, 0.9, 0.1, False),
+        ("bicycle", 1.0, 0.9, 0.1, False),
+    ],
+)
+def test_object_sets_off_when_it_moves_beyond_its_errors(
+    kind: str, deviation: float, speed: float, seconds: float, stands: bool
+) -> None:
+    known = observed(kind, deviation, speed, seconds)
+    assert (known.still_since is not None) is stands
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi, 0.4])
+def test_vehicle_off_the_lanes_moves_along_its_axis(roads: RoadNetwork, yaw: float) -> None:
+    # Beside the road, with a velocity across its axis that is within the error of 1.5 m/s.
+    box = KnownBox(60.0, LANE - 5.0, vx=-0.8 * math.sin(yaw), vy=0.8 * math.cos(yaw), yaw=yaw, deviation=1.0)
+    known = ObjectMemory(BehaviorSettings()).update(detections(0.0, box), 0.0)
+    found = Predictor(roads, TIMES).predict(known)
+    turn = found.yaw[0] - yaw
+    np.testing.assert_allclose(np.abs(np.cos(turn)), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.hypot(found.x[0] - 60.0, found.y[0] - (LANE - 5.0)), 0.0, atol=1e-9)
+
+
+def test_pedestrian_of_uncertain_velocity_may_move_anywhere(roads: RoadNetwork) -> None:
+    box = KnownBox(60.0, LANE - 5.0, vy=1.2, kind="pedestrian", size=(0.5, 0.5), deviation=1.0)
+    known = ObjectMemory(BehaviorSettings()).update(detections(0.0, box), 0.0)
+    found = Predictor(roads, TIMES).predict(known)
+    assert found.y[0, -1] == pytest.approx(LANE - 5.0 + 1.2 * 8.0)
+
+
+def test_vehicle_passes_a_narrow_place_at_walking_pace(roads: RoadNetwork) -> None:
+    run = drive(roads, lambda now: [PARKED, OPPOSITE], 45.0)
+    assert run.front > 80.0
+    beside = [speed for x, _, speed in run.path if PARKED.x - 4.0 < x + FRONT < PARKED.x + 3.0]
+    assert max(beside) < 2.5
+    assert any(reason.startswith("walking pace: ") for reason in run.reasons)
+    waits = [speed for speed in run.speeds if speed < 0.3]
+    assert len(waits) * 0.05 >= 5.0, "first it waits"
+
+
+def test_vehicle_stays_before_a_place_without_room(roads: RoadNetwork) -> None:
+    near = [PARKED._replace(y=LANE - 1.9), OPPOSITE._replace(y=LANE + 1.9)]
+    run = drive(roads, lambda now: near, 40.0)
+    assert run.front < PARKED.x - PARKED.size[0] / 2.0
+    assert run.speeds[-1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_walking_pace_keeps_the_margin_of_pedestrians(roads: RoadNetwork) -> None:
+    person = KnownBox(60.0, LANE - 1.4, kind="pedestrian", size=(0.5, 0.5), deviation=0.1)
+    run = drive(roads, lambda now: [person, OPPOSITE], 40.0)
+    assert run.front < person.x
+
+
+def noise(seed: int, boxes: Sequence[KnownBox]) -> Callable[[float], Sequence[KnownBox]]:
+    """Return the boxes with correlated errors of place (0.5 m along, 0.25 m across) and velocity (0.4 m/s)."""
+    random = np.random.default_rng(seed)
+    times = np.array([8.0, 8.0, 1.0, 1.0])
+    sigma = np.array([0.5, 0.25, 0.4, 0.4])
+    keep = np.exp(-0.05 / times)
+    state = random.normal(size=(len(boxes), 4))
+
+    def seen(now: float) -> Sequence[KnownBox]:
+        nonlocal state
+        state = keep * state + np.sqrt(1.0 - keep**2) * random.normal(size=state.shape)
+        errors = (sigma * state).tolist()
+        return [
+            box._replace(x=box.x + x, y=box.y + y, vx=vx, vy=vy)
+            for box, (x, y, vx, vy) in zip(boxes, errors, strict=True)
+        ]
+
+    return seen
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_parked_vans_of_noisy_place_and_velocity_are_passed(roads: RoadNetwork, seed: int) -> None:
+    vans = [PARKED, PARKED._replace(x=66.5)]
+    run = drive(roads, noise(seed, vans), 45.0)
+    assert run.front > 90.0
+    for van in vans:
+        beside = [y for x, y, _ in run.path if x - 1.0 < van.x + van.size[0] / 2.0 and x + FRONT > van.x - 2.95]
+        assert min(beside) - CAR.size[1] / 2.0 > van.y + van.size[1] / 2.0, "no contact"
