@@ -61,6 +61,7 @@ def run_and_save(
     seed = checked_seed(seed)
     command = _command(source, seed, settings) or command
     recording: Path | None = None
+    simulation: Simulation | None = None
     try:
         with limit_wall_time(wall_limit) as limit, ExitStack() as stack:
             if limit is not None and command:
@@ -94,6 +95,8 @@ def run_and_save(
             error.add_note(f"reproduce: {command}")
         if recording is not None and recording.exists():
             error.add_note(f"recording: {recording}")
+        for line in () if simulation is None else simulation.describe_state():
+            error.add_note(line)
         raise
 
 

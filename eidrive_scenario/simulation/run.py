@@ -166,6 +166,8 @@ class RunResult:
     """Link statistics, by (sender, receiver)."""
     settings: ResolvedSettings = field(default_factory=ResolvedSettings)
     """All settings that determine the run."""
+    final_state: tuple[str, ...] = ()
+    """State of the storyboard and last decision of each driven station at the end of the run, as lines of text."""
     command: str = ""
     """Command line that reproduces the run; empty for a scenario without a file."""
     folder: Path | None = None
@@ -216,6 +218,7 @@ class RunResult:
                 }
                 for verdict in self.criteria
             ],
+            "final_state": list(self.final_state),
             "warnings": list(self.warnings),
             "metrics": dict(self.metrics),
             "links": [

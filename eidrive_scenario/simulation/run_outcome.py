@@ -42,6 +42,7 @@ def build_result(
     settings: ResolvedSettings,
     trace_hash: str,
     false_tracks: FalseTracks,
+    final_state: tuple[str, ...],
     late_warnings: Iterator[str],
 ) -> RunResult:
     """Return the result of a run that has ended."""
@@ -72,6 +73,7 @@ def build_result(
         run=settings.run,
         links=links,
         settings=settings,
+        final_state=final_state,
     )
 
 

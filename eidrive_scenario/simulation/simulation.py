@@ -15,6 +15,7 @@ from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError,
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.text.final_state import FinalState
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose
@@ -78,7 +79,7 @@ class Simulation:
         """Warnings about criteria that demand no progress; they are warnings of the result as well."""
         self._state = RunState.of(setup)
         self.criteria = self._state.criteria
-        self._trace, self._false_tracks = TraceHash(), FalseTracks()
+        self._trace, self._false_tracks, self._final_state = TraceHash(), FalseTracks(), FinalState()
         self._motionless = MotionlessStations(self.stack.possible_drivers)
         self._user_values = dict(self.settings.user_values)
         self._external_poses: dict[str, ExternalPose] = {}
@@ -204,6 +205,7 @@ class Simulation:
         if self._motionless.watching:
             self._motionless.observe(frame.view, driven)
         self._trace.observe(frame)
+        self._final_state.observe(frame)
         if limits := self.stack.min_existence:
             self._false_tracks.observe(frame, limits)
         self._observers.observe(frame)
@@ -222,8 +224,13 @@ class Simulation:
             settings=self.resolved,
             trace_hash=self._trace.hexdigest(),
             false_tracks=self._false_tracks,
+            final_state=self._final_state.lines(),
             late_warnings=late_warnings(self.scenario, self.storyboard, self._motionless, values, self._ended),
         )
+
+    def describe_state(self) -> tuple[str, ...]:
+        """Return the state of the storyboard and the decisions of the stations in the last tick, as lines of text."""
+        return self._final_state.lines()
 
     def attribute(self, error: BaseException) -> None:
         """Raise ExtensionError from an error that an extension of this run raised; return otherwise."""
