@@ -54,6 +54,11 @@ class Limit:
         self.notes.append(note)
         self.publish()
 
+    def end(self) -> None:
+        """Withdraw the notes: the run is over, so that a later end of the process is not about it."""
+        self.notes.clear()
+        self.publish()
+
     def publish(self) -> None:
         """Pass the notes to a location that outlasts the process."""
         if _last_resort is not None and _last_resort.publish is not None:
@@ -107,6 +112,7 @@ def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
         raise WallLimitError(seconds, where=running_line(error.__traceback__)) from error
     finally:
         _of_thread.limit = None
+        limit.end()
 
 
 def _is_positive(seconds: object) -> bool:

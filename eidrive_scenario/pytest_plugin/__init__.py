@@ -20,6 +20,7 @@ from eidrive_scenario.pytest_plugin.options import (
     pytest_configure_node,
     pytest_report_header,
 )
+from eidrive_scenario.pytest_plugin.run_records import pytest_runtest_makereport, pytest_runtest_setup
 from eidrive_scenario.pytest_plugin.summary import pytest_terminal_summary
 
 __all__ = [
@@ -30,6 +31,8 @@ __all__ = [
     "pytest_generate_tests",
     "pytest_handlecrashitem",
     "pytest_report_header",
+    "pytest_runtest_makereport",
+    "pytest_runtest_setup",
     "pytest_sessionfinish",
     "pytest_terminal_summary",
     "pytest_testnodedown",

@@ -10,7 +10,9 @@ import pytest
 from eidrive_scenario.library import definition
 from eidrive_scenario.pytest_plugin.distributions import DistributionFile
 from eidrive_scenario.pytest_plugin.items import ScenarioItem
-from eidrive_scenario.pytest_plugin.options import is_selected, run_variants
+from eidrive_scenario.pytest_plugin.markers import test_name
+from eidrive_scenario.pytest_plugin.options import is_selected
+from eidrive_scenario.pytest_plugin.variants import run_variants
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.File | None:
@@ -32,4 +34,5 @@ class ScenarioFile(pytest.File):
     def collect(self) -> Iterable[ScenarioItem]:
         """Yield one item per channel and seed."""
         for variant in run_variants(self.config):
-            yield ScenarioItem.from_parent(self, name=f"{self.path.stem}[{variant}]", variant=variant)
+            name = f"{test_name(self.config, self.path)}[{variant}]"
+            yield ScenarioItem.from_parent(self, name=name, variant=variant)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.pytest_plugin.items import ScenarioItem
-from eidrive_scenario.pytest_plugin.options import run_variants
+from eidrive_scenario.pytest_plugin.markers import test_name
+from eidrive_scenario.pytest_plugin.options import max_runs
+from eidrive_scenario.pytest_plugin.variants import run_variants
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
@@ -33,22 +36,23 @@ class DistributionFile(pytest.File):
             runs = load_distribution(self.path)
         except InputError as error:
             raise self.CollectError(str(error)) from error
-        max_runs: int | None = self.config.getoption("eidrive_max_runs")
-        numbers = range(len(runs)) if max_runs is None else runs.spread(max_runs)
+        most = max_runs(self.config)
+        numbers = range(len(runs)) if most is None else runs.spread(most)
         if len(numbers) < len(runs):
             self.config.stash.setdefault(_LEFT_OUT, {})[self.nodeid] = [len(numbers), len(runs)]
         for number in numbers:
             run = runs[number]
             for variant in run_variants(self.config):
-                name = f"{self.path.stem}[{_run_name(run)}-{variant}]"
+                name = f"{test_name(self.config, self.path)}[{_run_name(run)}-{variant}]"
                 yield ScenarioItem.from_parent(self, name=name, run=run, variant=variant)
 
 
 def _run_name(run: ConcreteRun) -> str:
     """Return the number of the run, which is unique, and its parameters, which are truncated."""
-    values = re.sub(r"[\s\[\]:]+", "_", str(run))
+    parts = (f"{name}={PurePosixPath(text).name or text}" for name, text in run.parameters.items())
+    values = re.sub(r"[\s\[\]:]+", "_", "-".join(parts))
     values = values if len(values) <= _MAX_LENGTH else values[: _MAX_LENGTH - 1] + "…"
-    return f"run{run.number}-{values}" if values else f"run{run.number}"
+    return f"run={run.number}-{values}" if values else f"run={run.number}"
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -13,15 +13,16 @@ import pytest
 from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.library import definition, library_path, resolve_scenario
-from eidrive_scenario.pytest_plugin.options import MarkerSettings, RunVariant, run_variants
+from eidrive_scenario.pytest_plugin.failure_text import explain_outcome, failures_of
+from eidrive_scenario.pytest_plugin.markers import run_markers, test_name
 from eidrive_scenario.pytest_plugin.outcome import (
-    explain,
-    explain_rate,
-    path_beside,
     properties,
     rate_properties,
     run_variant,
 )
+from eidrive_scenario.pytest_plugin.relative_paths import path_beside
+from eidrive_scenario.pytest_plugin.run_records import add_error, add_failed_run, add_properties, add_section
+from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant, run_variants
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.statistics.sequential import RatioTest
@@ -73,10 +74,17 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     except ValueError as error:
         raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {error}", pytrace=False) from None
     variants = list(run_variants(metafunc.config, channels, seeds, added, rate))
-    cases = [Case(path, variant) for path in paths for variant in variants]
-    metafunc.parametrize(
-        "run_scenario", cases, indirect=True, ids=[f"{case.source.stem}-{case.variant}" for case in cases]
-    )
+    config = metafunc.config
+    cases = [
+        pytest.param(
+            Case(path, variant),
+            id=f"{test_name(config, path)}-{variant}",
+            marks=tuple(run_markers(config, path, variant.selectors, None)),
+        )
+        for path in paths
+        for variant in variants
+    ]
+    metafunc.parametrize("run_scenario", cases, indirect=True)
 
 
 def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]:
@@ -179,16 +187,17 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
                 return _rate_verdict(request.node, source, variant, settings)
             result = run_variant(request.node, source, variant, **settings)
         except InputError as error:
+            add_error(request.node, error, request.node.path)
             raise pytest.fail.Exception(str(error), pytrace=False) from None
         except SimulationError as error:
+            add_error(request.node, error, request.node.path)
             place = error.place if isinstance(error, ExtensionError | WallLimitError) else None
             if error.__cause__ is not None and place is not None:
                 error.__cause__.__traceback__ = _from_file(error.__cause__.__traceback__, place.file)
             raise error.with_traceback(None) from error.__cause__
         result = replace(result, warnings=(*result.warnings, *variant.replaced))
-        request.node.user_properties.extend(properties(result))
-        if not result.passed:
-            request.node.add_report_section("call", "eidrive", explain(result))
+        add_properties(request.node, properties(result))
+        _report_failures(request.node, source, result)
         return result
 
     return run
@@ -201,10 +210,18 @@ def _rate_verdict(
     from eidrive_scenario.experiments.success_rate import decide_rate
 
     verdict = decide_rate(lambda seed: run_variant(item, source, replace(variant, seed=seed), **settings), variant.rate)
-    item.user_properties.extend(rate_properties(verdict))
-    if not verdict.passed:
-        item.add_report_section("call", "eidrive", explain_rate(verdict))
+    add_properties(item, rate_properties(verdict))
+    _report_failures(item, source, verdict)
     return verdict
+
+
+def _report_failures(item: pytest.Item, source: Source, result: RunResult | RateVerdict) -> None:
+    """Add the reasons of a failed run to the report of the test."""
+    if result.passed:
+        return
+    add_section(item, explain_outcome(result))
+    for failure in failures_of(result):
+        add_failed_run(item, failure, source if isinstance(source, Path) else item.path)
 
 
 def _from_file(trace: TracebackType | None, file: str) -> TracebackType | None:

@@ -11,7 +11,6 @@ import os
 import shutil
 import sys
 import tempfile
-from argparse import ArgumentTypeError
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
@@ -20,11 +19,11 @@ from typing import IO, Any
 import pytest
 
 from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.pytest_plugin.run_records import RunRecord, add_notes
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 USUAL_LIMIT = 1800.0
-"""Default of the ini option `eidrive_wall_limit` [s]."""
-_NO_LIMIT = "none"
+"""Default wall limit of each run [s]."""
 _WORKER_KEY = "eidrive_hung_runs"
 _reports = pytest.StashKey[Path]()
 """Folder of the reports of workers."""
@@ -33,25 +32,9 @@ _before = pytest.StashKey["LastResort | None"]()
 _file = pytest.StashKey["IO[Any]"]()
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the command line option and the ini option of the wall limit."""
-    group = parser.getgroup("eidrive", "OpenSCENARIO files")
-    group.addoption(
-        "--eidrive-wall-limit",
-        metavar="SECONDS|none",
-        type=_seconds,
-        help=f"maximum wall time of each run (default: the ini option eidrive_wall_limit, or {USUAL_LIMIT:g})",
-    )
-    parser.addini(
-        "eidrive_wall_limit",
-        f"maximum wall time of each run in seconds, or none (default: {USUAL_LIMIT:g})",
-        default=None,
-    )
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Read the limit, and install the handler of uninterruptible runs in this process."""
-    config.stash[_limit] = _given_limit(config)
+def configure(config: pytest.Config, limit: float | str) -> None:
+    """Store the limit of each run [s], or `none`, and install the handler of uninterruptible runs in this process."""
+    config.stash[_limit] = None if isinstance(limit, str) else limit
     workerinput = getattr(config, "workerinput", None)
     if workerinput is not None:
         file: IO[Any] = (Path(workerinput[_WORKER_KEY]) / workerinput["workerid"]).open("wb", buffering=0)
@@ -67,7 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Undo `pytest_configure`."""
+    """Undo `configure`."""
     if _file in config.stash:
         set_last_resort(config.stash[_before])
         config.stash[_file].close()
@@ -84,20 +67,31 @@ def pytest_configure_node(node: Any) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
-    """Add the report of an ended worker to the report of its test."""
+    """Add the report of an ended worker to the report of its test.
+
+    A scenario file that ends its worker is an error, as its verdict is unknown; a test in Python is a failure.
+    """
     node: Any = getattr(report, "node", None)
     if node is None or _WORKER_KEY not in node.workerinput:
         return
     file = Path(node.workerinput[_WORKER_KEY]) / node.gateway.id
     text = file.read_text(errors="replace").strip() if file.is_file() else ""
+    notes = _Notes(file).read()
     if text.startswith("Timeout"):
         from eidrive_scenario.simulation.hung_runs import describe_dump
 
         limit = node.config.stash[_limit] or 0.0
-        notes = _Notes(file).read()
         text = "\n".join([str(describe_dump(limit, text)), *notes, "", text])
-    if text:
-        report.longrepr = f"{text}\n\n{report.longrepr}"
+    elif not text and notes:
+        text = "\n".join(["the process of the run ended: it was killed, or native code crashed", *notes])
+    if crashitem.partition("::")[0].endswith(".xosc"):
+        report.when = "setup"
+    if not text:
+        return
+    record = RunRecord(reasons=[text.splitlines()[0]])
+    add_notes(record, dict.fromkeys([*text.splitlines(), *notes]))
+    report.eidrive, report.eidrive_is_crash = record.as_report(), True  # type: ignore[attr-defined]
+    report.longrepr = f"{text}\n\n{report.longrepr}"
 
 
 def wall_limit_of(config: pytest.Config) -> float | None:
@@ -137,32 +131,6 @@ class _Reporter:
             sys.stdout.flush()
         finally:
             os._exit(ABORTED)
-
-
-def _given_limit(config: pytest.Config) -> float | None:
-    given = config.getoption("eidrive_wall_limit")
-    if given is not None:
-        return None if given == _NO_LIMIT else float(given)
-    text = config.getini("eidrive_wall_limit")
-    if text is None:
-        return USUAL_LIMIT
-    try:
-        seconds = _seconds(str(text))
-    except ArgumentTypeError as error:
-        raise pytest.UsageError(f"eidrive_wall_limit: {error}") from None
-    return None if seconds == _NO_LIMIT else float(seconds)
-
-
-def _seconds(text: str) -> float | str:
-    if text.strip() == _NO_LIMIT:
-        return _NO_LIMIT
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not 0.0 < seconds < float("inf"):
-        raise ArgumentTypeError(f"not a positive number of seconds or none (got {text!r})")
-    return seconds
 
 
 def _has_faulthandler_timeout(config: pytest.Config) -> bool:

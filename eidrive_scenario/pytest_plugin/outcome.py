@@ -1,8 +1,7 @@
-"""One run as a test: execution, report properties, and text of a failure."""
+"""One run as a test: execution and report properties."""
 
 from __future__ import annotations
 
-import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import fields, replace
@@ -11,31 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.errors import Diagnostic, EidriveError, ExtensionError, InputError, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.hung_runs import wall_limit_of
-from eidrive_scenario.pytest_plugin.options import MarkerSettings, RunVariant
+from eidrive_scenario.pytest_plugin.option_values import split_channels
+from eidrive_scenario.pytest_plugin.options import OPTIONS, command_line_value, listed_value, option_value
+from eidrive_scenario.pytest_plugin.relative_paths import path_beside
+from eidrive_scenario.pytest_plugin.run_records import add_properties
+from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
 if TYPE_CHECKING:
-    from eidrive_scenario.evaluation import Verdict
     from eidrive_scenario.experiments.success_rate import RateVerdict
     from eidrive_scenario.openscenario import ConcreteRun, Source
     from eidrive_scenario.simulation import RunResult
 
 Properties = list[tuple[str, object]]
 
-_SHOWN_FAILURES = 5
-"""Number of failed runs that a failed test of the success rate explains."""
 WARNING = "warning"
 """Name of the properties with the warnings of a run."""
-
-
-class ScenarioFailed(Exception):
-    """Failed verdict of a run."""
-
-    def __init__(self, result: RunResult | RateVerdict) -> None:
-        super().__init__(explain_outcome(result))
-        self.result = result
+_NOT_REPEATED = ("out", "max_runs")
+"""Options that the command of a test omits, as they do not change its run."""
 
 
 def run_file_and_report(
@@ -48,7 +42,7 @@ def run_file_and_report(
     result: RunResult | RateVerdict
     if variant.rate is None:
         result = _run_and_report(item.config, source, run or source, variant, {})
-        item.user_properties.extend(properties(result))
+        add_properties(item, properties(result))
     else:
         from eidrive_scenario.experiments.success_rate import decide_rate
 
@@ -56,9 +50,9 @@ def run_file_and_report(
             lambda seed: _run_and_report(item.config, source, run or source, replace(variant, seed=seed), {}),
             variant.rate,
         )
-        item.user_properties.extend(rate_properties(result))
+        add_properties(item, rate_properties(result))
     if run is not None:
-        item.user_properties.extend((f"parameter.{name}", value) for name, value in run.parameters.items())
+        add_properties(item, [(f"parameter.{name}", value) for name, value in run.parameters.items()])
     return result
 
 
@@ -74,14 +68,25 @@ def run_variant(item: pytest.Item, source: Source, variant: RunVariant, **overri
 def pytest_command(item: pytest.Item) -> str:
     """Return the command line that repeats a test, including runs of scenarios without a file."""
     words = ["pytest", "::".join([str(item.path), *item.nodeid.split("::")[1:]])]
-    for name in ("channel", "detector", "planner", "seeds"):
-        value = item.config.getoption(f"eidrive_{name}")
-        if value is not None:
-            words += [f"--eidrive-{name}", ",".join(value) if isinstance(value, list) else str(value)]
-    for name in ("drive", "criterion"):
-        for value in item.config.getoption(f"eidrive_{name}") or ():
-            words += [f"--eidrive-{name}", value]
+    for option in OPTIONS:
+        value = None if option.name in _NOT_REPEATED else command_line_value(item.config, option.name)
+        for one in value if option.repeatable and value else [] if value is None else [value]:
+            words += [option.flag, _option_text(option.name, one)]
     return shlex.join(words)
+
+
+def _option_text(name: str, value: Any) -> str:
+    """Return the text of an option that is valid in any folder."""
+    if name == "channel":
+        return ",".join(_absolute(channel) for channel in split_channels(value))
+    if name == "drive":
+        entity, equals, stack = value.partition("=")
+        return f"{entity}{equals}{_absolute(stack) if equals else ''}"
+    return f"{value.bad:g}" if hasattr(value, "bad") else _absolute(str(value)) if name == "criterion" else str(value)
+
+
+def _absolute(value: str) -> str:
+    return str(path_beside(value, Path.cwd()))
 
 
 def _run_and_report(
@@ -103,14 +108,19 @@ def _run_and_report(
         if keyword not in known:
             raise SettingError(Diagnostic(f"run_scenario: unknown setting {keyword!r}", suggestion(keyword, known)))
     settings: dict[str, Any] = {
-        "channel": variant.channel,
-        "detector": config.getoption("eidrive_detector"),
-        "planner": config.getoption("eidrive_planner"),
+        "channel": _channel(config, variant.channel),
+        "detector": option_value(config, "detector"),
+        "planner": option_value(config, "planner"),
         **added_settings(config, variant.added),
-        **overrides,
     }
-    folder = config.getoption("eidrive_out")
-    below = Path(config.invocation_params.dir, folder, *_subfolders(config, file)) if folder is not None else None
+    if (time_limit := option_value(config, "time_limit")) is not None:
+        settings["time_limit"] = time_limit
+    settings.update(overrides)
+    folder = command_line_value(config, "out")
+    below = None if folder is None else Path(config.invocation_params.dir, folder)
+    if below is None and (listed := option_value(config, "out")) is not None:
+        below = config.rootpath / listed
+    below = below and below.joinpath(*_subfolders(config, file))
     return run_and_save(
         source,
         seed=variant.seed,
@@ -130,21 +140,24 @@ def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, A
     from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources, parse_drive
 
     root = config.rootpath
-    listed = parse_drive("eidrive_drive", config.getini("eidrive_drive"))
+    listed = parse_drive("eidrive_drive", listed_value(config, "drive"))
     in_file = {name: stack and path_beside(stack, root) for name, stack in listed.items()}
-    by_option = parse_drive("--eidrive-drive", config.getoption("eidrive_drive") or ())
-    criteria = [path_beside(one, root) for one in config.getini("eidrive_criteria")]
+    by_option = parse_drive("--eidrive-drive", command_line_value(config, "drive") or ())
+    criteria = [path_beside(one, root) for one in listed_value(config, "criterion")]
     return {
         "drive": {**in_file, **drive_sources(marker.drive), **by_option},
-        "criteria": [*criteria, *criteria_sources(marker.criteria), *(config.getoption("eidrive_criterion") or ())],
+        "criteria": [
+            *criteria,
+            *criteria_sources(marker.criteria),
+            *(command_line_value(config, "criterion") or ()),
+        ],
     }
 
 
-def path_beside(source: Any, folder: Path) -> Any:
-    """Return the path of a file relative to a folder, or any other value unchanged."""
-    if isinstance(source, str | Path) and os.path.isfile(folder / source):
-        return folder / source
-    return source
+def _channel(config: pytest.Config, channel: str | None) -> Any:
+    """Return a channel; a file of the ini option is relative to the root."""
+    is_listed = channel in split_channels(",".join(listed_value(config, "channel")))
+    return path_beside(channel, config.rootpath) if is_listed else channel
 
 
 def _subfolders(config: pytest.Config, source: Path) -> tuple[str, ...]:
@@ -194,50 +207,3 @@ def rate_properties(verdict: RateVerdict) -> Properties:
         ("success_rate.high", rate.high),
         ("success_rate.failed_seeds", ",".join(str(failure.seed) for failure in verdict.failures)),
     ]
-
-
-def explain_rate(verdict: RateVerdict) -> str:
-    """Return the reason of a failed or undecided test of the success rate, with its first failed runs."""
-    shown = [explain(failure) for failure in verdict.failures[:_SHOWN_FAILURES]]
-    more = len(verdict.failures) - len(shown)
-    return "\n\n".join([str(verdict), *shown, *([f"and {more} more failed runs"] if more else [])])
-
-
-def explain_outcome(result: RunResult | RateVerdict) -> str:
-    """Return the reason of a failed run, or of a failed test of the success rate."""
-    from eidrive_scenario.simulation import RunResult
-
-    return explain(result) if isinstance(result, RunResult) else explain_rate(result)
-
-
-def explain(result: RunResult) -> str:
-    """Return the reasons of a failed run, the command that repeats it, and the path of its recording."""
-    from eidrive_scenario.experiments.commands import reproduction_lines
-
-    lines = [f"{verdict.name}: {verdict.reason}{_limit(verdict)}" for verdict in result.criteria if not verdict.passed]
-    if not lines:
-        lines = [f"ended by its {result.end_reason} after {result.simulated_s:.2f} s"]
-    run = "" if result.run is None else f"run {result.run} of "
-    head = f"{run}{result.scenario} failed with channel {result.channel}, seed {result.seed}"
-    return "\n".join([head, *lines, *reproduction_lines(result)])
-
-
-def _limit(verdict: Verdict) -> str:
-    return f" (limit {verdict.limit:g} {verdict.unit})" if verdict.limit is not None and verdict.unit else ""
-
-
-def failure_text(error: BaseException) -> str | None:
-    """Return the text of a failure without traceback, or None for an error that requires a traceback."""
-    if isinstance(error, ScenarioFailed | InputError):
-        return str(error)
-    notes: list[str] = getattr(error, "__notes__", [])
-    if isinstance(error, OSError) and notes:
-        return "\n".join([f"aborted: {error}", *notes])
-    if not isinstance(error, EidriveError):
-        return None
-    lines = [str(error), *notes]
-    if isinstance(error, ExtensionError):
-        from eidrive_scenario.simulation.attribution import traceback_from_extension
-
-        lines += ["", traceback_from_extension(error)]
-    return "\n".join(lines).rstrip()

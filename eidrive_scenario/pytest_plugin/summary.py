@@ -7,10 +7,12 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.pytest_plugin.distributions import show_left_out
+from eidrive_scenario.pytest_plugin.github import show_annotations
 from eidrive_scenario.pytest_plugin.warning_summary import show_warnings
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Print the omitted runs and the warnings of all runs."""
+    """Print the omitted runs and the warnings of all runs, and in GitHub Actions the annotations."""
     show_left_out(terminalreporter, config)
     show_warnings(terminalreporter)
+    show_annotations(terminalreporter, config)

@@ -10,6 +10,8 @@ from openscenario_xml import catalog_xml
 
 pytest_plugins = ["pytester"]
 
+FIRST = "data/first.xosc::data/first[seed=1]"
+SECOND = "data/second.xosc::data/second[seed=1]"
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 
 
@@ -18,6 +20,8 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
     """Return a third-party project: Python tests, and a folder with two scenarios and a catalog."""
     pytester.makepyfile(test_own="def test_own():\n    pass")
     data = pytester.mkdir("data")
+    for name in ("one", "two"):
+        (pytester.mkdir(name) / "bad.yaml").write_text("loss: {kind: bernoulli, probability: 0.9}")
     for name in ("first", "second"):
         shutil.copy(PASSING_BY, data / f"{name}.xosc")
     (data / "cars.xosc").write_bytes(catalog_xml("cars", ""))
@@ -35,12 +39,12 @@ def test_collection_without_arguments_ignores_scenarios(project: pytest.Pytester
 
 
 def test_collection_of_folder_finds_its_scenarios(project: pytest.Pytester) -> None:
-    assert collected(project, "data") == ["data/first.xosc::first[seed1]", "data/second.xosc::second[seed1]"]
+    assert collected(project, "data") == [FIRST, SECOND]
 
 
 def test_collection_of_file_and_node_id_finds_them(project: pytest.Pytester) -> None:
-    assert collected(project, "data/first.xosc") == ["data/first.xosc::first[seed1]"]
-    item = "data/first.xosc::first[none-seed2]"
+    assert collected(project, "data/first.xosc") == [FIRST]
+    item = "data/first.xosc::data/first[channel=none-seed=2]"
     assert collected(project, item, "--eidrive-channel", "ideal,none", "--eidrive-seeds", "2") == [item]
 
 
@@ -52,26 +56,24 @@ def test_eidrive_paths_option_selects_folders(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_paths = scenarios")
     scenarios = project.mkdir("scenarios")
     shutil.copy(PASSING_BY, scenarios / "third.xosc")
-    assert collected(project) == ["scenarios/third.xosc::third[seed1]", "test_own.py::test_own"]
+    assert collected(project) == ["scenarios/third.xosc::scenarios/third[seed=1]", "test_own.py::test_own"]
     assert collected(project, "data") == []
-    assert collected(project, "data/first.xosc") == ["data/first.xosc::first[seed1]"]
+    assert collected(project, "data/first.xosc") == [FIRST]
 
 
 def test_collection_yields_one_item_per_channel_and_seed(project: pytest.Pytester) -> None:
-    items = collected(
-        project, "data/first.xosc", "--eidrive-channel", "ideal,channels/bad.yaml", "--eidrive-seeds", "2"
-    )
+    items = collected(project, "data/first.xosc", "--eidrive-channel", "ideal,one/bad.yaml", "--eidrive-seeds", "2")
     assert [item.split("::")[1] for item in items] == [
-        "first[ideal-seed1]",
-        "first[ideal-seed2]",
-        "first[bad-seed1]",
-        "first[bad-seed2]",
+        "data/first[channel=ideal-seed=1]",
+        "data/first[channel=ideal-seed=2]",
+        "data/first[channel=bad-seed=1]",
+        "data/first[channel=bad-seed=2]",
     ]
 
 
 def test_keyword_option_selects_items(project: pytest.Pytester) -> None:
-    items = collected(project, "data", "--eidrive-seeds", "3", "-k", "second and seed3")
-    assert items == ["data/second.xosc::second[seed3]"]
+    items = collected(project, "data", "--eidrive-seeds", "3", "-k", "second and seed:3")
+    assert items == ["data/second.xosc::data/second[seed=3]"]
 
 
 def test_seeds_option_of_zero_is_usage_error(project: pytest.Pytester) -> None:
@@ -91,15 +93,18 @@ def test_channel_option_accepts_inline_profile_and_drops_duplicates(project: pyt
     channels = "ideal, {delay: {kind: uniform, low: 0, high: 0.1}, loss: {kind: none}},ideal,none,"
     items = collected(project, "data/first.xosc", "--eidrive-channel", channels)
     assert [item.split("::")[1] for item in items] == [
-        "first[ideal-seed1]",
-        "first[delay_kind_uniform_low_0_high_0.1_loss_kind_none-seed1]",
-        "first[none-seed1]",
+        "data/first[channel=ideal-seed=1]",
+        "data/first[channel=delay_kind_uniform_low_0_high_0.1_loss_kind_none-seed=1]",
+        "data/first[channel=none-seed=1]",
     ]
 
 
 def test_channel_option_is_repeatable(project: pytest.Pytester) -> None:
     items = collected(project, "data/first.xosc", "--eidrive-channel", "ideal", "--eidrive-channel", "none,ideal")
-    assert [item.split("::")[1] for item in items] == ["first[ideal-seed1]", "first[none-seed1]"]
+    assert [item.split("::")[1] for item in items] == [
+        "data/first[channel=ideal-seed=1]",
+        "data/first[channel=none-seed=1]",
+    ]
 
 
 def test_collection_without_arguments_under_xdist_ignores_scenarios(project: pytest.Pytester) -> None:
@@ -113,5 +118,5 @@ def test_item_names_of_channels_with_equal_names_differ(project: pytest.Pytester
     channels = f"one/bad.yaml,two/bad.yaml,{inline}true}},{inline}false}}"
     items = collected(project, "data/first.xosc", "--eidrive-channel", channels)
     names = [item.split("::")[1] for item in items]
-    assert names[:2] == ["first[bad-seed1]", "first[bad_2-seed1]"]
+    assert names[:2] == ["data/first[channel=bad-seed=1]", "data/first[channel=bad_2-seed=1]"]
     assert len(set(names)) == 4

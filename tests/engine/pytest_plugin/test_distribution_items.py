@@ -42,13 +42,13 @@ def collected(pytester: pytest.Pytester, *arguments: str) -> list[str]:
 
 def test_distribution_yields_one_item_per_run(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     vary(values_xml("OtherY", "5", "4.5", "roads/[town]::1.xodr"))
-    items = ["run0-OtherY=5-seed1", "run1-OtherY=4.5-seed1", "run2-OtherY=_town_1.xodr-seed1"]
+    items = ["run=0-OtherY=5-seed=1", "run=1-OtherY=4.5-seed=1", "run=2-OtherY=_town_1.xodr-seed=1"]
     assert collected(pytester, "vary.xosc") == [f"vary.xosc::vary[{item}]" for item in items]
-    one = "vary.xosc::vary[run1-OtherY=4.5-ideal-seed2]"
+    one = "vary.xosc::vary[run=1-OtherY=4.5-channel=ideal-seed=2]"
     assert collected(pytester, one, "--eidrive-channel", "none,ideal", "--eidrive-seeds", "2") == [one]
-    assert collected(pytester, "vary.xosc", "-k", "run0") == ["vary.xosc::vary[run0-OtherY=5-seed1]"]
+    assert collected(pytester, "vary.xosc", "-k", "run:0") == ["vary.xosc::vary[run=0-OtherY=5-seed=1]"]
     assert collected(pytester, ".") == [
-        "passing_by.xosc::passing_by[seed1]",
+        "passing_by.xosc::passing_by[seed=1]",
         *(f"vary.xosc::vary[{item}]" for item in items),
     ]
 
@@ -65,10 +65,10 @@ def test_omitted_runs_are_reported(pytester: pytest.Pytester, vary: Callable[[st
     message = "vary.xosc: {} of 801 runs are tests, {} are omitted"
     result.stdout.fnmatch_lines([message.format(100, 701), "--eidrive-max-runs N selects more of them*"])
     result = pytester.runpytest_inprocess("--collect-only", "-q", "vary.xosc", "--eidrive-max-runs", "2")
-    result.stdout.fnmatch_lines(["vary.xosc::vary?run0-OtherY=0-seed1?", message.format(2, 799)])
+    result.stdout.fnmatch_lines(["vary.xosc::vary?run=0-OtherY=0-seed=1?", message.format(2, 799)])
     everything = collected(pytester, "vary.xosc", "--eidrive-max-runs", "all")
     assert len(everything) == 801
-    assert everything[-1] == "vary.xosc::vary[run800-OtherY=8-seed1]"
+    assert everything[-1] == "vary.xosc::vary[run=800-OtherY=8-seed=1]"
 
 
 def test_distribution_without_omitted_runs_prints_no_report(
@@ -104,7 +104,7 @@ def test_distribution_items_have_outcomes_and_properties(
     result.stdout.no_fnmatch_line("*Traceback*")
     cases = {case.get("name"): case for case in ElementTree.parse(pytester.path / "junit.xml").iter("testcase")}
     properties = {
-        entry.get("name"): entry.get("value") for entry in cases["vary[run0-OtherY=5-seed1]"].iter("property")
+        entry.get("name"): entry.get("value") for entry in cases["vary[run=0-OtherY=5-seed=1]"].iter("property")
     }
     assert (properties["run"], properties["parameter.OtherY"], properties["seed"]) == ("0", "5", "1")
     kept = sorted(path.relative_to(pytester.path).as_posix() for path in pytester.path.glob("runs/**/result.json"))

@@ -38,7 +38,9 @@ def test_far(run_scenario):
 """
     result = run(project, text, "--junitxml", "junit.xml")
     result.assert_outcomes(passed=8)
-    result.stdout.fnmatch_lines(["*test_far?first-ideal-seed1? PASSED*", "*test_far?second-none-seed2? PASSED*"])
+    result.stdout.fnmatch_lines(
+        ["*test_far?drives/first-channel=ideal-seed=1? PASSED*", "*test_far?drives/second-channel=none-seed=2? PASSED*"]
+    )
     case = next(iter(ElementTree.parse(project.path / "junit.xml").iter("testcase")))
     assert "min_distance.value" in {entry.get("name") for entry in case.iter("property")}
 

@@ -36,7 +36,7 @@ def test_scenario_items_have_outcomes_and_reasons(project: pytest.Pytester) -> N
         [
             "*failed with channel *, seed 1",
             "collision: Ego and Parked hit each other at 1.6* s at *",
-            "min_distance: Ego and Parked came within * m (center to center) at * s (limit 3 m)",
+            "min_distance: Ego and Parked came within * m (*) at * s (value * m, limit 3 m, first violated at * s)",
             "*wrong.xosc:61: *did you mean 'step'?",
         ]
     )
@@ -53,12 +53,12 @@ def test_junit_file_of_two_workers_contains_all_runs(project: pytest.Pytester) -
         for case in ElementTree.parse(project.path / "junit.xml").iter("testcase")
     }
     assert sorted(cases) == [
-        f"xosc.{name}.xosc::{name}[{channel}-seed{seed}]"
+        f"xosc.{name}.xosc::xosc/{name}[channel={channel}-seed={seed}]"
         for name in ("far", "near")
         for channel in ("ideal", "none")
         for seed in (1, 2)
     ]
-    case = cases["xosc.far.xosc::far[ideal-seed2]"]
+    case = cases["xosc.far.xosc::xosc/far[channel=ideal-seed=2]"]
     properties = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
     assert properties["min_distance.passed"] == "True"
     assert float(properties["min_distance.value"] or "") == pytest.approx(5.0)
@@ -66,7 +66,7 @@ def test_junit_file_of_two_workers_contains_all_runs(project: pytest.Pytester) -
     assert float(properties["min_distance.Ego.Parked.box"] or "") == pytest.approx(3.0)
     assert (properties["seed"], properties["end_reason"]) == ("2", "stop trigger")
     assert len(properties["trace_hash"] or "") == 64
-    failure = cases["xosc.near.xosc::near[none-seed1]"].find("failure")
+    failure = cases["xosc.near.xosc::xosc/near[channel=none-seed=1]"].find("failure")
     assert failure is not None
     assert "hit each other" in (failure.text or "")
     assert "Traceback" not in (failure.text or "")

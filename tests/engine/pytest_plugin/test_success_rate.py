@@ -18,6 +18,8 @@ from eidrive_scenario.experiments.success_rate import decide_rate
 pytest_plugins = ["pytester"]
 __all__ = ["eidrive", "passing_by"]
 
+pytestmark = pytest.mark.timeout(600)
+
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 TEXT = """
 import pytest
@@ -90,7 +92,7 @@ def test_marker_decides_rate_over_seeds(project: pytest.Pytester) -> None:
     done.assert_outcomes(passed=2, failed=2)
     done.stdout.fnmatch_lines(
         [
-            "*test_rate?first-rate0.5? PASSED*",
+            "*test_rate?drives/first-rate=0.5? PASSED*",
             "*with a confidence of 95%: undecided (4 of 4 runs passed*",
             "*with a confidence of 95%: failed (0 of * runs passed*",
             "*reproduce: eidrive run*OtherY=0*--seed 1*",
@@ -98,7 +100,8 @@ def test_marker_decides_rate_over_seeds(project: pytest.Pytester) -> None:
     )
     cases = {str(case.get("name")): case for case in ElementTree.parse(project.path / "junit.xml").iter("testcase")}
     entries = {
-        str(entry.get("name")): entry.get("value") for entry in cases["test_rate[first-rate0.5]"].iter("property")
+        str(entry.get("name")): entry.get("value")
+        for entry in cases["test_rate[drives/first-rate=0.5]"].iter("property")
     }
     assert entries["success_rate.decision"] == "passed"
     assert (entries["success_rate.runs"], entries["success_rate.passed_runs"]) == ("6", "6")
@@ -107,7 +110,7 @@ def test_marker_decides_rate_over_seeds(project: pytest.Pytester) -> None:
 def test_option_applies_to_scenario_files(project: pytest.Pytester) -> None:
     done = project.runpytest_subprocess("drives", "-v", "-p", "no:cacheprovider", "--eidrive-success-rate", "0.5")
     done.assert_outcomes(passed=1)
-    done.stdout.fnmatch_lines(["*first?rate0.5?*PASSED*"])
+    done.stdout.fnmatch_lines(["*first?rate=0.5?*PASSED*"])
 
 
 @pytest.mark.parametrize(

@@ -67,5 +67,5 @@ def test_warnings_of_scenario_files_are_shown_once(pytester: pytest.Pytester) ->
     options = ("--eidrive-seeds", "2", "--junitxml", "junit.xml")
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "scene.xosc", *options)
     result.assert_outcomes(passed=2)
-    result.stdout.fnmatch_lines(["*scene[[]seed1] and 1 more: *scene.xosc:*: most messages take one step of 0.05 s*"])
+    result.stdout.fnmatch_lines(["*scene[[]seed=1] and 1 more: *scene.xosc:*: most messages take one step of 0.05 s*"])
     assert len(warnings_of(pytester.path / "junit.xml")) == 2

@@ -12,6 +12,7 @@ HEAD = """import ctypes
 import itertools
 import math
 import os
+import signal
 import sys
 import time
 
@@ -40,6 +41,7 @@ POINTS = {
         "hangs_in_c_later": "HangsInCLater",
         "deadlocks": "Deadlocks",
         "ends_process": "EndsProcess",
+        "kills_process": "KillsProcess",
         "hangs_when_built": "HangsWhenBuilt",
         "hangs_in_c_when_built": "HangsInCWhenBuilt",
         "exits": "Exits",

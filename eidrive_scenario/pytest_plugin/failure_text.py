@@ -1,0 +1,94 @@
+"""Text of a failed or aborted test of a scenario."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.errors import EidriveError, ExtensionError, InputError
+from eidrive_scenario.exit_codes import ABORTED
+
+if TYPE_CHECKING:
+    from eidrive_scenario.evaluation import Verdict
+    from eidrive_scenario.experiments.success_rate import RateVerdict
+    from eidrive_scenario.simulation import RunResult
+
+_SHOWN_FAILURES = 5
+"""Number of failed runs that a failed test of the success rate explains."""
+
+
+class ScenarioFailed(Exception):
+    """Failed verdict of a run."""
+
+    def __init__(self, result: RunResult | RateVerdict) -> None:
+        super().__init__(explain_outcome(result))
+        self.result = result
+
+
+def explain_rate(verdict: RateVerdict) -> str:
+    """Return the reason of a failed or undecided test of the success rate, with its first failed runs."""
+    shown = [explain(failure) for failure in verdict.failures[:_SHOWN_FAILURES]]
+    more = len(verdict.failures) - len(shown)
+    return "\n\n".join([str(verdict), *shown, *([f"and {more} more failed runs"] if more else [])])
+
+
+def explain_outcome(result: RunResult | RateVerdict) -> str:
+    """Return the reason of a failed run, or of a failed test of the success rate."""
+    from eidrive_scenario.simulation import RunResult
+
+    return explain(result) if isinstance(result, RunResult) else explain_rate(result)
+
+
+def explain(result: RunResult) -> str:
+    """Return the reasons of a failed run, its last state, the command that repeats it, and its recording."""
+    from eidrive_scenario.experiments.commands import reproduction_lines
+
+    run = "" if result.run is None else f"run {result.run} of "
+    head = f"{run}{result.scenario} failed with channel {result.channel}, seed {result.seed}"
+    return "\n".join([head, *reasons(result), *result.final_state, *reproduction_lines(result)])
+
+
+def reasons(result: RunResult) -> list[str]:
+    """Return a line for each failed criterion, and for the end by the limit of simulated time."""
+    lines = [_reason(verdict) for verdict in result.criteria if not verdict.passed]
+    if not lines or is_out_of_time(result):
+        lines.append(f"ended by its {result.end_reason} after {result.simulated_s:.2f} s")
+    return lines
+
+
+def is_out_of_time(result: RunResult | RateVerdict) -> bool:
+    """Whether a single run has reached its limit of simulated time, and no criterion has failed until then."""
+    return getattr(result, "exit_code", None) == ABORTED
+
+
+def failures_of(result: RunResult | RateVerdict) -> list[RunResult]:
+    """Return the failed runs that a report explains; none for a passed test."""
+    from eidrive_scenario.simulation import RunResult
+
+    if result.passed:
+        return []
+    return [result] if isinstance(result, RunResult) else list(result.failures[:_SHOWN_FAILURES])
+
+
+def _reason(verdict: Verdict) -> str:
+    quantities = (("value", verdict.value, verdict.unit), ("limit", verdict.limit, verdict.unit))
+    facts = [f"{name} {value:g} {unit}".rstrip() for name, value, unit in quantities if value is not None]
+    if verdict.first_violation is not None:
+        facts.append(f"first violated at {verdict.first_violation:.2f} s")
+    return f"{verdict.name}: {verdict.reason}" + (f" ({', '.join(facts)})" if facts else "")
+
+
+def failure_text(error: BaseException) -> str | None:
+    """Return the text of a failure without traceback, or None for an error that requires a traceback."""
+    if isinstance(error, ScenarioFailed | InputError):
+        return str(error)
+    notes: list[str] = getattr(error, "__notes__", [])
+    if isinstance(error, OSError) and notes:
+        return "\n".join([f"aborted: {error}", *notes])
+    if not isinstance(error, EidriveError):
+        return None
+    lines = [str(error), *notes]
+    if isinstance(error, ExtensionError):
+        from eidrive_scenario.simulation.attribution import traceback_from_extension
+
+        lines += ["", traceback_from_extension(error)]
+    return "\n".join(lines).rstrip()

@@ -1,0 +1,93 @@
+"""Markers of tests that run scenarios: `scenario`, the folder of the file, and `slow`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import pytest
+
+_SCENARIO = (
+    "scenario(pattern, channel=None, seeds=None, success_rate=None, drive=None, criteria=None): run the test once for "
+    "every scenario that matches the pattern (beside the test file, below the root, or in the library), channel and "
+    "seed, through the fixture run_scenario; success_rate: run seeds until a sequential test decides; drive and "
+    "criteria are those of RunSettings. Each run has a marker scenario(name=…, channel=…, seed=…) for the option -m"
+)
+_SLOW = "slow: run of a scenario in eidrive_slow, or a test of a success rate, which has many runs"
+_INI_SLOW = "eidrive_slow"
+_RESERVED = frozenset(
+    {
+        *("skip", "skipif", "xfail", "parametrize", "usefixtures", "filterwarnings", "tryfirst", "trylast", "scenario"),
+        *("anyio", "asyncio", "benchmark", "dependency", "flaky", "no_cover", "order", "repeat", "timeout"),
+        "xdist_group",
+    }
+)
+"""Markers with an effect, which a folder of their name must not set."""
+_DECLARED = pytest.StashKey[set[str]]()
+
+
+def add_ini_option(parser: pytest.Parser) -> None:
+    """Add the ini option of slow scenarios."""
+    parser.addini(
+        _INI_SLOW,
+        "patterns of scenario files below the root with the marker slow, such as xosc/ei/*, one per line",
+        type="linelist",
+        default=[],
+    )
+
+
+def declare(config: pytest.Config) -> None:
+    """Declare the markers `scenario` and `slow`; those of folders follow with their first file."""
+    config.addinivalue_line("markers", _SCENARIO)
+    config.addinivalue_line("markers", _SLOW)
+    config.stash[_DECLARED] = {"scenario", "slow"}
+
+
+def family_of(path: Path) -> str:
+    """Return the marker of the folder of a file, or "" for a folder that sets none."""
+    name = re.sub(r"\W+", "_", path.parent.name).strip("_")
+    return "" if name in _RESERVED else name
+
+
+def test_name(config: pytest.Config, path: Path) -> str:
+    """Return the part of a test name that a scenario file has, such as `coop/scenario_1`.
+
+    The folder is omitted for a file in the root, whose name differs between checkouts.
+    """
+    parent = path.parent.name if path.parent != config.rootpath else ""
+    return "/".join(re.sub(r"[^\w.+=,~-]+", "_", part) for part in (parent, path.stem) if part)
+
+
+def run_markers(
+    config: pytest.Config, path: Path, selectors: Mapping[str, str | int], run: int | None
+) -> Iterator[pytest.MarkDecorator]:
+    """Yield the markers of one run of a scenario file, or of one run of a distribution.
+
+    selectors  settings of the run by name
+    """
+    settings = {} if run is None else {"run": run}
+    yield pytest.mark.scenario(name=path.stem, folder=path.parent.name, **settings, **selectors)
+    family = family_of(path)
+    if family:
+        yield _marker(config, family, f"scenarios in folders named {path.parent.name}")
+    place = path.relative_to(config.rootpath) if path.is_relative_to(config.rootpath) else path
+    is_slow = "rate" in selectors or any(fnmatchcase(place.as_posix(), one) for one in config.getini(_INI_SLOW))
+    if is_slow and family != "slow":
+        yield pytest.mark.slow
+
+
+def keywords(selectors: Mapping[str, str | int], run: int | None) -> set[str]:
+    """Return words for the option -k, whose expressions cannot contain an equals sign: `channel:ideal`, `seed:3`."""
+    words = {f"{name}:{value}" for name, value in selectors.items()}
+    return words if run is None else {*words, f"run:{run}"}
+
+
+def _marker(config: pytest.Config, name: str, description: str) -> pytest.MarkDecorator:
+    """Return a marker, declared for the option --strict-markers."""
+    declared = config.stash[_DECLARED]
+    if name not in declared:
+        declared.add(name)
+        config.addinivalue_line("markers", f"{name}: {description}")
+    return getattr(pytest.mark, name)  # type: ignore[no-any-return]

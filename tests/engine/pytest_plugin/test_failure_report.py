@@ -1,0 +1,114 @@
+"""Text of a failed run: criterion, value, limit, time, last state, decision, command and recording."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from faulty_extensions import write_scenario
+
+from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.pytest_plugin.criterion_lines import line_of_criterion
+from eidrive_scenario.pytest_plugin.failure_text import explain
+from eidrive_scenario.simulation import RunSettings
+
+pytest_plugins = ["pytester"]
+
+pytestmark = pytest.mark.timeout(600)
+
+PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+
+
+def test_failed_run_is_explained_with_state_and_decision(tmp_path: Path) -> None:
+    """A driven vehicle exceeds its speed limit; the stop trigger fires in the first tick after one second."""
+    scenario = write_scenario(tmp_path / "a b.xosc", criterion="max_speed: {of: Ego, at_most: 1}", end=1.0)
+    text = explain(run_and_save(scenario, seed=2, below=tmp_path / "kept")).splitlines()
+    assert text[0] == "a b failed with channel none, seed 2"
+    speed = re.match(r"max_speed: .*\(value (\S+) m/s, limit 1 m/s, first violated at 0\.00 s\)$", text[1])
+    assert speed is not None
+    assert float(speed[1]) == pytest.approx(5.0, abs=0.5)
+    assert text[2] == "storyboard: stopped at 1.05 s: simulation time 1.05 s > 1 s"
+    assert text[3].startswith("running events: ")
+    decisions = [line for line in text if line.startswith("decision of ")]
+    assert any(
+        re.match(r"decision of Ego: drive at \d+\.\d m/s, acceleration -?\d+\.\d m/s²: \w+", one) for one in decisions
+    )
+    assert f"reproduce: eidrive run '{scenario}' --seed 2" in text
+    assert Path(text[-1].removeprefix("recording: ")).is_file()
+
+
+def test_running_event_is_part_of_state(tmp_path: Path) -> None:
+    """At the limit of simulated time the storyboard runs, with the event that began at 0.5 s."""
+    scenario = write_scenario(tmp_path / "s.xosc", end=9.0, action="sound")
+    result = run_and_save(scenario, settings=RunSettings(time_limit=0.75))
+    assert result.end_reason == "time limit"
+    assert result.final_state[0] == "storyboard: running at 0.75 s"
+    assert "ended by its time limit after 0.75 s" in explain(result)
+
+
+def test_command_of_options_reproduces_run(pytester: pytest.Pytester) -> None:
+    """The pasted command gives the same verdict in another folder, with every option that needs quotes."""
+    folder = pytester.mkdir("it's a folder")
+    text = PASSING_BY.read_text(encoding="utf-8")
+    (folder / "near by.xosc").write_text(text.replace('value="5.0"', 'value="0.0"'), encoding="utf-8")
+    (folder / "late.yaml").write_text("delay: {kind: constant, seconds: 0.2}", encoding="utf-8")
+    result = pytester.runpytest_subprocess(
+        str(folder),
+        *("--eidrive-channel", "it's a folder/late.yaml", "--eidrive-time-limit", "2.5", "-p", "no:cacheprovider"),
+        *("--eidrive-criterion", '{max_speed: {of: Ego, at_most: 90, name: "Ego\'s $HOME"}}'),
+    )
+    result.assert_outcomes(failed=1)
+    (command,) = {line.removeprefix("reproduce: ") for line in result.outlines if line.startswith("reproduce: ")}
+    words = command.replace("eidrive ", f"{sys.executable} -m eidrive_scenario ", 1)
+    again = subprocess.run(["/bin/sh", "-c", f"{words} --json"], cwd="/", capture_output=True, text=True, check=False)
+    assert again.returncode == 1, again.stderr
+    assert '"time_limit": 2.5' in again.stdout
+    assert "Ego's $HOME" in again.stdout
+    assert '"seconds": 0.2' in again.stdout
+
+
+def test_command_of_scenario_without_file_reproduces_test(pytester: pytest.Pytester) -> None:
+    """The pytest command has the options that select and change the run."""
+    shutil.copy(PASSING_BY, pytester.path / "scene.xosc")
+    pytester.makepyfile(
+        **{
+            "test_own": """
+            import pytest
+
+            @pytest.mark.parametrize("value", ["0", "it's [0]"])
+            def test_object(run_scenario, value):
+                source = open("scene.xosc", "rb").read().replace(b'value="5.0"', b'value="0.0"')
+                assert run_scenario(source).passed
+            """
+        }
+    )
+    options = ("--eidrive-time-limit", "2.5", "--eidrive-criterion", "{max_speed: {of: Ego, at_most: 90}}")
+    result = pytester.runpytest_subprocess(*options, "-p", "no:cacheprovider", "-k", "it")
+    result.assert_outcomes(failed=1, deselected=1)
+    (command,) = {line.removeprefix("reproduce: ") for line in result.outlines if line.startswith("reproduce: ")}
+    words = command.replace("pytest ", f"{sys.executable} -m pytest -p no:cacheprovider ", 1)
+    again = subprocess.run(["/bin/sh", "-c", words], cwd=pytester.path, capture_output=True, text=True, check=False)
+    assert "1 failed" in again.stdout, again.stdout + again.stderr
+    assert f"reproduce: {command}" in again.stdout
+
+
+def test_line_of_criterion_is_that_of_its_declaration(tmp_path: Path) -> None:
+    path = tmp_path / "s.xosc"
+    path.write_text(
+        '<a name="collision"/>\n'
+        '<CustomCommandAction type="eidrive.channel">collision</CustomCommandAction>\n'
+        '<CustomCommandAction type="eidrive.criterion">\n'
+        "  max_speed: {of: Ego, at_most: 9, name: own speed}\n"
+        "  collision: {of: Ego}</CustomCommandAction>\n"
+        "own\n",
+        encoding="utf-8",
+    )
+    assert line_of_criterion(path, "collision") == 5
+    assert line_of_criterion(path, "own speed") == 4
+    assert line_of_criterion(path, "own") == 4
+    assert line_of_criterion(path, "speed_limit") is None
+    assert line_of_criterion(tmp_path / "missing.xosc", "collision") is None
