@@ -28,8 +28,11 @@ def is_active() -> bool:
 
 
 def show_annotations(terminalreporter: Any, config: pytest.Config) -> None:
-    """Print one error annotation per failed test of a scenario, and append the job summary."""
-    if not is_active():
+    """Print one error annotation per failed test of a scenario, and append the job summary.
+
+    Workers of pytest-xdist write neither: their controller has all reports.
+    """
+    if not is_active() or hasattr(config, "workerinput"):
         return
     reports = _failed(terminalreporter)
     if reports and not config.pluginmanager.hasplugin(_PLUGIN):
