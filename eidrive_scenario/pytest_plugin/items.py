@@ -37,7 +37,8 @@ class ScenarioItem(pytest.Item):
     """
 
     def __init__(self, *, variant: RunVariant, run: ConcreteRun | None = None, **named: Any) -> None:
-        super().__init__(**named)
+        # The text is parsed into name and parameters, as pytest does with the ids that it stores for --lf.
+        super().__init__(nodeid=f"{named['parent'].nodeid}::{named['name']}", **named)
         self.variant = variant
         self.run = run
         self._result: RunResult | RateVerdict | None = None
