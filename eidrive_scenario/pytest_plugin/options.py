@@ -25,6 +25,8 @@ from eidrive_scenario.pytest_plugin.option_values import (
 _DEFAULT_MAX_RUNS = 100
 _SHOWN = ("channel", "drive", "criterion", "detector", "planner", "seeds", "success_rate", "time_limit", "out")
 """Options that the header of a report lists."""
+_COMBINED = ("drive", "criterion")
+"""Options whose values are added to those of the ini file."""
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _INI = pytest.StashKey[dict[str, Any]]()
 """Parsed values of the ini options with a value, by name."""
@@ -151,7 +153,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _ini_value(config: pytest.Config, option: Option) -> Any:
-    """Return the parsed value of an ini option, or None. Raise UsageError for an invalid value."""
+    """Return the parsed value of an ini option; None without a value, and if the command line replaces it.
+
+    Raise UsageError for an invalid value.
+    """
+    if option.name not in _COMBINED and command_line_value(config, option.name) is not None:
+        return None
     given = config.getini(option.key)
     texts = [str(text) for text in (given if isinstance(given, list) else [given])] if given is not None else []
     try:
