@@ -29,7 +29,7 @@ from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
-from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace, moves_safely
+from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -149,7 +149,7 @@ class Decider:
         slow = pace.situation(situation)
         options = self._options(slow, scene, profiles, with_maneuvers=self._settings.lane_changes)
         best = options.best()
-        if not moves_safely(options, best):
+        if not pace.moves_safely(situation, options, best):
             return None
         decision = self._decision(slow, options, best)
         return msgspec.structs.replace(decision, reason=f"walking pace: {decision.reason}", is_free=False)
