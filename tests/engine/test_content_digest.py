@@ -110,7 +110,11 @@ def test_memory_layout_does_not_change_the_digest() -> None:
     )
 
 
-@pytest.mark.parametrize("value", [object(), {1, 2}, np.array([object()]), print, [object()]], ids=str)
+@pytest.mark.parametrize(
+    "value",
+    [object(), {1, 2}, np.array([object()]), print, [object()]],
+    ids=["object", "set", "array", "function", "list"],
+)
 def test_values_without_content_raise_type_errors(value: object) -> None:
     with pytest.raises(TypeError, match="no digest"):
         content_digest(value)
