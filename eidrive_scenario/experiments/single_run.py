@@ -91,12 +91,13 @@ def run_and_save(
     except InputError:
         raise
     except BaseException as error:
+        # The state of the run says nothing about a file that cannot be written
+        for line in () if simulation is None or isinstance(error, OSError) else simulation.describe_state():
+            error.add_note(line)
         if command:
             error.add_note(f"reproduce: {command}")
         if recording is not None and recording.exists():
             error.add_note(f"recording: {recording}")
-        for line in () if simulation is None else simulation.describe_state():
-            error.add_note(line)
         raise
 
 

@@ -28,7 +28,7 @@ def refused(path: Path, *words: str, line: bool = True) -> None:
         assert all(word in text for word in words), text
         assert not line or any(part.split(":")[0].isdigit() for part in text.split(f"{path.name}:")[1:]), text
         assert len(result.output) < 50_000
-        assert time.process_time() - began < 10.0  # of the processor; the least of these cases took minutes
+        assert time.process_time() - began < 60.0  # of the processor; without limits the least of these takes minutes
 
 
 @pytest.mark.parametrize("encoding", ["no-such-codec", "utf-7", "idna", "base64", "cp037", "GB18030", "UTF-99"])
