@@ -21,7 +21,7 @@ demo: install   ## run scenarios 1 and 2 of the paper in all arms: reports/demo.
 	$(BIN)/python -m eidrive_scenario.reporting.demo --out reports/demo.html
 
 test: install   ## run the test suite and the scenarios of the library
-	$(BIN)/python -m pytest -n auto tests xosc/coop
+	$(BIN)/python -m pytest -n auto --durations 25 tests xosc/coop
 
 lint: install   ## check style, types and import contracts
 	$(BIN)/ruff check .

@@ -275,9 +275,10 @@ def test_error_of_run_has_notes_with_command_and_recording(tmp_path: Path, monke
     monkeypatch.setattr("eidrive_scenario.simulation.simulation.end_reason", fail)
     with pytest.raises(ZeroDivisionError) as raised:
         run(tmp_path)
-    notes = raised.value.__notes__
-    assert notes[0] == f"reproduce: eidrive run {PASSING_BY} --seed 1 --time-limit 0.3"
-    assert os.path.exists(notes[1].removeprefix("recording: "))
+    *state, command, recording = raised.value.__notes__
+    assert state[0].startswith("storyboard: ")
+    assert command == f"reproduce: eidrive run {PASSING_BY} --seed 1 --time-limit 0.3"
+    assert os.path.exists(recording.removeprefix("recording: "))
 
 
 def test_page_of_replaced_recording_is_removed(tmp_path: Path) -> None:
