@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,16 +21,11 @@ VARIABLES = ("GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY", "GITHUB_WORKSPACE", "CI_PR
 
 
 @pytest.fixture
-def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
-    """Return a project with a passing, a failing and an invalid scenario, outside of any CI system."""
+def project(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    """Return the project outside of any CI system."""
     for name in VARIABLES:
         monkeypatch.delenv(name, raising=False)
-    text = PASSING_BY.read_text(encoding="utf-8")
-    folder = pytester.mkdir("xosc")
-    shutil.copy(PASSING_BY, folder / "far.xosc")
-    (folder / "near.xosc").write_text(text.replace('value="5.0"', 'value="0.0"'), encoding="utf-8")
-    (folder / "wrong.xosc").write_text(text.replace('"step"', '"stp"'), encoding="utf-8")
-    return pytester
+    return project
 
 
 def outputs(junit: Path) -> dict[str, list[str]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,17 +15,6 @@ import pytest
 pytest_plugins = ["pytester"]
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
-
-
-@pytest.fixture
-def project(pytester: pytest.Pytester) -> pytest.Pytester:
-    """Return a project with a passing, a failing and an invalid scenario."""
-    text = PASSING_BY.read_text(encoding="utf-8")
-    folder = pytester.mkdir("xosc")
-    shutil.copy(PASSING_BY, folder / "far.xosc")
-    (folder / "near.xosc").write_text(text.replace('value="5.0"', 'value="0.0"'), encoding="utf-8")
-    (folder / "wrong.xosc").write_text(text.replace('"step"', '"stp"'), encoding="utf-8")
-    return pytester
 
 
 def test_scenario_items_have_outcomes_and_reasons(project: pytest.Pytester) -> None:
