@@ -6,6 +6,7 @@ Stable: all names.
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, PASSED
+from eidrive_scenario.experiments.judgement import Judgement, judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.statistics.sequential import success_rate
 from eidrive_scenario.experiments.success_rate import RateVerdict
@@ -24,6 +25,7 @@ __all__ = [
     "PASSED",
     "CheckReport",
     "Frame",
+    "Judgement",
     "Observer",
     "RateVerdict",
     "Recording",
@@ -31,6 +33,7 @@ __all__ = [
     "RunSettings",
     "Simulation",
     "check_scenario",
+    "judge_recording",
     "limit_wall_time",
     "load_distribution",
     "load_for_seed",

@@ -16,6 +16,7 @@ from eidrive_scenario.cli.check import check
 from eidrive_scenario.cli.compare import compare
 from eidrive_scenario.cli.error_output import Guarded, print_error
 from eidrive_scenario.cli.init import init
+from eidrive_scenario.cli.judge import judge
 from eidrive_scenario.cli.reproduce import reproduce
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.short_help import ShortHelp
@@ -39,6 +40,7 @@ app.command()(check)
 app.command(name="list")(list_names)
 app.command()(tree)
 app.command()(view)
+app.command()(judge)
 app.command()(report)
 app.command(cls=ShortHelp)(sweep)
 app.command()(results)

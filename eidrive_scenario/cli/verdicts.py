@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 
 import typer
 from rich.console import Console
@@ -12,7 +13,9 @@ from rich.text import Text
 from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
 from eidrive_scenario.experiments.commands import reproduction_lines
+from eidrive_scenario.experiments.judgement import Judgement
 from eidrive_scenario.simulation import RunResult
+from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 _OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("time limit", "bold red")}
 
@@ -40,17 +43,7 @@ def show(result: RunResult, varied: str = "") -> None:
         (result.scenario, "bold"), f"{run}  seed {result.seed}  channel {result.channel}  ", (word, style)
     )
     out.print(title)
-    if result.criteria:
-        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-        for heading in ("criterion", "", "value", "limit", "reason"):
-            table.add_column(
-                heading, justify="right" if heading in ("value", "limit") else "left", no_wrap=heading != "reason"
-            )
-        for verdict in result.criteria:
-            table.add_row(*_row(verdict))
-        out.print(table)
-    else:
-        out.print("no criterion: nothing was evaluated", style="yellow")
+    _print_table(out, result.criteria)
     pace = result.simulated_s / result.wall_s if result.wall_s > 0 else 0.0
     speed = f", {pace:.{0 if pace >= 10 else 1 if pace >= 1 else 2}f} times real time" if pace else ""
     out.print(Text(f"end: {result.end_reason} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
@@ -60,8 +53,34 @@ def show(result: RunResult, varied: str = "") -> None:
     show_warnings(result)
 
 
-def show_warnings(result: RunResult) -> None:
-    """Print the warnings of a run on standard error, one per line."""
+def show_judgement(judgement: Judgement) -> None:
+    """Print the verdicts on a recording, and its warnings."""
+    out = console()
+    word, style = _OUTCOMES[judgement.exit_code]
+    if judgement.exit_code == ABORTED and judgement.end_reason != TIME_LIMIT:
+        word = "incomplete or damaged"
+    out.print(Text.assemble((judgement.scenario, "bold"), f"  seed {judgement.seed}  recorded  ", (word, style)))
+    _print_table(out, judgement.criteria)
+    out.print(Text(f"end: {judgement.end_reason} at {judgement.simulated_s:.2f} s"))
+    show_warnings(judgement)
+
+
+def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
+    if not criteria:
+        out.print("no criterion: nothing was evaluated", style="yellow")
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("criterion", "", "value", "limit", "reason"):
+        table.add_column(
+            heading, justify="right" if heading in ("value", "limit") else "left", no_wrap=heading != "reason"
+        )
+    for verdict in criteria:
+        table.add_row(*_row(verdict))
+    out.print(table)
+
+
+def show_warnings(result: RunResult | Judgement) -> None:
+    """Print the warnings of a run or of a judgement on standard error, one per line."""
     for warning in result.warnings:
         typer.secho(f"warning: {warning}", fg="yellow", err=True)
 

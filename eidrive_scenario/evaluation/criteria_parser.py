@@ -17,6 +17,7 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
 from eidrive_scenario.evaluation.scenario_runner_criteria import CLASSES, INEXPRESSIBLE, translation
+from eidrive_scenario.files.yaml_sources import flow_yaml
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
@@ -53,6 +54,12 @@ class CriterionDeclaration:
             raise InvalidResult(criterion, "name", f"is {name!r} (expected a text)")
         criterion.name = name
         return criterion
+
+
+def declaration_text(declaration: CriterionDeclaration, name: str) -> str:
+    """Return a declaration with all settings, and the name of its verdict, as YAML that `parse_criteria` reads."""
+    settings = declaration.settings.model_dump(mode="json", by_alias=True) | {"name": name}
+    return flow_yaml({declaration.kind: settings}, setting=f"criterion {name!r}")
 
 
 def parse_criteria(
@@ -241,8 +248,8 @@ def exit_verdict(command: CustomCommand, time: float) -> Verdict:
     return Verdict(command.type, passed, None, None, "", None if passed else time, reason, fatal=True)
 
 
-def stop_trigger_criteria(scenario: Scenario) -> list[Criterion]:
-    """Return the criteria about the ego vehicle that a file for ScenarioRunner specifies.
+def stop_trigger_declarations(scenario: Scenario) -> list[CriterionDeclaration]:
+    """Return declarations of the criteria about the ego vehicle that a file for ScenarioRunner specifies.
 
     Unsupported criteria are omitted and reported by `unsupported_criteria`. Raise SettingError if the value of a
     condition is invalid or no entity is the ego vehicle.
@@ -255,7 +262,7 @@ def stop_trigger_criteria(scenario: Scenario) -> list[Criterion]:
         kind, settings = translated
         settings = {"of": _ego(scenario, condition), **settings}
         declarations.append(_declare(kind, settings, condition.source, condition.line, {}))
-    return build_criteria(declarations)
+    return declarations
 
 
 def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:

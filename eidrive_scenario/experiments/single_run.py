@@ -12,17 +12,19 @@ from typing import Any
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.commands import command_of
+from eidrive_scenario.experiments.judgement import Judgement
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.openscenario.values.parameters import Assignment
-from eidrive_scenario.recording import CameraImageWriter, CsvWriter, Explanation, Recorder, RunLog
-from eidrive_scenario.recording.run_files import RECORDING
+from eidrive_scenario.recording import CameraImageWriter, CsvWriter, Explanation, RunLog
+from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
+from eidrive_scenario.simulation.recorded_outcome import CONTEXT, RunRecorder, criteria_context_text
 from eidrive_scenario.simulation.run import checked_seed
 from eidrive_scenario.wall_limit import limit_wall_time
 
@@ -127,9 +129,14 @@ def _record(
     simulation.add_observer(images)
     scenario, resolved = simulation.scenario, simulation.resolved
     given = _given_settings(scenario, resolved.seed, resolved.run, settings)
-    metadata = {**given, "settings": resolved.canonical, "command": command}
+    metadata = {
+        **given,
+        "settings": resolved.canonical,
+        "command": command,
+        CONTEXT: criteria_context_text(scenario),
+    }
     text = scenario.text if scenario.text is not None else _text(source)
-    simulation.add_observer(Recorder(folder.recording, metadata=metadata, attachments=_attachments(text, scenario)))
+    simulation.add_observer(RunRecorder(folder.recording, metadata=metadata, attachments=_attachments(text, scenario)))
 
 
 def _text(source: Scenario | Source | ConcreteRun) -> bytes:
@@ -152,8 +159,11 @@ def _keep(result: RunResult, folder: RunFolder, record: bool) -> RunResult:
     return replace(result, warnings=warnings, folder=folder.path, recording=recording)
 
 
-def as_json_text(result: RunResult, indent: int | None = None, *, ascii_only: bool = False) -> str:
-    """Return the result as JSON, with null for non-finite numbers. `ascii_only` escapes other letters: `\\u00e4`."""
+def as_json_text(result: RunResult | Judgement, indent: int | None = None, *, ascii_only: bool = False) -> str:
+    """Return a result or judgement as JSON, with null for non-finite numbers.
+
+    ascii_only  whether other letters are escaped: `\\u00e4`
+    """
     return json.dumps(_finite(result.as_json()), indent=indent, ensure_ascii=ascii_only, allow_nan=False)
 
 
@@ -184,7 +194,7 @@ def _given_settings(scenario: Scenario, seed: int, run: int | None, settings: Ru
 
 def _attachments(text: bytes, scenario: Scenario) -> dict[str, bytes]:
     """Return the text of the scenario and its road, so that a replay needs no other files."""
-    texts = {"scenario.xosc": text}
+    texts = {SCENARIO_FILE: text}
     if scenario.road_file is not None:
-        texts["road.xodr"] = read_road_text(scenario.road_file)
+        texts[ROAD_FILE] = read_road_text(scenario.road_file)
     return texts

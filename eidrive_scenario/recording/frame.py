@@ -15,6 +15,17 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 
+class ExecutedCommand(msgspec.Struct, frozen=True):
+    """Executed CustomCommandAction: type, content, and the time of its execution [s].
+
+    The content of a command that declares criteria contains all their settings, with their names in the run.
+    """
+
+    type: str
+    content: str
+    time: float
+
+
 class Frame(msgspec.Struct, frozen=True):
     """Ground truth, steps of the stations, storyboard transitions and message outcomes of one tick.
 
@@ -26,6 +37,8 @@ class Frame(msgspec.Struct, frozen=True):
     environment  time of day, weather and road condition; None until the scenario sets an environment
     monitors     values of the scenario's monitors by name
     routes       points (M, 3) of the routes that the scenario requested in this tick, by actor [m]
+    commands     custom commands that were executed after the former frame; in the first frame those of Init, the
+                 criteria of the StopTrigger, and the criteria that options of the run add
     """
 
     view: WorldView
@@ -37,3 +50,4 @@ class Frame(msgspec.Struct, frozen=True):
     environment: Environment | None = None
     monitors: Mapping[str, bool] = msgspec.field(default_factory=dict)
     routes: Mapping[str, Array] = msgspec.field(default_factory=dict)
+    commands: tuple[ExecutedCommand, ...] = ()

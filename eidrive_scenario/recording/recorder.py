@@ -15,8 +15,10 @@ from eidrive_scenario.recording.seal import Seal
 from eidrive_scenario.resolved_settings import package_versions
 
 TOPIC = "/frame"
-FORMAT = "2"
+FORMAT = "3"
 """Version of the recording format, stored in the metadata."""
+READABLE = ("2", FORMAT)
+"""Versions that are read. Version 2 lacks the commands of frames and the outcome of the run."""
 _CHUNK = 256 * 2**10
 """Uncompressed size at which a chunk is written [bytes]."""
 _SPAN = 1_000_000_000
@@ -49,18 +51,23 @@ class Recorder:
         self._writer.add_metadata(RUN, entries)
         self._seal.add_metadata(entries)
         for name, data in (attachments or {}).items():
-            self._writer.add_attachment(0, 0, name, "application/octet-stream", data)
-            self._seal.add_attachment(name, data)
+            self.attach(name, data)
         self._due = 0
         self._codec = codec(Frame)
         schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Frame", **self._codec.schema}
         schema_id = self._writer.register_schema("eidrive.Frame", "jsonschema", json.dumps(schema).encode())
         self._channel = self._writer.register_channel(TOPIC, "json", schema_id)
 
+    def attach(self, name: str, data: bytes) -> None:
+        """Append an attached file. Raise SimulationError if the recording is closed."""
+        self._check_open()
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._writer.add_attachment(0, 0, name, "application/octet-stream", data)
+        self._seal.add_attachment(name, data)
+
     def observe(self, frame: Frame) -> None:
         """Append one frame. Raise SimulationError if the file is closed: each run needs its own recorder."""
-        if self._file.closed:
-            raise SimulationError(f"{self._file.name}: the recording is closed; a second run needs a second Recorder")
+        self._check_open()
         text = json.dumps(self._codec.encode(frame), separators=(",", ":"), ensure_ascii=False, allow_nan=False)
         data, instant = text.encode(), round(frame.view.time * 1e9)
         self._writer.add_message(self._channel, instant, data, instant, sequence=frame.view.tick)
@@ -68,6 +75,10 @@ class Recorder:
         if instant >= self._due:
             self._writer.flush()  # type: ignore[no-untyped-call]
             self._due = instant + _SPAN
+
+    def _check_open(self) -> None:
+        if self._file.closed:
+            raise SimulationError(f"{self._file.name}: the recording is closed; a second run needs a second Recorder")
 
     def close(self) -> None:
         """Finish the file. A second call has no effect."""

@@ -15,7 +15,7 @@ from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.frame_check import check_frame
-from eidrive_scenario.recording.recorder import FORMAT, RUN
+from eidrive_scenario.recording.recorder import FORMAT, READABLE, RUN
 from eidrive_scenario.recording.run_files import recording_in
 from eidrive_scenario.recording.seal import NAME as SEAL
 from eidrive_scenario.recording.seal import Seal
@@ -190,7 +190,7 @@ class _Reading:
     def finish(self, path: Path) -> Recording:
         """Return the recording. Raise InputError if package or format differ."""
         found = self._metadata.get("format")
-        if found != FORMAT and (found is not None or not self._seal.frames):
+        if found not in READABLE and (found is not None or not self._seal.frames):
             got = "no format" if found is None else f"format {found[:20]!r}"
             message = f"not a recording of this version of eidrive (got {got}; expected format {FORMAT!r})"
             raise InputError(Diagnostic(message, "give a recording that this version wrote", str(path)))

@@ -14,6 +14,8 @@ from eidrive_scenario.files.bounded_json import load_json
 
 RECORDING, RESULT, IMAGES = "recording.mcap", "result.json", "images"
 """Names of the files in the folder of a run."""
+SCENARIO_FILE, ROAD_FILE = "scenario.xosc", "road.xodr"
+"""Names of the scenario and its road in the attachments of a recording."""
 _LARGEST = 256 * 2**20
 """Maximum size of a result [bytes]."""
 _MAX_DEPTH = 40

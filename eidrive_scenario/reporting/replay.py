@@ -39,6 +39,7 @@ from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.run_report.reported_run import parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
+from eidrive_scenario.simulation.recorded_outcome import CONTEXT
 
 _LARGEST_PAGE = 64 * 2**20
 """Approximate maximum size of the frames in a page [bytes]."""
@@ -163,7 +164,7 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
     """Return the facts about the run that the page lists."""
     if settings:
         return run_facts(settings)
-    hidden = ("format", "parameters", "settings", "command")
+    hidden = ("format", "parameters", "settings", "command", CONTEXT)
     facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
 

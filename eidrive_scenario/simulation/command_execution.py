@@ -11,11 +11,13 @@ from eidrive_scenario.evaluation.criteria_parser import (
     EXITS,
     CriterionDeclaration,
     build_criteria,
+    declaration_text,
     exit_verdict,
     parse_criteria,
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.recording.frame import ExecutedCommand
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.commands import CHANNEL, PREFIX, DeclaredCriteria, command_key
 from eidrive_scenario.simulation.run_setup import RunSetup
@@ -35,6 +37,7 @@ class RunState:
     criteria       of the run; commands add to them
     warnings       of the run; commands without effect add to them
     exit           verdict of the command that ends the run; None before it
+    executed       custom commands since the last frame
     """
 
     scenario: Scenario
@@ -47,6 +50,7 @@ class RunState:
     warnings: list[str]
     inputs: StackInputs = field(default_factory=StackInputs)
     exit: Verdict | None = None
+    executed: list[ExecutedCommand] = field(default_factory=list)
 
     @classmethod
     def of(cls, setup: RunSetup) -> RunState:
@@ -58,9 +62,20 @@ class RunState:
             setup.stack,
             weather_fixed=setup.weather is not None,
             declared=setup.declared_criteria,
-            criteria=list(setup.criteria),
+            criteria=[],
             warnings=list(setup.warnings),
         )
+
+    def take_executed(self) -> tuple[ExecutedCommand, ...]:
+        """Return the commands since the last call."""
+        if not self.executed:
+            return ()
+        executed, self.executed = tuple(self.executed), []
+        return executed
+
+    def record(self, kind: str, content: str) -> None:
+        """Add an executed command."""
+        self.executed.append(ExecutedCommand(kind, content, self.world.time))
 
 
 def execute(commands: Commands, run: RunState) -> None:
@@ -114,6 +129,8 @@ def set_weather(commands: Commands, run: RunState) -> None:
 def execute_custom(commands: Commands, run: RunState) -> None:
     """Execute CustomCommandActions. A command of another tool has no effect, which is a warning."""
     for command in commands.custom:
+        if command.type != CRITERION:  # `add_criteria` records criteria with all their settings
+            run.record(command.type, command.content)
         handler = CUSTOM_HANDLERS.get(command.type)
         if handler is not None:
             handler(command, run)
@@ -146,9 +163,11 @@ def declare(command: CustomCommand, run: RunState) -> None:
 
 def add_criteria(declarations: Iterable[CriterionDeclaration], run: RunState) -> None:
     """Add new criteria. The name of another criterion is not used again."""
+    declarations = list(declarations)
     added = build_criteria(declarations, [criterion.name for criterion in run.criteria])
-    for criterion in added:
+    for declaration, criterion in zip(declarations, added, strict=True):
         bind_roads(criterion, run.roads)
+        run.record(CRITERION, declaration_text(declaration, criterion.name))
     run.criteria += added
 
 

@@ -6,6 +6,7 @@ Errors in late events are thus reported at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from eidrive_scenario.openscenario.model import (
     CustomCommandAction,
     RandomRouteAction,
 )
+from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.registry import registry
@@ -98,8 +100,40 @@ def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> t
 
     Raise SettingError with all diagnostics.
     """
+    if not (sources := tuple(sources)):
+        return ()
+    return parse_added_criteria(sources, criteria_context(scenario), scope=scenario.scope)
+
+
+@dataclass(frozen=True)
+class CriteriaContext:
+    """Content of a scenario to which criteria refer; None for names that are unknown and therefore not checked.
+
+    entities, monitors  their names
+    has_roads           whether the scenario has roads
+    has_routes          whether the scenario, or an action of an extension, may request a route
+    """
+
+    entities: tuple[str, ...] | None = None
+    monitors: tuple[str, ...] | None = None
+    has_roads: bool = True
+    has_routes: bool = True
+
+
+def criteria_context(scenario: Scenario) -> CriteriaContext:
+    """Return the content of a scenario to which criteria refer."""
+    roads = scenario.road_file is not None
+    return CriteriaContext(tuple(scenario.entities), tuple(_monitors(scenario)), roads, _requests_routes(scenario))
+
+
+def parse_added_criteria(
+    sources: Iterable[str | Path], context: CriteriaContext, scope: Scope | None = None
+) -> tuple[CriterionDeclaration, ...]:
+    """Parse criteria, given as YAML texts and files. Raise SettingError with all diagnostics.
+
+    scope  parameters to which settings refer
+    """
     found: list[CriterionDeclaration] = []
-    has_routes = cache(lambda: _requests_routes(scenario))
     diagnostics: list[Diagnostic] = []
     for source in sources:
         try:
@@ -108,11 +142,11 @@ def check_added_criteria(scenario: Scenario, sources: Iterable[str | Path]) -> t
                 content.data,
                 content.lines,
                 source=content.source,
-                entities=scenario.entities,
-                monitors=_monitors(scenario),
-                scope=scenario.scope,
-                has_roads=scenario.road_file is not None,
-                has_routes=has_routes(),
+                entities=context.entities,
+                monitors=context.monitors,
+                scope=scope,
+                has_roads=context.has_roads,
+                has_routes=context.has_routes,
                 shown=quoted(content.data),
             )
         except InputError as error:

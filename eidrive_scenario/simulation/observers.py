@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, suppress
 
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.simulation.run import Observer, checked_observer
+from eidrive_scenario.simulation.run import Observer, RunResult, checked_observer
 
 
 class Observers:
@@ -33,6 +33,13 @@ class Observers:
         """Pass a frame to all observers, in the order in which they were added."""
         for observer in self._observers:
             observer.observe(frame)
+
+    def conclude(self, result: RunResult) -> None:
+        """Pass the result of a completed run to the observers that have a method for it."""
+        for observer in self._observers:
+            conclude = getattr(observer, "conclude", None)
+            if callable(conclude):
+                conclude(result)
 
     def close(self, stack: ExitStack) -> None:
         """Register the closing of all open observers with `stack`, so that an exception of one does not skip others."""

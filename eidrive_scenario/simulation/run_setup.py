@@ -10,10 +10,9 @@ from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.evaluation.criteria_parser import (
     CriterionDeclaration,
-    stop_trigger_criteria,
+    stop_trigger_declarations,
     unsupported_criteria,
 )
-from eidrive_scenario.evaluation.criterion import Criterion, bind_roads
 from eidrive_scenario.evaluation.progress_demand import progress_warnings
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
@@ -44,7 +43,7 @@ class RunSetup:
     roads: RoadNetwork | None
     storyboard: Storyboard
     stack: DrivingStack
-    criteria: tuple[Criterion, ...]
+    criteria: tuple[CriterionDeclaration, ...]
     declared_criteria: DeclaredCriteria
     added_criteria: tuple[CriterionDeclaration, ...]
     weather: Weather | None
@@ -70,7 +69,7 @@ def set_up_run(
     collector = ErrorCollector()
     scenario = load_for_run(source, seed, settings.parameters, collector)
     roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
-    criteria: tuple[Criterion, ...] = ()
+    criteria: tuple[CriterionDeclaration, ...] = ()
     declared: DeclaredCriteria = {}
     added: tuple[CriterionDeclaration, ...] = ()
     replaced: tuple[Diagnostic, ...] = ()
@@ -87,15 +86,13 @@ def set_up_run(
     with collector:
         driving = build_stack(stack, _stack_context(scenario, roads, seed, settings, load_weights))
     with collector:
-        criteria = tuple(stop_trigger_criteria(scenario))
-        for criterion in criteria:
-            bind_roads(criterion, roads)
+        criteria = tuple(stop_trigger_declarations(scenario))
     with collector:
         if settings.weather is not None:
             weather = load_weather(settings.weather, origin="--weather")
     collector.raise_if_any()
-    declarations = [*(one for several in declared.values() for one in several), *added]
-    all_criteria = [*criteria, *(one.build() for one in declarations)]
+    declarations = [*criteria, *(one for several in declared.values() for one in several), *added]
+    all_criteria = [one.build() for one in declarations]
     progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
     warnings = tuple(map(str, [*replaced, *_warnings(scenario, roads, driving), *progress]))
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)

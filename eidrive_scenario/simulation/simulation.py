@@ -85,6 +85,7 @@ class Simulation:
         self._external_poses: dict[str, ExternalPose] = {}
         self._links: Sequence[LinkEvent] = ()
         try:
+            add_criteria(setup.criteria, self._state)
             commands = self.storyboard.initial()
             self._environment: Environment | None = commands.environment
             execute(commands, self._state)
@@ -165,7 +166,9 @@ class Simulation:
         with limit_wall_time(wall_limit), self:
             while self._ended is None:
                 self.tick()
-            return self.result()
+            result = self.result()
+            self._observers.conclude(result)
+            return result
 
     def tick(self) -> tuple[Frame, str | None]:
         """Execute one time step; return its frame, and the reason if the run ends with it.
@@ -190,7 +193,18 @@ class Simulation:
         signals, appearances, monitors = commands.signals, commands.appearances, commands.monitors
         environment = self._environment = commands.environment or self._environment
         changes = self.storyboard.changes
-        frame = Frame(view, steps, changes, self._links, signals, appearances, environment, monitors, commands.routes)
+        frame = Frame(
+            view,
+            steps,
+            changes,
+            self._links,
+            signals,
+            appearances,
+            environment,
+            monitors,
+            commands.routes,
+            self._state.take_executed(),
+        )
         self._observe(frame, commands.driven)
         end = end_reason(self._state, self.storyboard, view.time, self.settings.time_limit)
         if end is None:

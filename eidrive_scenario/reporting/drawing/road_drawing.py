@@ -10,6 +10,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.recording import Recording
+from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.geometry.poses import lateral_axis
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
@@ -25,8 +26,6 @@ _LARGEST_ROAD_FILE = 64 * 2**20
 """Maximum size of a road file of a recording that is drawn [bytes]."""
 TOLERANCE = 0.02
 """Maximum deviation of a drawn line from the edge [m]."""
-ROAD_FILE = "road.xodr"
-"""Name of the road file in the attachments of a recording."""
 
 _LOWEST = ("none", "shoulder", "border", "sidewalk", "median")
 

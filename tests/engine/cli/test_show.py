@@ -22,7 +22,7 @@ def test_help_lists_commands_without_importing_engine() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for command in ("run", "check", "list", "tree", "view", "report"):
+    for command in ("run", "check", "list", "tree", "view", "judge", "report"):
         assert f" {command} " in done.stdout
 
 

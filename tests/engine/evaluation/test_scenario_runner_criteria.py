@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.evaluation.criteria_parser import parse_criteria, stop_trigger_criteria, unsupported_criteria
+from eidrive_scenario.evaluation.criteria_parser import (
+    build_criteria,
+    parse_criteria,
+    stop_trigger_declarations,
+    unsupported_criteria,
+)
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.simulation import Simulation
 
@@ -48,7 +53,7 @@ def test_stop_trigger_criteria_translates_supported_conditions() -> None:
         ("criteria_ReachedRegionTest", "", ""),
         ("criteria_KeepLaneTest", "", ""),
     )
-    criteria = stop_trigger_criteria(scenario)
+    criteria = build_criteria(stop_trigger_declarations(scenario))
     assert [criterion.name for criterion in criteria] == [
         *("collision", "driven_distance", "max_speed", "average_speed", "actor_blocked", "actor_blocked_2"),
     ]
@@ -65,7 +70,7 @@ def test_stop_trigger_criteria_on_lanes_and_signals_are_evaluated_with_roads() -
     names = ["KeepLane", "WrongLane", "OnSidewalk", "OffRoad", "EndofRoad", "RunningRedLight", "RunningStop"]
     scenario = written_for_scenario_runner(*((f"criteria_{name}Test", "", "") for name in names), road=ROAD)
     assert unsupported_criteria(scenario) == []
-    assert [criterion.name for criterion in stop_trigger_criteria(scenario)] == [
+    assert [criterion.name for criterion in build_criteria(stop_trigger_declarations(scenario))] == [
         *("keep_lane", "wrong_lane", "on_sidewalk", "off_road", "end_of_road", "running_red_light"),
         "running_stop_sign",
     ]
@@ -84,7 +89,7 @@ def test_stop_trigger_criteria_on_routes_and_emergency_vehicles() -> None:
         road=ROAD,
     )
     assert unsupported_criteria(scenario) == []
-    near, usual, completion, lanes, emergency = stop_trigger_criteria(scenario)
+    near, usual, completion, lanes, emergency = build_criteria(stop_trigger_declarations(scenario))
     assert [near.verdict().limit, usual.verdict().limit, completion.verdict().limit] == [20.0, 30.0, 0.99]
     assert (lanes.name, emergency.subjects) == ("outside_route_lanes", ("Ego", "Ambulance"))
 
@@ -119,7 +124,7 @@ VALUES = {"YieldToEmergencyVehicle": ("ev", "Parked"), "DrivenDistance": ("dista
 def test_class_of_scenario_runner_is_translated_or_named_with_its_replacement(name: str) -> None:
     parameter, value = VALUES.get(name, ("", "9" if name in ("MaxVelocity", "AverageVelocity") else ""))
     scenario = written_for_scenario_runner((f"criteria_{name}Test", parameter, value), road=ROAD)
-    criteria = stop_trigger_criteria(scenario)
+    criteria = build_criteria(stop_trigger_declarations(scenario))
     warnings = unsupported_criteria(scenario)
     assert len(criteria) + len(warnings) == 1
     if criteria:
@@ -141,26 +146,26 @@ def test_misspelled_class_of_scenario_runner_has_a_suggestion() -> None:
 
 def test_stop_trigger_criterion_with_a_duration_has_it_as_limit() -> None:
     scenario = written_for_scenario_runner(("criteria_OffRoadTest", "duration", "2.5"), road=ROAD)
-    (criterion,) = stop_trigger_criteria(scenario)
+    (criterion,) = build_criteria(stop_trigger_declarations(scenario))
     assert criterion.verdict().limit == 2.5
 
 
 def test_stop_trigger_criteria_ignores_other_conditions() -> None:
     scenario = load_scenario(PASSING_BY)
-    assert stop_trigger_criteria(scenario) == []
+    assert build_criteria(stop_trigger_declarations(scenario)) == []
     assert unsupported_criteria(scenario) == []
 
 
 def test_stop_trigger_criterion_with_non_numeric_value_raises_setting_error() -> None:
     scenario = written_for_scenario_runner(("criteria_DrivenDistanceTest", "distance_success", "far"))
     with pytest.raises(SettingError, match="setting 'at_least' is 'far'"):
-        stop_trigger_criteria(scenario)
+        build_criteria(stop_trigger_declarations(scenario))
 
 
 def test_stop_trigger_criteria_without_ego_raises_setting_error() -> None:
     scenario = written_for_scenario_runner(("criteria_CollisionTest", "", ""), ego=False)
     with pytest.raises(SettingError, match="the scenario has no ego vehicle; give a Vehicle the property"):
-        stop_trigger_criteria(scenario)
+        build_criteria(stop_trigger_declarations(scenario))
 
 
 def test_stop_condition_with_prefix_but_without_parameter_ends_run() -> None:

@@ -1,0 +1,201 @@
+"""Evaluation of a recorded run: with the criteria of the run, or with other ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, EidriveError, SettingError
+from eidrive_scenario.evaluation.criteria_parser import (
+    CRITERION,
+    EXITS,
+    build_criteria,
+    exit_verdict,
+    parse_criteria,
+)
+from eidrive_scenario.evaluation.criterion import Criterion, Verdict, bind_roads, checked_verdict
+from eidrive_scenario.exit_codes import ABORTED, PASSED
+from eidrive_scenario.recording.frame import ExecutedCommand, Frame
+from eidrive_scenario.recording.recording import Recording, open_recording
+from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation.added_settings import criteria_sources
+from eidrive_scenario.simulation.attribution import report_extension
+from eidrive_scenario.simulation.commands import parse_added_criteria
+from eidrive_scenario.simulation.recorded_outcome import (
+    CONTEXT,
+    RecordedOutcome,
+    plain_verdict,
+    recorded_context,
+    recorded_outcome,
+)
+from eidrive_scenario.simulation.run_outcome import criteria_metrics, exit_code_of
+from eidrive_scenario.storyboard.state.commands import CustomCommand
+
+INCOMPLETE = "the recording is incomplete"
+"""Reason for the end of a recording without the outcome of its run."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Verdicts on a recorded run.
+
+    exit_code  as that of a run; 3 also for an incomplete or damaged recording
+    metrics    of the criteria, by name
+    warnings   damage of the recording, and differences from the verdicts of the run
+    """
+
+    recording: Path
+    scenario: str
+    seed: int
+    end_reason: str
+    exit_code: int
+    criteria: tuple[Verdict, ...]
+    metrics: Mapping[str, float]
+    simulated_s: float
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """True if all criteria passed, and the run ended before its time limit."""
+        return self.exit_code == PASSED
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object that `eidrive judge --json` prints, with the keys of that of a run."""
+        keys = ("name", "passed", "value", "limit", "unit", "reason")
+        return {
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "passed": self.passed,
+            "end_reason": self.end_reason,
+            "criteria": [{key: getattr(verdict, key) for key in keys} for verdict in self.criteria],
+            "warnings": list(self.warnings),
+            "metrics": dict(self.metrics),
+            "simulated_s": self.simulated_s,
+            "recording": str(self.recording),
+        }
+
+
+def judge_recording(location: str | Path, criteria: Any = None) -> Judgement:
+    """Judge a recorded run, given as its recording or the folder of the run.
+
+    criteria  None for the criteria of the run, whose verdicts then equal those of the run bit for bit; or other
+              criteria, as in `RunSettings(criteria=…)`, which replace those of the run
+
+    The readable frames of an incomplete or damaged recording are judged. Raise InputError if it cannot be read, has
+    no readable frame, or lacks what a criterion requires, and ExtensionError for a fault of a criterion.
+    """
+    try:
+        return _judge(open_recording(recording_in(Path(location))), criteria)
+    except EidriveError:
+        raise
+    except Exception as error:
+        report_extension(error)
+        raise
+
+
+def _judge(recording: Recording, criteria: Any) -> Judgement:
+    outcome, text = recorded_outcome(recording), recording.attachments.get(ROAD_FILE)
+    roads = None if text is None else RoadNetwork.parse(text)
+    judge = _Judge(recording, roads, outcome)
+    if criteria is not None:
+        judge.add_others(criteria)
+    elif CONTEXT not in recording.metadata:
+        version = recording.metadata.get("eidrive-scenario", "unknown")
+        message = f"the recording contains no criteria (written by version {version})"
+        raise SettingError(Diagnostic(message, "give criteria (--criterion)", str(recording.path)))
+    skipped: list[str] = []
+    for frame in recording.frames(skipped.append):
+        judge.observe(frame)
+    return judge.conclude([*recording.damage, *skipped])
+
+
+class _Judge:
+    """Criteria on the frames of one recording. They join and leave it as those of the run."""
+
+    def __init__(self, recording: Recording, roads: RoadNetwork | None, outcome: RecordedOutcome | None) -> None:
+        self._recording = recording
+        self._roads = roads
+        self._outcome = outcome
+        self._criteria: list[Criterion] = []
+        self._own = True
+        self._exit: Verdict | None = None
+        self._last: Frame | None = None
+
+    def add_others(self, criteria: Any) -> None:
+        """Add criteria that replace those of the run."""
+        self._own = False
+        declarations = parse_added_criteria(criteria_sources(criteria), recorded_context(self._recording))
+        self._add(build_criteria(declarations))
+
+    def observe(self, frame: Frame) -> None:
+        """Process a frame, and the commands before it."""
+        for command in frame.commands if self._own else ():
+            self._execute(command)
+        for criterion in self._criteria:
+            criterion.observe(frame)
+        self._last = frame
+
+    def _execute(self, command: ExecutedCommand) -> None:
+        source = str(self._recording.path)
+        if command.type == CRITERION:
+            has_roads = self._roads is not None
+            declarations = parse_criteria(command.content, source=source, has_roads=has_roads)
+            self._add(build_criteria(declarations, [one.name for one in self._criteria]))
+        elif command.type in EXITS:
+            self._exit = exit_verdict(CustomCommand(command.type, command.content, 0, source), command.time)
+
+    def _add(self, criteria: Iterable[Criterion]) -> None:
+        for criterion in criteria:
+            if self._outcome is None and type(criterion).observe_links is not Criterion.observe_links:
+                message = f"criterion {criterion.name!r} requires link statistics, and the recording has none"
+                hint = "the run did not end, or an older version recorded it"
+                raise SettingError(Diagnostic(message, hint, str(self._recording.path)))
+            bind_roads(criterion, self._roads)
+            self._criteria.append(criterion)
+
+    def conclude(self, damage: Sequence[str]) -> Judgement:
+        """Return the judgement after the last frame."""
+        if self._last is None:
+            hint = "; ".join(damage) or "record the run again"
+            raise SettingError(Diagnostic("the recording contains no readable frame", hint, str(self._recording.path)))
+        outcome = self._outcome
+        links = {} if outcome is None else {(link.sender, link.receiver): link.statistics for link in outcome.links}
+        for criterion in self._criteria:
+            criterion.observe_links(links)
+        verdicts = [plain_verdict(checked_verdict(criterion)) for criterion in self._criteria]
+        verdicts += [] if self._exit is None else [self._exit]
+        end = INCOMPLETE if outcome is None else outcome.end_reason
+        code = exit_code_of(verdicts, end)
+        warnings = [f"the recording is damaged: {line}" for line in damage]
+        if self._own and outcome is not None and not damage:
+            warnings += _differences(verdicts, outcome.criteria)
+        return Judgement(
+            self._recording.path,
+            self._recording.scenario,
+            self._recording.seed,
+            end,
+            max(code, ABORTED) if damage or outcome is None else code,
+            tuple(verdicts),
+            criteria_metrics(self._criteria),
+            self._last.view.time,
+            tuple(warnings),
+        )
+
+
+def _differences(found: Sequence[Verdict], recorded: Sequence[Verdict]) -> list[str]:
+    """Return a warning for each verdict that differs from that of the run, for example by another version."""
+    earlier = {verdict.name: verdict for verdict in recorded}
+    return [
+        f"verdict {verdict.name!r} differs from that of the run: {_text(verdict)}, in the run {_text(held)}"
+        for verdict in found
+        if (held := earlier.get(verdict.name)) != verdict
+    ]
+
+
+def _text(verdict: Verdict | None) -> str:
+    if verdict is None:
+        return "absent"
+    return f"{'passed' if verdict.passed else 'failed'} ({verdict.reason})"

@@ -1,0 +1,112 @@
+"""Outcome of a run in its recording: verdicts, metrics and link statistics, without loss."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.evaluation.criterion import Verdict
+from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.recording.codec import codec
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import Recording
+from eidrive_scenario.recording.run_files import ROAD_FILE
+from eidrive_scenario.resolved_settings import canonical_json
+from eidrive_scenario.simulation.commands import CriteriaContext, criteria_context
+from eidrive_scenario.simulation.run import RunResult
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+
+OUTCOME = "outcome.json"
+"""Name of the attachment with the outcome."""
+CONTEXT = "criteria_context"
+"""Entry of the metadata with the names of the scenario to which criteria refer."""
+
+
+@dataclass(frozen=True)
+class RecordedLink:
+    """Statistics of the link between two stations."""
+
+    sender: str
+    receiver: str
+    statistics: LinkStatistics
+
+
+@dataclass(frozen=True)
+class RecordedOutcome:
+    """Part of the result of a run that equal runs share; the metadata of the recording contain its settings."""
+
+    passed: bool
+    end_reason: str
+    exit_code: int
+    criteria: tuple[Verdict, ...]
+    metrics: Mapping[str, float]
+    links: tuple[RecordedLink, ...]
+    final_state: tuple[str, ...]
+    warnings: tuple[str, ...]
+    trace_hash: str
+    simulated_s: float
+
+
+class RunRecorder(Recorder):
+    """Recorder that attaches the outcome of a completed run."""
+
+    def conclude(self, result: RunResult) -> None:
+        """Attach the outcome."""
+        links = (RecordedLink(*stations, statistics) for stations, statistics in result.links.items())
+        outcome = RecordedOutcome(
+            bool(result.passed),
+            result.end_reason,
+            result.exit_code,
+            tuple(map(plain_verdict, result.criteria)),
+            {name: float(value) for name, value in result.metrics.items()},
+            tuple(links),
+            result.final_state,
+            result.warnings,
+            result.trace_hash,
+            result.simulated_s,
+        )
+        text = json.dumps(codec(RecordedOutcome).encode(outcome), ensure_ascii=False, allow_nan=False)
+        self.attach(OUTCOME, text.encode())
+
+
+def plain_verdict(verdict: Verdict) -> Verdict:
+    """Return a verdict with numbers of Python instead of those of numpy, which some criteria return."""
+    numbers = [None if one is None else float(one) for one in (verdict.value, verdict.limit, verdict.first_violation)]
+    value, limit, first = numbers
+    passed, fatal = bool(verdict.passed), bool(verdict.fatal)
+    return Verdict(verdict.name, passed, value, limit, verdict.unit, first, verdict.reason, fatal)
+
+
+def criteria_context_text(scenario: Scenario) -> str:
+    """Return the entry `CONTEXT` of the metadata of a run."""
+    return canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))
+
+
+def recorded_context(recording: Recording) -> CriteriaContext:
+    """Return the names to which criteria on a recording refer. Those of an older or damaged recording are unknown."""
+    has_roads = ROAD_FILE in recording.attachments
+    try:
+        found: CriteriaContext = codec(CriteriaContext).decode(load_json(recording.metadata[CONTEXT].encode()))
+    except (AttributeError, LookupError, TypeError, ValueError):
+        return CriteriaContext(has_roads=has_roads)
+    return replace(found, has_roads=has_roads)
+
+
+def recorded_outcome(recording: Recording) -> RecordedOutcome | None:
+    """Return the outcome of a recorded run, or None if the run did not end or was recorded by an older version.
+
+    Raise InputError if the attachment is not an outcome.
+    """
+    data = recording.attachments.get(OUTCOME)
+    if data is None:
+        return None
+    try:
+        found: RecordedOutcome = codec(RecordedOutcome).decode(load_json(data))
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        message = f"{OUTCOME} cannot be decoded: {type(error).__name__}: {error}"[:200]
+        hint = f"read it with the version that wrote it ({recording.metadata.get('eidrive-scenario', 'unknown')})"
+        raise InputError(Diagnostic(message, hint, str(recording.path))) from error
+    return found

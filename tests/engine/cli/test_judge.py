@@ -1,0 +1,50 @@
+"""Command `eidrive judge`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_fixtures import Eidrive
+
+
+@pytest.mark.parametrize(("other_y", "code"), [("5", 0), ("0", 1)])
+def test_judge_prints_criteria_of_run_with_its_exit_code(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, other_y: str, code: int
+) -> None:
+    run = eidrive("run", passing_by, "--param", f"OtherY={other_y}", "--out", tmp_path, "--json")
+    judged = eidrive("judge", tmp_path, "--json")
+    assert run.exit_code == judged.exit_code == code
+    first, second = json.loads(run.stdout), json.loads(judged.stdout)
+    for key in ("seed", "passed", "end_reason", "criteria", "simulated_s"):
+        assert first[key] == second[key]
+    shown = eidrive("judge", tmp_path).stdout
+    assert all(verdict["reason"] in shown for verdict in first["criteria"])
+
+
+def test_judge_with_other_criterion_fails(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    (tmp_path / "slow.yaml").write_text("max_speed: {of: Ego, at_most: 5}\n")
+    judged = eidrive("judge", tmp_path, "--criterion", tmp_path / "slow.yaml")
+    assert judged.exit_code == 1
+    assert "max_speed" in judged.stdout
+    assert "min_distance" not in judged.stdout
+
+
+def test_judge_of_damaged_recording_has_exit_code_three(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    (path,) = tmp_path.glob("*/recording.mcap")
+    path.write_bytes(path.read_bytes()[:-3000])
+    judged = eidrive("judge", path)
+    assert judged.exit_code == 3
+    assert "incomplete or damaged" in judged.stdout
+    assert "warning: the recording is damaged: " in judged.stderr
+
+
+@pytest.mark.parametrize("content", [b"", b"not a recording"])
+def test_judge_of_other_file_has_exit_code_two(eidrive: Eidrive, tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "x.mcap").write_bytes(content)
+    judged = eidrive("judge", tmp_path / "x.mcap")
+    assert judged.exit_code == 2
+    assert "x.mcap: not an MCAP file" in judged.stderr
