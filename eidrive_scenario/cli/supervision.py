@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import ctypes
 import os
 import signal
 import sys
 from collections.abc import Callable
-from types import FrameType
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import typer
 
 from eidrive_scenario.exit_codes import ABORTED
-from eidrive_scenario.files.bounded import file_in_memory
-from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+    from eidrive_scenario.wall_limit import Limit
 
 _FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 _DEATH_SIGNAL = 1
@@ -47,6 +48,11 @@ def supervise(
     """
     if not _allowed or not hasattr(os, "fork"):
         return
+    import ctypes
+
+    from eidrive_scenario.files.bounded import file_in_memory
+    from eidrive_scenario.wall_limit import LastResort, set_last_resort
+
     dump = file_in_memory()  # stays open as long as the process
     finished, finish = os.pipe()
     sys.stdout.flush()

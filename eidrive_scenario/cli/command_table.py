@@ -1,0 +1,58 @@
+"""Commands by name. The module of a command is imported when the command is executed or described."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.main import get_command
+
+from eidrive_scenario.cli.short_help import ShortHelp
+
+FUNCTIONS = {
+    "run": "run:run",
+    "check": "check:check",
+    "list": "show:list_names",
+    "tree": "show:tree",
+    "view": "show:view",
+    "judge": "judge:judge",
+    "report": "show:report",
+    "sweep": "sweep:sweep",
+    "results": "sweep:results",
+    "compare": "compare:compare",
+    "reproduce": "reproduce:reproduce",
+    "init": "init:init",
+}
+"""Module of this package and function of each command, in the order of the help."""
+_SHORT = frozenset({"run", "sweep"})
+"""Commands with options that only `--help-all` describes."""
+
+
+class CommandTable(Mapping[str, Any]):
+    """Commands of the command line by name, each created on its first access."""
+
+    def __init__(self) -> None:
+        self._created: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a command. Raise KeyError if none has this name."""
+        if name not in self._created:
+            self._created[name] = _create(name, FUNCTIONS[name])
+        return self._created[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(FUNCTIONS)
+
+    def __len__(self) -> int:
+        return len(FUNCTIONS)
+
+
+def _create(name: str, place: str) -> Any:
+    module, function = place.split(":")
+    app = typer.Typer(add_completion=False)
+    app.command(name=name, cls=ShortHelp if name in _SHORT else None)(
+        getattr(import_module(f"eidrive_scenario.cli.{module}"), function)
+    )
+    return get_command(app)
