@@ -18,6 +18,7 @@ FUNCTIONS = {
     "tree": "show:tree",
     "view": "show:view",
     "judge": "judge:judge",
+    "export": "export:export",
     "report": "show:report",
     "sweep": "sweep:sweep",
     "results": "sweep:results",

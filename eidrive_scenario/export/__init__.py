@@ -1,0 +1,1 @@
+"""Files of other tools from recordings: ASAM OSI traces, Foxglove topics, tables."""

@@ -1,0 +1,1 @@
+"""ASAM OSI messages and traces from the frames of a recording."""

@@ -1,0 +1,66 @@
+"""GroundTruth messages from frames."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from eidrive_scenario.export.osi.environment import set_environment
+from eidrive_scenario.export.osi.identifiers import Identifiers
+from eidrive_scenario.export.osi.lanes import LaneMap
+from eidrive_scenario.export.osi.moving_objects import ACTOR, VEHICLES, add_moving_objects
+from eidrive_scenario.export.osi.schemas import Osi
+from eidrive_scenario.export.osi.traffic_lights import TrafficLights
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.run_files import ROAD_FILE
+from eidrive_scenario.roads import RoadNetwork
+
+_EGOS = frozenset({"ego", "hero", "ego_vehicle"})
+
+
+class GroundTruthBuilder:
+    """Builder of the messages of one run. The first message contains the lanes and boundaries of the map."""
+
+    def __init__(self, osi: Osi, roads: RoadNetwork | None, ids: Identifiers) -> None:
+        self._osi = osi
+        self._roads = roads
+        self._ids = ids
+        self._lanes = LaneMap(osi, roads, ids)
+        self._lights = TrafficLights(osi, roads, ids)
+        self._host: str | None = None
+        self._has_map = False
+
+    def build(self, frame: Frame) -> Any:
+        """Return the message of the next frame."""
+        message = self._osi.begin(self._osi.ground_truth(), frame.view.time)
+        self._host = self._host or host_vehicle(frame)
+        if self._host is not None:
+            message.host_vehicle_id.value = self._ids.of(ACTOR, self._host)
+        if self._roads is not None:
+            message.map_reference = ROAD_FILE
+            self._set_projection(message)
+        if not self._has_map:
+            self._lanes.add(message)
+            self._has_map = True
+        add_moving_objects(self._osi, message, frame, self._ids, self._lanes.assigned(frame.view))
+        self._lights.add(message, frame.signals)
+        if frame.environment is not None:
+            set_environment(self._osi, message.environmental_conditions, frame.environment, frame.view.time)
+        return message
+
+    def _set_projection(self, message: Any) -> None:
+        assert self._roads is not None
+        header = self._roads.header
+        message.proj_string = header.geo_reference
+        x, y, z, turn = header.offset
+        if any(header.offset):
+            offset = message.proj_frame_offset
+            offset.position.x, offset.position.y, offset.position.z, offset.yaw = x, y, z, turn
+
+
+def host_vehicle(frame: Frame) -> str | None:
+    """Return the host vehicle: the first station that drives, else an actor named as an ego, else the first vehicle."""
+    view = frame.view
+    driven = [name for name, step in frame.steps.items() if step.control is not None and name in view]
+    egos = [name for name in view.names if name.lower() in _EGOS]
+    vehicles = [name for name, category in zip(view.names, view.categories, strict=True) if category in VEHICLES]
+    return next(iter([*driven, *egos, *vehicles]), None)

@@ -1,0 +1,113 @@
+"""Moving objects of a GroundTruth message."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.export.bodies import rotations
+from eidrive_scenario.export.osi.identifiers import Identifiers
+from eidrive_scenario.export.osi.schemas import Osi, set_vector
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.view import WorldView
+
+ACTOR = "actor"
+"""Kind of the identifiers of actors."""
+VEHICLES: Mapping[str, str] = {
+    "car": "TYPE_CAR",
+    "van": "TYPE_VAN",
+    "truck": "TYPE_HEAVY_TRUCK",
+    "bus": "TYPE_BUS",
+    "motorbike": "TYPE_MOTORCYCLE",
+    "bicycle": "TYPE_BICYCLE",
+}
+"""Types of vehicles by category."""
+_GENERIC: Mapping[str, str] = {
+    "lowBeam": "head_light",
+    "highBeam": "high_beam",
+    "fogLights": "front_fog_light",
+    "fogLightsFront": "front_fog_light",
+    "fogLightsRear": "rear_fog_light",
+    "reversingLights": "reversing_light",
+    "licensePlateIllumination": "license_plate_illumination_rear",
+}
+"""Lights with the states on and off, by the type of OpenSCENARIO."""
+_INDICATORS = (("warningLights", "WARNING"), ("indicatorLeft", "LEFT"), ("indicatorRight", "RIGHT"))
+
+
+def object_type(category: str) -> str:
+    """Return the OSI type of a category."""
+    if category in VEHICLES:
+        return "TYPE_VEHICLE"
+    return "TYPE_PEDESTRIAN" if category == "pedestrian" else "TYPE_OTHER"
+
+
+def add_moving_objects(osi: Osi, message: Any, frame: Frame, ids: Identifiers, lanes: Mapping[int, int]) -> None:
+    """Add all actors to a GroundTruth message.
+
+    lanes  identifiers of lanes by the row of the actor
+    """
+    view = frame.view
+    turns = rotations(view.yaw, view.pitch, view.roll)
+    arms = np.einsum("nij,nj->ni", turns, view.offset)
+    centers = view.position + arms
+    velocity, acceleration = center_motion(view, arms)
+    for row, (name, category) in enumerate(zip(view.names, view.categories, strict=True)):
+        found = message.moving_object.add()
+        found.id.value = ids.of(ACTOR, name)
+        found.type = osi.moving_object.Type.Value(object_type(category))
+        base = found.base
+        base.dimension.length, base.dimension.width, base.dimension.height = view.size[row].tolist()
+        set_vector(base.position, centers[row])
+        angles = view.yaw[row], view.pitch[row], view.roll[row]
+        base.orientation.yaw, base.orientation.pitch, base.orientation.roll = map(float, angles)
+        set_vector(base.velocity, velocity[row])
+        set_vector(base.acceleration, acceleration[row])
+        base.orientation_rate.yaw = float(view.yaw_rate[row])
+        found.source_reference.add(type="net.asam.openscenario", identifier=[name])
+        if row in lanes:
+            found.assigned_lane_id.add().value = lanes[row]
+            found.moving_object_classification.assigned_lane_id.add().value = lanes[row]
+        if category in VEHICLES:
+            kind = osi.moving_object.VehicleClassification.Type
+            found.vehicle_classification.type = kind.Value(VEHICLES[category])
+            set_vector(found.vehicle_attributes.bbcenter_to_rear, -view.offset[row])
+            _set_lights(osi, found.vehicle_classification.light_state, frame.appearances.get(name))
+
+
+def center_motion(view: WorldView, arms: Array) -> tuple[Array, Array]:
+    """Return velocity [m/s] and acceleration [m/s²] (N, 3) of the box centers.
+
+    arms  (N, 3) from the reference points to the centers in the world frame [m]
+
+    The share of the yaw acceleration, which views do not contain, is omitted.
+    """
+    rate = view.yaw_rate[:, None]
+    turned = np.column_stack([-arms[:, 1], arms[:, 0], np.zeros(len(arms))])
+    inward = np.column_stack([arms[:, :2], np.zeros(len(arms))])
+    return view.velocity + rate * turned, view.acceleration - rate**2 * inward
+
+
+def _set_lights(osi: Osi, state: Any, appearance: Appearance | None) -> None:
+    """Set the lights that the scenario switches; the others have no state."""
+    if appearance is None or not appearance.lights:
+        return
+    kinds = osi.moving_object.VehicleClassification.LightState
+    modes = {name: light.mode != "off" for name, light in appearance.lights.items()}
+    for name, field in _GENERIC.items():
+        if name in modes:
+            value = f"GENERIC_LIGHT_STATE_{'ON' if modes[name] else 'OFF'}"
+            setattr(state, field, kinds.GenericLightState.Value(value))
+    if any(name in modes for name, _ in _INDICATORS):
+        shown = next((word for name, word in _INDICATORS if modes.get(name)), "OFF")
+        state.indicator_state = kinds.IndicatorState.Value(f"INDICATOR_STATE_{shown}")
+    if "brakeLights" in modes:
+        word = "NORMAL" if modes["brakeLights"] else "OFF"
+        state.brake_light_state = kinds.BrakeLightState.Value(f"BRAKE_LIGHT_STATE_{word}")
+    if "specialPurposeLights" in modes:
+        word = "FLASHING_BLUE" if modes["specialPurposeLights"] else "OFF"
+        state.emergency_vehicle_illumination = kinds.GenericLightState.Value(f"GENERIC_LIGHT_STATE_{word}")

@@ -1,0 +1,51 @@
+"""Modules of osi-python, imported once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from eidrive_scenario.export.libraries import library
+
+
+class Osi:
+    """Message classes and the version of ASAM OSI. Raise SettingError if osi-python is missing."""
+
+    def __init__(self) -> None:
+        ground_truth = library("osi3.osi_groundtruth_pb2")
+        self.ground_truth: Any = ground_truth.GroundTruth
+        self.sensor_data: Any = library("osi3.osi_sensordata_pb2").SensorData
+        self.moving_object: Any = library("osi3.osi_object_pb2").MovingObject
+        self.traffic_light: Any = library("osi3.osi_trafficlight_pb2").TrafficLight
+        self.lane: Any = library("osi3.osi_lane_pb2").Lane
+        self.lane_boundary: Any = library("osi3.osi_lane_pb2").LaneBoundary
+        self.environment: Any = library("osi3.osi_environment_pb2").EnvironmentalConditions
+        self.detected: Any = library("osi3.osi_detectedobject_pb2")
+        version = library("osi3.osi_version_pb2")
+        options = version.DESCRIPTOR.GetOptions()
+        self._version = options.Extensions[version.current_interface_version]
+
+    @property
+    def version(self) -> str:
+        """Version of the standard."""
+        return f"{self._version.version_major}.{self._version.version_minor}.{self._version.version_patch}"
+
+    def begin(self, message: Any, time: float) -> Any:
+        """Set version and timestamp [s] of a new message, and return it."""
+        message.version.CopyFrom(self._version)
+        set_time(message.timestamp, time)
+        return message
+
+
+def set_time(stamp: Any, time: float) -> None:
+    """Set a timestamp [s]."""
+    stamp.seconds, stamp.nanos = divmod(nanoseconds(time), 1_000_000_000)
+
+
+def nanoseconds(time: float) -> int:
+    """Return a time [s] in nanoseconds, at least 0."""
+    return max(round(time * 1e9), 0)
+
+
+def set_vector(vector: Any, values: Any) -> None:
+    """Set a Vector3d."""
+    vector.x, vector.y, vector.z = (float(value) for value in values)

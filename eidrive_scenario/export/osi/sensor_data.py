@@ -1,0 +1,114 @@
+"""SensorData messages from the detections of stations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.export.bodies import rotations
+from eidrive_scenario.export.osi.identifiers import Identifiers
+from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type
+from eidrive_scenario.export.osi.schemas import Osi, set_time, set_vector
+from eidrive_scenario.recording.frame import Frame
+
+
+class _Origin(NamedTuple):
+    """Vehicle frame of a station: position (3,) [m], rotation (3, 3), yaw [rad], velocity (3,) [m/s], yaw rate."""
+
+    position: Array
+    turn: Array
+    yaw: float
+    velocity: Array
+    yaw_rate: float
+
+
+class SensorDataBuilder:
+    """Builder of the messages of one station, in the frame of its vehicle.
+
+    list_name  "detections" for own detections, "fused" for the objects after fusion
+    """
+
+    def __init__(self, osi: Osi, ids: Identifiers, station: str, list_name: str) -> None:
+        self._osi = osi
+        self._station = station
+        self._list = list_name
+        self._sensor = ids.of("sensor", station, list_name)
+
+    def build(self, frame: Frame) -> Any | None:
+        """Return the message of a frame, or None if the station is absent."""
+        step = frame.steps.get(self._station)
+        origin = _origin(frame, self._station)
+        if step is None or origin is None:
+            return None
+        objects: Detections = getattr(step, self._list)
+        message = self._osi.begin(self._osi.sensor_data(), frame.view.time)
+        message.sensor_id.value = self._sensor
+        # The sensor is a virtual one in the origin of the vehicle
+        set_vector(message.mounting_position.position, (0.0, 0.0, 0.0))
+        orientation = message.mounting_position.orientation
+        orientation.yaw, orientation.pitch, orientation.roll = 0.0, 0.0, 0.0
+        if math.isfinite(objects.time):
+            set_time(message.last_measurement_time, objects.time)
+            set_time(message.moving_object_header.measurement_time, objects.time)
+        message.moving_object_header.cycle_counter = frame.view.tick
+        qualifier = type(message.moving_object_header).DataQualifier
+        message.moving_object_header.data_qualifier = qualifier.Value("DATA_QUALIFIER_AVAILABLE")
+        for row in range(len(objects)):
+            self._add(message, objects, row, origin)
+        return message
+
+    def _add(self, message: Any, objects: Detections, row: int, origin: _Origin) -> None:
+        box = objects.boxes[row]
+        found = message.moving_object.add()
+        header = found.header
+        if objects.tracks:
+            header.tracking_id.value = max(objects.tracks[row], 0)
+        header.existence_probability = float(objects.confidence[row])
+        header.sensor_id.add().value = self._sensor
+        state = type(header).MeasurementState
+        header.measurement_state = state.Value("MEASUREMENT_STATE_MEASURED")
+        base = found.base
+        base.dimension.length, base.dimension.width, base.dimension.height = box[3:6].tolist()
+        position = origin.turn.T @ (box[:3] - origin.position)
+        set_vector(base.position, position)
+        base.orientation.yaw = math.remainder(float(box[6]) - origin.yaw, math.tau)
+        velocity = np.append(objects.velocity[row], 0.0)
+        if np.isfinite(velocity).all():
+            spin = origin.yaw_rate * np.array([-position[1], position[0], 0.0])
+            set_vector(base.velocity, origin.turn.T @ (velocity - origin.velocity) - spin)
+        covariance = objects.covariance[row]
+        if np.isfinite(covariance).all():
+            plane = origin.turn[:2, :2]
+            spread = np.sqrt(np.maximum(np.diag(plane.T @ covariance @ plane), 0.0))
+            found.base_rmse.position.x, found.base_rmse.position.y = spread.tolist()
+        reference = self._osi.detected.DetectedMovingObject.ReferencePoint
+        found.reference_point = reference.Value("REFERENCE_POINT_CENTER")
+        self._add_candidate(found, objects.classes[row], float(objects.scores[row]))
+
+    def _add_candidate(self, found: Any, category: str, score: float) -> None:
+        candidate = found.candidate.add()
+        candidate.probability = min(max(score, 0.0), 1.0)
+        candidate.type = self._osi.moving_object.Type.Value(object_type(category))
+        if category in VEHICLES:
+            kind = self._osi.moving_object.VehicleClassification.Type
+            candidate.vehicle_classification.type = kind.Value(VEHICLES[category])
+
+
+def _origin(frame: Frame, station: str) -> _Origin | None:
+    """Return the vehicle frame that the station estimates, or its true one if it estimates none."""
+    step, view = frame.steps.get(station), frame.view
+    estimate = step.estimate if step is not None else None
+    if estimate is not None:
+        turn = rotations(*(np.array([one]) for one in (estimate.yaw, estimate.pitch, estimate.roll)))[0]
+        velocity = turn @ np.array([estimate.speed, 0.0, 0.0])
+        return _Origin(estimate.position, turn, estimate.yaw, velocity, estimate.yaw_rate)
+    if station not in view:
+        return None
+    row = view.row(station)
+    turn = rotations(view.yaw[row : row + 1], view.pitch[row : row + 1], view.roll[row : row + 1])[0]
+    rate, yaw = float(view.yaw_rate[row]), float(view.yaw[row])
+    return _Origin(view.position[row], turn, yaw, view.velocity[row], rate)

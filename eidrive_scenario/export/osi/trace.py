@@ -1,0 +1,118 @@
+"""ASAM OSI trace files: multi-channel (MCAP) and single-channel (.osi)."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+from urllib.parse import quote
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.export.libraries import library
+from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
+from eidrive_scenario.export.osi.identifiers import Identifiers
+from eidrive_scenario.export.osi.schemas import Osi, nanoseconds
+from eidrive_scenario.export.osi.sensor_data import SensorDataBuilder
+from eidrive_scenario.export.recorded_run import RecordedRun
+from eidrive_scenario.files.atomic import atomic_output, create
+from eidrive_scenario.recording.frame import Frame
+
+MULTI_CHANNEL, SINGLE_CHANNEL = ".mcap", ".osi"
+"""Suffixes of the two formats of the standard."""
+GROUND_TRUTH = "ground_truth"
+"""Topic of the GroundTruth messages."""
+_FIRST_SENSOR = 2**32 + 1
+"""First identifier of sensors. Identifiers of the ground truth are below it, equal in both formats."""
+_FILE = "net.asam.osi.trace"
+_CHANNEL = "net.asam.osi.trace.channel"
+_LISTS: Mapping[str, str] = {"detections": "own detections", "fused": "objects after fusion"}
+"""Object lists of a station, with their descriptions."""
+_CONVENTIONS = (
+    "lanes and boundaries are in the first GroundTruth only; bbcenter_to_rear points to the ground below the rear axle"
+)
+
+
+def write_osi(run: RecordedRun, path: Path) -> None:
+    """Write a run as an OSI trace: `.mcap` with ground truth and sensor data, `.osi` with ground truth only.
+
+    Raise SettingError for another suffix, if osi-python is missing, or if the file cannot be written.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in (MULTI_CHANNEL, SINGLE_CHANNEL):
+        message = f"an OSI trace has no suffix {path.suffix!r}"
+        hint = f"give a file *{MULTI_CHANNEL} (multi-channel) or *{SINGLE_CHANNEL} (single-channel)"
+        raise SettingError(Diagnostic(message, hint, str(path)))
+    osi = Osi()
+    with atomic_output(path) as partial, create(partial) as stream:
+        if suffix == SINGLE_CHANNEL:
+            _write_single_channel(osi, run, stream)
+        else:
+            _write_multi_channel(osi, run, stream)
+
+
+def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
+    builder = GroundTruthBuilder(osi, run.roads, Identifiers())
+    for frame in run.frames():
+        data = builder.build(frame).SerializeToString()
+        stream.write(struct.pack("<I", len(data)) + data)
+
+
+def _write_multi_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
+    from mcap.writer import CompressionType, Writer
+
+    register_schema = library("mcap_protobuf.schema").register_schema
+    protobuf = library("google.protobuf").__version__
+    writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    writer.start(profile="", library="eidrive-scenario")
+    source = f"eidrive-scenario {run.recording.metadata.get('eidrive-scenario', 'unknown')}"
+    metadata = {
+        f"{edge}_{name}_version": version
+        for edge in ("min", "max")
+        for name, version in (("osi", osi.version), ("protobuf", protobuf))
+    }
+    description = {"description": f"{run.title}; {_CONVENTIONS}", "data_sources": source}
+    writer.add_metadata(_FILE, {"version": osi.version, **metadata, **description})
+    schemas: dict[str, int] = {}
+    channels: dict[str, int] = {}
+    traces = _Traces(osi, run)
+    for frame in run.frames():
+        for topic, text, message in traces.messages(frame):
+            kind = type(message).DESCRIPTOR.full_name
+            if kind not in schemas:
+                schemas[kind] = register_schema(writer, type(message))
+            if topic not in channels:
+                entries = {"osi_version": osi.version, "protobuf_version": protobuf, "description": text}
+                about = {f"{_CHANNEL}.{key}": value for key, value in entries.items()}
+                channels[topic] = writer.register_channel(topic, "protobuf", schemas[kind], about)
+            instant = nanoseconds(frame.view.time)
+            writer.add_message(channels[topic], instant, message.SerializeToString(), instant)
+    writer.finish()  # type: ignore[no-untyped-call]
+
+
+class _Traces:
+    """All messages of a run with their topics and descriptions."""
+
+    def __init__(self, osi: Osi, run: RecordedRun) -> None:
+        self._osi = osi
+        self._sensors = Identifiers(_FIRST_SENSOR)
+        self._truth = GroundTruthBuilder(osi, run.roads, Identifiers())
+        self._title = run.title
+        self._stations: dict[tuple[str, str], SensorDataBuilder] = {}
+
+    def messages(self, frame: Frame) -> Iterator[tuple[str, str, Any]]:
+        """Yield topic, description and message of a frame."""
+        yield GROUND_TRUTH, f"ground truth of {self._title}", self._truth.build(frame)
+        for station in frame.steps:
+            for name, text in _LISTS.items():
+                key = station, name
+                if key not in self._stations:
+                    self._stations[key] = SensorDataBuilder(self._osi, self._sensors, station, name)
+                message = self._stations[key].build(frame)
+                if message is not None:
+                    yield sensor_data_topic(station, name), f"{text} of {station}", message
+
+
+def sensor_data_topic(station: str, list_name: str) -> str:
+    """Return the topic of a station; characters that separate parts of a topic are escaped as in an URL."""
+    return f"sensor_data/{quote(station, safe=' ')}/{list_name}"

@@ -1,0 +1,51 @@
+"""Traffic lights of a GroundTruth message: one entity per lamp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from eidrive_scenario.export.osi.identifiers import Identifiers
+from eidrive_scenario.export.osi.schemas import Osi
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.signal_states import FLASHING, ON, lamp_colors, lamps
+from eidrive_scenario.world.road_objects import signal_heads
+
+_DEPTH = 0.1
+"""Length of the box of a lamp along its direction [m]."""
+
+
+class TrafficLights:
+    """Lamps of all traffic lights of a map. Without a map there are none."""
+
+    def __init__(self, osi: Osi, roads: RoadNetwork | None, ids: Identifiers) -> None:
+        self._osi = osi
+        self._ids = ids
+        heads = [] if roads is None else signal_heads(roads)
+        self._heads = [(head, colors) for head in heads if (colors := lamp_colors(head.signal))]
+
+    def add(self, message: Any, states: Mapping[str, str]) -> None:
+        """Add the lamps with their states, by the id of the signal. The mode of a light without a state is unknown."""
+        kinds = self._osi.traffic_light.Classification
+        for head, colors in self._heads:
+            state = states.get(head.signal.id)
+            shown = [(color, None) for color in colors] if state is None else list(lamps(state, colors))
+            height = head.height / len(shown)
+            for index, (color, mode) in enumerate(shown):
+                lamp = message.traffic_light.add()
+                lamp.id.value = self._ids.of("lamp", head.signal.id, index)
+                base = lamp.base
+                base.position.x, base.position.y = head.pose.x, head.pose.y
+                base.position.z = head.pose.z + (len(shown) - index - 0.5) * height
+                base.dimension.length, base.dimension.width, base.dimension.height = _DEPTH, head.width, height
+                base.orientation.yaw, base.orientation.pitch, base.orientation.roll = head.pose.h, 0.0, 0.0
+                lamp.classification.color = kinds.Color.Value(f"COLOR_{color.upper()}")
+                lamp.classification.icon = kinds.Icon.Value("ICON_NONE")
+                lamp.classification.mode = kinds.Mode.Value(_mode(mode))
+                lamp.source_reference.add(type="net.asam.opendrive", identifier=[head.signal.id])
+
+
+def _mode(mode: str | None) -> str:
+    if mode is None:
+        return "MODE_UNKNOWN"
+    return {ON: "MODE_CONSTANT", FLASHING: "MODE_FLASHING"}.get(mode, "MODE_OFF")

@@ -1,0 +1,61 @@
+"""Recorded run as the source of exports: frames, roads, and identification of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import Recording, open_recording
+from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
+from eidrive_scenario.roads import RoadNetwork
+
+
+@dataclass
+class RecordedRun:
+    """Recording with its roads.
+
+    warnings  damage of the recording, and frames that cannot be read; complete after a pass over all frames
+    """
+
+    recording: Recording
+    roads: RoadNetwork | None
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def title(self) -> str:
+        """Scenario and seed in one line."""
+        return f"{self.recording.scenario or self.recording.path.stem}, seed {self.recording.seed}"
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield the readable frames. Raise SettingError if there is none."""
+        count = 0
+        for frame in self.recording.frames(self._skip):
+            count += 1
+            yield frame
+        if not count:
+            hint = "; ".join(self.warnings) or "record the run again"
+            raise SettingError(Diagnostic("the recording contains no readable frame", hint, str(self.recording.path)))
+
+    def _skip(self, reason: str) -> None:
+        if reason not in self.warnings:
+            self.warnings.append(reason)
+
+
+def open_run(location: str | Path) -> RecordedRun:
+    """Open a recording, given as its file or as the folder of a run. Raise InputError if it cannot be read.
+
+    Invalid roads of a damaged recording are omitted with a warning.
+    """
+    recording = open_recording(recording_in(Path(location)))
+    warnings = [f"the recording is damaged: {line}" for line in recording.damage]
+    text = recording.attachments.get(ROAD_FILE)
+    roads = None
+    if text is not None:
+        try:
+            roads = RoadNetwork.parse(text, ROAD_FILE)
+        except InputError as error:
+            warnings.append(f"the roads are omitted: {error.diagnostics[0]}")
+    return RecordedRun(recording, roads, warnings)

@@ -1,0 +1,255 @@
+"""OSI ground truth, read by osi-python: poses, identifiers, types, lights, lanes and environment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from osi3trace.osi_trace import OSITrace
+from scipy.spatial.transform import Rotation
+from written_recording import Body, detected, step, view, write_run
+
+from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.export.osi.trace import GROUND_TRUTH, write_osi
+from eidrive_scenario.export.recorded_run import open_run
+from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation import RunSettings
+from eidrive_scenario.world.appearance import Appearance, LightState
+from eidrive_scenario.world.environment import Environment
+
+ROADS = Path(__file__).parents[3] / "xosc" / "roads"
+MILLIMETER = 1e-3
+
+
+def messages(path: Path) -> list[Any]:
+    trace = OSITrace(str(path), "GroundTruth", topic=GROUND_TRUTH if path.suffix == ".mcap" else None)
+    found = list(trace)
+    trace.close()
+    return found
+
+
+def exported(folder: Path, *frames: Frame, road: Path | None = None, name: str = "trace.mcap") -> list[Any]:
+    write_osi(write_run(folder, frames, road=road), folder / name)
+    return messages(folder / name)
+
+
+def vector(found: Any) -> list[float]:
+    return [found.x, found.y, found.z]
+
+
+@pytest.fixture(scope="module")
+def scenario_3(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return the recording and the trace of a run with traffic lights."""
+    folder = tmp_path_factory.mktemp("osi")
+    result = run_and_save("coop/scenario_3", settings=RunSettings(time_limit=6.0), out=folder)
+    assert result.recording is not None
+    write_osi(open_run(result.recording), folder / "trace.mcap")
+    return result.recording, folder / "trace.mcap"
+
+
+def test_positions_of_trace_equal_those_of_the_run(scenario_3: tuple[Path, Path]) -> None:
+    """Rotated and added to the box center, bbcenter_to_rear leads back to the reference point of OpenSCENARIO."""
+    frames = list(read_recording(scenario_3[0]).frames())
+    truths = messages(scenario_3[1])
+    assert len(truths) == len(frames) > 100
+    for frame, truth in zip(frames, truths, strict=True):
+        assert truth.timestamp.seconds + 1e-9 * truth.timestamp.nanos == pytest.approx(frame.view.time, abs=1e-9)
+        assert len(truth.moving_object) == len(frame.view.names)
+        for row, found in enumerate(truth.moving_object):
+            angles = found.base.orientation
+            turn = Rotation.from_euler("ZYX", [angles.yaw, angles.pitch, angles.roll])
+            rear = vector(found.vehicle_attributes.bbcenter_to_rear) if found.type == 2 else -frame.view.offset[row]
+            position = vector(found.base.position) + turn.apply(rear)
+            assert np.abs(position - frame.view.position[row]).max() < MILLIMETER
+
+
+def test_identifiers_are_unique_and_stable(scenario_3: tuple[Path, Path]) -> None:
+    by_name: dict[str, int] = {}
+    for truth in messages(scenario_3[1]):
+        kinds = (truth.moving_object, truth.traffic_light, truth.lane, truth.lane_boundary)
+        numbers = [found.id.value for kind in kinds for found in kind]
+        assert len(set(numbers)) == len(numbers)
+        for found in truth.moving_object:
+            name = found.source_reference[0].identifier[0]
+            assert by_name.setdefault(name, found.id.value) == found.id.value
+        assert truth.host_vehicle_id.value == by_name["Ego"]
+
+
+def test_reentering_actor_keeps_its_identifier(tmp_path: Path) -> None:
+    both: dict[str, Body] = {"A": {}, "B": {"position": (9.0, 0.0, 0.0)}}
+    one: dict[str, Body] = {"A": {}}
+    truths = exported(tmp_path, *(Frame(view(bodies, tick)) for tick, bodies in enumerate([both, one, both])))
+    first, _, last = ([found.id.value for found in truth.moving_object] for truth in truths)
+    assert first == last
+
+
+def test_box_center_of_inclined_body_follows_all_angles(tmp_path: Path) -> None:
+    """A body that stands on its tail (nose up by 90°) has its center 1.4 m above its reference point and behind it."""
+    body = {"angles": (0.0, -np.pi / 2, 0.0), "position": (10.0, 5.0, 1.0)}
+    (truth,) = exported(tmp_path, Frame(view({"A": body})))
+    assert vector(truth.moving_object[0].base.position) == pytest.approx([10.0 - 0.75, 5.0, 1.0 + 1.4])
+
+
+def test_velocity_of_turning_body_is_that_of_its_center(tmp_path: Path) -> None:
+    """A body that turns in place with 0.5 rad/s moves its center, 1.4 m ahead, to the left and accelerates it back."""
+    (truth,) = exported(tmp_path, Frame(view({"A": {"yaw_rate": 0.5}})))
+    base = truth.moving_object[0].base
+    assert vector(base.velocity) == pytest.approx([0.0, 0.7, 0.0])
+    assert vector(base.acceleration) == pytest.approx([-0.35, 0.0, 0.0])
+    assert base.orientation_rate.yaw == 0.5
+
+
+@pytest.mark.parametrize(
+    ("category", "kind", "vehicle"),
+    [
+        ("car", "TYPE_VEHICLE", "TYPE_CAR"),
+        ("bicycle", "TYPE_VEHICLE", "TYPE_BICYCLE"),
+        ("truck", "TYPE_VEHICLE", "TYPE_HEAVY_TRUCK"),
+        ("pedestrian", "TYPE_PEDESTRIAN", None),
+        ("misc", "TYPE_OTHER", None),
+    ],
+)
+def test_category_selects_type_of_object(tmp_path: Path, category: str, kind: str, vehicle: str | None) -> None:
+    (truth,) = exported(tmp_path, Frame(view({"A": {"category": category}})))
+    (found,) = truth.moving_object
+    assert type(found).Type.Name(found.type) == kind
+    assert found.HasField("vehicle_classification") == (vehicle is not None)
+    if vehicle is not None:
+        assert type(found).VehicleClassification.Type.Name(found.vehicle_classification.type) == vehicle
+
+
+def test_host_vehicle_is_first_driven_station(tmp_path: Path) -> None:
+    bodies = {"Ego": {}, "Mast": {"category": "misc"}, "Driven": {}}
+    steps = {"Mast": step(detected(0.0, []), drives=False), "Driven": step(detected(0.0, []))}
+    (truth,) = exported(tmp_path, Frame(view(bodies), steps))
+    host = next(found for found in truth.moving_object if found.id.value == truth.host_vehicle_id.value)
+    assert host.source_reference[0].identifier == ["Driven"]
+
+
+def test_run_without_vehicle_has_no_host(tmp_path: Path) -> None:
+    (truth,) = exported(tmp_path, Frame(view({"Walker": {"category": "pedestrian"}})))
+    assert not truth.HasField("host_vehicle_id")
+    assert len(truth.moving_object) == 1
+
+
+def test_switched_lights_are_states(tmp_path: Path) -> None:
+    lights = {name: LightState(name, mode) for name, mode in (("indicatorLeft", "flashing"), ("lowBeam", "off"))}
+    frame = Frame(view({"A": {}, "B": {}}), appearances={"A": Appearance(lights)})
+    (truth,) = exported(tmp_path, frame)
+    state, other = (found.vehicle_classification.light_state for found in truth.moving_object)
+    assert type(state).IndicatorState.Name(state.indicator_state) == "INDICATOR_STATE_LEFT"
+    assert type(state).GenericLightState.Name(state.head_light) == "GENERIC_LIGHT_STATE_OFF"
+    assert not state.HasField("brake_light_state")
+    assert not other.HasField("indicator_state")
+
+
+def test_traffic_lights_have_one_entity_per_lamp(scenario_3: tuple[Path, Path]) -> None:
+    """Modes follow from the recorded states, which are lists of lamps from top to bottom or names of colors."""
+    frames = list(read_recording(scenario_3[0]).frames())
+    truths = messages(scenario_3[1])
+    shown = set()
+    for frame, truth in zip(frames, truths, strict=True):
+        heads: dict[str, list[Any]] = {}
+        for lamp in truth.traffic_light:
+            heads.setdefault(lamp.source_reference[0].identifier[0], []).append(lamp)
+        assert set(frame.signals) <= set(heads)
+        for signal, lamps in heads.items():
+            heights = [lamp.base.position.z for lamp in lamps]
+            assert heights == sorted(heights, reverse=True)
+            assert len(lamps) == 3
+            kinds = type(lamps[0].classification)
+            lit = [lamp for lamp in lamps if kinds.Mode.Name(lamp.classification.mode) == "MODE_CONSTANT"]
+            state = frame.signals.get(signal)
+            assert (state is None) == (not lit)
+            if state is not None:
+                colors = {kinds.Color.Name(lamp.classification.color).removeprefix("COLOR_").lower() for lamp in lit}
+                modes = dict(zip(("red", "yellow", "green"), state.split(";"), strict=True))
+                assert colors == {color for color, mode in modes.items() if mode == "on"}
+                shown |= colors
+    assert shown
+
+
+def test_lanes_have_boundaries_on_both_sides(tmp_path: Path) -> None:
+    """The center line lies on the lane of the map, and half a width between the boundaries left and right of it."""
+    road = ROADS / "coop_1.xodr"
+    first, second = exported(tmp_path, *(Frame(view({"A": {}}, tick)) for tick in range(2)), road=road)
+    assert len(second.lane) == len(second.lane_boundary) == 0
+    network = RoadNetwork.load(road)
+    lanes = {found.id.value: found for found in first.lane}
+    lines = {
+        found.id.value: np.array([vector(point.position) for point in found.boundary_line])
+        for found in first.lane_boundary
+    }
+    checked = 0
+    for lane in first.lane:
+        name, number, start = (text.partition(":")[2] for text in lane.source_reference[0].identifier)
+        data = lane.classification
+        center = np.array([vector(point) for point in data.centerline])
+        pose = network.lane_pose_at(name, int(number), float(start))
+        assert center[0] == pytest.approx([pose.x, pose.y, pose.z], abs=1e-6)
+        along = (center[1] - center[0])[:2]
+        for ids, sign in ((data.left_lane_boundary_id, 1.0), (data.right_lane_boundary_id, -1.0)):
+            edge = lines[ids[0].value][0] - center[0]
+            assert abs(edge[2]) < 0.2
+            beside = along[0] * edge[1] - along[1] * edge[0]
+            assert sign * beside >= 0.0
+            width = network.lane_width(name, int(number), float(start))
+            assert np.hypot(edge[0], edge[1]) == pytest.approx(width / 2, abs=1e-6)
+            checked += 1
+        for neighbor in data.left_adjacent_lane_id:
+            assert lane.id.value in [one.value for one in lanes[neighbor.value].classification.right_adjacent_lane_id]
+        assert data.centerline_is_driving_direction == (network.driving_direction(name, int(number)) == 1)
+        for pairing in data.lane_pairing:
+            if pairing.HasField("successor_lane_id"):
+                after = lanes[pairing.successor_lane_id.value].classification
+                ends = [vector(after.centerline[0]), vector(after.centerline[-1])]
+                assert min(np.linalg.norm(center[-1] - end) for end in ends) < 0.05
+    assert checked > 10
+
+
+def test_actor_is_assigned_to_its_lane(tmp_path: Path) -> None:
+    road = ROADS / "coop_1.xodr"
+    network = RoadNetwork.load(road)
+    lane = next(one for one in network.roads["1"].sections[0].lanes.values() if one.drivable)
+    pose = network.lane_pose_at("1", lane.id, 20.0)
+    body = {"position": (pose.x, pose.y, pose.z), "offset": (0.0, 0.0, 0.75)}
+    off = {"position": (pose.x, pose.y + 500.0, 0.0)}
+    (truth,) = exported(tmp_path, Frame(view({"A": body, "Off": off})), road=road)
+    on_road, off_road = truth.moving_object
+    (assigned,) = on_road.assigned_lane_id
+    found = next(one for one in truth.lane if one.id.value == assigned.value)
+    assert found.source_reference[0].identifier[:2] == ["road_id:1", f"lane_id:{lane.id}"]
+    assert not off_road.assigned_lane_id
+
+
+def test_environment_is_in_classes_of_standard(tmp_path: Path) -> None:
+    """By the definitions in osi_environment.proto: 2 mm/h moderate, 150 m thick fog, 15000 lx level 9."""
+    environment = Environment(
+        date_time="2026-06-01T10:30:15",
+        precipitation="rain",
+        precipitation_intensity=2.0,
+        fog_range=150.0,
+        illuminance=15_000.0,
+        temperature=280.0,
+        pressure=100_000.0,
+    )
+    (truth,) = exported(tmp_path, replace(Frame(view({"A": {}})), environment=environment))
+    found = truth.environmental_conditions
+    kinds = type(found)
+    assert kinds.Precipitation.Name(found.precipitation) == "PRECIPITATION_MODERATE"
+    assert kinds.Fog.Name(found.fog) == "FOG_THICK"
+    assert kinds.AmbientIllumination.Name(found.ambient_illumination) == "AMBIENT_ILLUMINATION_LEVEL9"
+    assert (found.temperature, found.atmospheric_pressure) == (280.0, 100_000.0)
+    assert found.time_of_day.seconds_since_midnight == 10 * 3600 + 30 * 60 + 15
+
+
+def test_single_channel_trace_contains_the_same_messages(scenario_3: tuple[Path, Path], tmp_path: Path) -> None:
+    write_osi(open_run(scenario_3[0]), tmp_path / "trace.osi")
+    assert [one.SerializeToString() for one in messages(tmp_path / "trace.osi")] == [
+        one.SerializeToString() for one in messages(scenario_3[1])
+    ]
