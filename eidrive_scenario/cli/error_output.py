@@ -1,10 +1,11 @@
-"""Error messages and exit codes of the command line. A traceback is printed on request only."""
+"""Errors, warnings and exit codes of the command line. A traceback is printed on request only."""
 
 from __future__ import annotations
 
 import os
 import sys
 import traceback
+from collections.abc import Iterable
 from typing import Any
 
 import typer
@@ -75,6 +76,12 @@ def print_notes(error: BaseException) -> None:
     """Print the notes of an error of a run: the command that reproduces the run, and the path of its recording."""
     for note in getattr(error, "__notes__", ()):
         typer.echo(note, err=True)
+
+
+def print_warnings(warnings: Iterable[str]) -> None:
+    """Print warnings on stderr, one per line."""
+    for warning in warnings:
+        typer.secho(f"warning: {warning}", fg="yellow", err=True)
 
 
 def _attribute(error: BaseException) -> BaseException:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.error_output import print_warnings
+
 
 def judge(
     recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
@@ -26,14 +28,15 @@ def judge(
     Exit codes as for eidrive run; 3 also for an incomplete or damaged recording.
     """
     from eidrive_scenario.cli.streams import has_all_characters
-    from eidrive_scenario.cli.verdicts import show_judgement, show_warnings
     from eidrive_scenario.experiments.judgement import judge_recording
     from eidrive_scenario.experiments.single_run import as_json_text
 
     judgement = judge_recording(recording, criterion or None)
     if json:
         typer.echo(as_json_text(judgement, ascii_only=not has_all_characters()))
-        show_warnings(judgement)
+        print_warnings(judgement.warnings)
     else:
+        from eidrive_scenario.cli.verdicts import show_judgement
+
         show_judgement(judgement)
     raise typer.Exit(judgement.exit_code)

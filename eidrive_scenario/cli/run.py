@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.added_options import Criteria, Drive, Planner
+from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
@@ -20,6 +21,7 @@ from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
+    from eidrive_scenario.recording import Explanation
 
 
 def run(
@@ -122,11 +124,9 @@ def run(
 
     Without an option, the scenario file decides.
     """
-    from eidrive_scenario.cli.verdicts import show, show_warnings
     from eidrive_scenario.experiments.commands import reproduction_lines
     from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
     from eidrive_scenario.library import definition, resolve_scenario
-    from eidrive_scenario.recording import Explanation
     from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
     from eidrive_scenario.simulation import RunSettings
     from eidrive_scenario.simulation.added_settings import parse_drive
@@ -174,7 +174,7 @@ def run(
             if test is not None and (decided := decision_code(test, codes, json=json)) is not None:
                 return [decided]
             suffixes = [*parts, f"seed-{each}"] if most > 1 else parts
-            explanations = [Explanation(name) for name in explain or ()]
+            explanations = _explanations(explain) if explain else []
             failures.begin(each, None if isinstance(source, Path) else source.number)
             try:
                 result = run_and_save(
@@ -200,10 +200,12 @@ def run(
                 continue
             if json:
                 typer.echo(as_json_text(result, ascii_only=not has_all_characters()))
-                show_warnings(result)
+                print_warnings(result.warnings)
                 for line in reproduction_lines(result):
                     typer.echo(line, err=True)
             else:
+                from eidrive_scenario.cli.verdicts import show
+
                 show(result, varied="" if isinstance(source, Path) else str(source))
             if result.folder is not None:
                 typer.echo(f"files: {result.folder}", err=json)
@@ -234,6 +236,12 @@ def run(
             Diagnostic(f"--max-runs has no effect for a scenario (got {max_runs})", "remove the option", str(path))
         )
     raise typer.Exit(max(run_seeds(path)))
+
+
+def _explanations(names: list[str]) -> list[Explanation]:
+    from eidrive_scenario.recording import Explanation
+
+    return [Explanation(name) for name in names]
 
 
 def _with_suffixes(path: Path, suffixes: list[str]) -> Path:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
 from eidrive_scenario.experiments.commands import reproduction_lines
-from eidrive_scenario.experiments.judgement import Judgement
 from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
+
+if TYPE_CHECKING:
+    from eidrive_scenario.experiments.judgement import Judgement
 
 _OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("time limit", "bold red")}
 
@@ -50,7 +53,7 @@ def show(result: RunResult, varied: str = "") -> None:
     out.print(Text(f"trace {result.trace_hash}", style="dim"), soft_wrap=True)
     for line in reproduction_lines(result):
         out.print(Text(line), soft_wrap=True)
-    show_warnings(result)
+    print_warnings(result.warnings)
 
 
 def show_judgement(judgement: Judgement) -> None:
@@ -62,7 +65,7 @@ def show_judgement(judgement: Judgement) -> None:
     out.print(Text.assemble((judgement.scenario, "bold"), f"  seed {judgement.seed}  recorded  ", (word, style)))
     _print_table(out, judgement.criteria)
     out.print(Text(f"end: {judgement.end_reason} at {judgement.simulated_s:.2f} s"))
-    show_warnings(judgement)
+    print_warnings(judgement.warnings)
 
 
 def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
@@ -77,12 +80,6 @@ def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
     for verdict in criteria:
         table.add_row(*_row(verdict))
     out.print(table)
-
-
-def show_warnings(result: RunResult | Judgement) -> None:
-    """Print the warnings of a run or of a judgement on standard error, one per line."""
-    for warning in result.warnings:
-        typer.secho(f"warning: {warning}", fg="yellow", err=True)
 
 
 def _row(verdict: Verdict) -> tuple[Text, ...]:

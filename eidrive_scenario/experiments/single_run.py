@@ -8,25 +8,26 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.commands import command_of
-from eidrive_scenario.experiments.judgement import Judgement
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.openscenario.values.parameters import Assignment
-from eidrive_scenario.recording import CameraImageWriter, CsvWriter, Explanation, RunLog
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
-from eidrive_scenario.simulation.recorded_outcome import CONTEXT, RunRecorder, criteria_context_text
 from eidrive_scenario.simulation.run import checked_seed
 from eidrive_scenario.wall_limit import limit_wall_time
+
+if TYPE_CHECKING:
+    from eidrive_scenario.experiments.judgement import Judgement
+    from eidrive_scenario.recording import Explanation
 
 
 def run_and_save(
@@ -80,8 +81,12 @@ def run_and_save(
             if log is not None:
                 if str(log) != STANDARD_OUTPUT:
                     stack.enter_context(exclusive(Path(log)))
+                from eidrive_scenario.recording import RunLog
+
                 simulation.add_observer(RunLog(log))
             if csv is not None:
+                from eidrive_scenario.recording import CsvWriter
+
                 simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(Path(csv)))))
             if folder is not None and record:
                 recording = folder.recording
@@ -124,6 +129,9 @@ def _record(
     command: str,
 ) -> None:
     """Add a recorder and a writer of camera images to the observers."""
+    from eidrive_scenario.recording import CameraImageWriter
+    from eidrive_scenario.simulation.recorded_outcome import CONTEXT, RunRecorder, criteria_context_text
+
     images = CameraImageWriter(folder.images)
     images.watch(simulation.stack)
     simulation.add_observer(images)

@@ -1,9 +1,24 @@
 """Reader of OpenSCENARIO XML 1.0 to 1.3: files to a frozen, validated Scenario, distributions to concrete runs."""
 
-from eidrive_scenario.openscenario.distributions import ConcreteRun, DistributionExpansion, load_distribution
-from eidrive_scenario.openscenario.reading.document import read_document
-from eidrive_scenario.openscenario.reading.parsing import Source, text_of
-from eidrive_scenario.openscenario.scenario import EntityObject, Scenario, load_scenario
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from eidrive_scenario.openscenario.distributions import ConcreteRun, DistributionExpansion, load_distribution
+    from eidrive_scenario.openscenario.reading.document import read_document
+    from eidrive_scenario.openscenario.reading.parsing import Source, text_of
+    from eidrive_scenario.openscenario.scenario import EntityObject, Scenario, load_scenario
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "distributions": "ConcreteRun DistributionExpansion load_distribution",
+            "reading.document": "read_document",
+            "reading.parsing": "Source text_of",
+            "scenario": "EntityObject Scenario load_scenario",
+        },
+    )
 
 __all__ = [
     "ConcreteRun",

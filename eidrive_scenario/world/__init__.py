@@ -3,19 +3,13 @@
 `World` is imported on first access, so that the types of this package are available without loading pybullet.
 """
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from typing import TYPE_CHECKING, Any
+from eidrive_scenario.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from eidrive_scenario.world.world import World
+else:
+    __getattr__ = lazy_exports(__name__, {"world": "World"})
 
 __all__ = ["World"]
-
-
-def __getattr__(name: str) -> Any:
-    if name == "World":
-        from eidrive_scenario.world.world import World
-
-        return World
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -13,6 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import SimulationError, suggestion
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world import render, scene
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.actor_table import ActorTable
 from eidrive_scenario.world.appearance import Appearance
@@ -26,10 +27,7 @@ from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.ground import GroundUnder
 from eidrive_scenario.world.physics.rays import RayHits, cast_rays, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
-from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
 from eidrive_scenario.world.road_objects import signal_heads
-from eidrive_scenario.world.scene.roadside import FIRST_LABEL
-from eidrive_scenario.world.scene.visuals import DisplayState, UndrawnImage, Visuals
 from eidrive_scenario.world.view import Contact, WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -77,7 +75,7 @@ class World:
         self._table: ActorTable | None = None
         self._scenery = Scenery(self._client, roads, entities)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
-        self._visuals: Visuals | None = None
+        self._visuals: scene.Visuals | None = None
         self._changed()
 
     def __enter__(self) -> World:
@@ -179,7 +177,7 @@ class World:
     def signal_labels(self) -> Mapping[int, str]:
         """Labels of the heads of traffic signals in segmentation images, with the ids of the signals."""
         heads = signal_heads(self._roads) if self._roads is not None else ()
-        return {FIRST_LABEL - row: head.signal.id for row, head in enumerate(heads)}
+        return {scene.FIRST_LABEL - row: head.signal.id for row, head in enumerate(heads)}
 
     def add_building(
         self, name: str, center: Vector3, size: Vector3, yaw: float = 0.0, color: Vector3 | None = None
@@ -268,17 +266,17 @@ class World:
         `ignore` are not drawn. The first image creates all meshes.
         """
         seen = self.radiance(pose, Pinhole.of_fov(width, height, fov, near, far), ignore=ignore)
-        rgb = tone_map(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))
+        rgb = render.tone_map(seen.luminance * np.float32(1.0 / render.white_level(seen.luminance)))
         return CameraImage(rgb, seen.depth, seen.segmentation)
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """Return the light that a camera at this pose (4, 4) receives now, with depth and labels."""
         return self.image(pose, pinhole, ignore=ignore).draw()
 
-    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> UndrawnImage:
+    def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> scene.UndrawnImage:
         """Return the same image before it is drawn. It shows the current time, also if it is drawn later."""
-        self._visuals = self._visuals or Visuals(self._scenery)
-        shown, fixed = DisplayState(self.time, self._signals, self._appearances), np.array(pose, dtype=float)
+        self._visuals = self._visuals or scene.Visuals(self._scenery)
+        shown, fixed = scene.DisplayState(self.time, self._signals, self._appearances), np.array(pose, dtype=float)
         return self._visuals.image(self._bodies.values(), ignore, fixed, pinhole, self._weather, shown)
 
     def _body(self, name: str) -> Body:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario, model
@@ -19,11 +19,13 @@ from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 from eidrive_scenario.storyboard.state.element_states import ElementStateObserver
 from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
-from eidrive_scenario.traffic.background import BackgroundTraffic
-from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
+
+if TYPE_CHECKING:
+    from eidrive_scenario.traffic.background import BackgroundTraffic
+    from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 
 E = TypeVar("E", bound=model.Element)
 

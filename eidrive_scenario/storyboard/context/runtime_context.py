@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, SimulationError
 from eidrive_scenario.openscenario import Scenario, model
@@ -18,12 +19,14 @@ from eidrive_scenario.storyboard.state.domains import Domain
 from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
 from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
 from eidrive_scenario.storyboard.state.signals import Signals
-from eidrive_scenario.traffic.background import BackgroundTraffic
-from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
-from eidrive_scenario.traffic.spawning.population import CentralObject, Population
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
+
+if TYPE_CHECKING:
+    from eidrive_scenario.traffic.background import BackgroundTraffic
+    from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
+    from eidrive_scenario.traffic.spawning.population import CentralObject
 
 
 class RuntimeContext:
@@ -142,6 +145,9 @@ class RuntimeContext:
         """Build the background traffic. Raise SimulationError without a road network."""
         if self.roads is None:
             raise SimulationError("background traffic: the scenario has no road network")
+        from eidrive_scenario.traffic.background import BackgroundTraffic
+        from eidrive_scenario.traffic.spawning.population import Population
+
         population = Population(
             self.roads,
             seed=self.seed,
@@ -156,6 +162,8 @@ class RuntimeContext:
         actor = self.actors.get(name)
         if actor is None or not actor.present:
             return None
+        from eidrive_scenario.traffic.spawning.population import CentralObject
+
         row = self.view.rows.get(name)
         if row is None:
             pose = actor.motion.pose

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.storyboard.state.commands import Commands
-from eidrive_scenario.traffic.background import BackgroundTraffic
-from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 from eidrive_scenario.world.view import WorldView
+
+if TYPE_CHECKING:
+    from eidrive_scenario.traffic.background import BackgroundTraffic
+    from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 
 
 class BackgroundTrafficPort:

@@ -1,0 +1,28 @@
+"""Exports of a package whose modules are imported on first access."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any
+
+
+def lazy_exports(package: str, names: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return the `__getattr__` of a package (PEP 562), which imports a name when it is first accessed.
+
+    package  name of the package
+    names    exported names, separated by spaces, by the module of the package that defines them
+
+    The package imports the names under `TYPE_CHECKING` as well, for type checkers and import contracts.
+    """
+    modules = {name: f"{package}.{module}" for module, exported in names.items() for name in exported.split()}
+
+    def get(name: str) -> Any:
+        if name not in modules:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value = getattr(import_module(modules[name]), name)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    return get
