@@ -7,7 +7,11 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 
-_PACKAGES = {"osi3": "osi-python", "foxglove": "foxglove-schemas-protobuf", "mcap_protobuf": "mcap-protobuf-support"}
+_PACKAGES = {
+    "osi3": "osi-python",
+    "foxglove_schemas_protobuf": "foxglove-schemas-protobuf",
+    "mcap_protobuf": "mcap-protobuf-support",
+}
 """Package on PyPI by module."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from urllib.parse import quote
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.files.atomic import create
-from eidrive_scenario.geometry import box_corners
+from eidrive_scenario.geometry import box_corners, rotation_matrix
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.recording.frame import Frame
@@ -38,7 +39,7 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 
 
 class CameraImageWriter:
-    """Writer of each camera image of a station to FOLDER/STATION/CAMERA-TICK.jpg.
+    """Writer of each camera image of a station to FOLDER/STATION/CAMERA-TICK.jpg, and its camera to CAMERA.json.
 
     Detections of an image detector are drawn with class and score. For a detector without image detections, the 3D
     detections of the station are projected into the image.
@@ -47,6 +48,7 @@ class CameraImageWriter:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._stack: DrivingStack | None = None
+        self._described: set[tuple[str, str]] = set()
 
     def watch(self, stack: DrivingStack) -> None:
         """Select the driving stack whose camera images are written."""
@@ -63,8 +65,11 @@ class CameraImageWriter:
                     image = draw_image_detections(reading.rgb, detections[camera])
                 else:
                     image = draw_projected_boxes(reading, frame.steps[station].detections)
-                name = f"{quote(camera, safe=' ')}-{frame.view.tick:06d}.jpg"
-                self._write(self._folder / quote(station, safe=" ") / name, image)
+                folder = self._folder / quote(station, safe=" ")
+                if (station, camera) not in self._described and station in frame.view:
+                    self._described.add((station, camera))
+                    _describe(reading, frame, station, folder / camera_file(camera))
+                self._write(folder / image_file(camera, frame.view.tick), image)
 
     def close(self) -> None:
         """Do nothing: each image is written at once."""
@@ -75,6 +80,41 @@ class CameraImageWriter:
         _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         with create(path) as stream:
             stream.write(data.tobytes())
+
+
+def image_file(camera: str, tick: int) -> str:
+    """Return the name of an image."""
+    return f"{quote(camera, safe=' ')}-{tick:06d}.jpg"
+
+
+def camera_file(camera: str) -> str:
+    """Return the name of the description of a camera.
+
+    It is a JSON object with width and height [px], intrinsics (3, 3) [px], distortion k1, k2, p1, p2, k3, and the pose
+    (4, 4) camera to station [m], camera frame x right, y down, z forward.
+    """
+    return f"{quote(camera, safe=' ')}.json"
+
+
+def _describe(reading: CameraReading, frame: Frame, station: str, path: Path) -> None:
+    """Write the description of a camera."""
+    view = frame.view
+    row = view.row(station)
+    body = np.eye(4)
+    body[:3, :3] = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
+    body[:3, 3] = view.position[row]
+    height, width = reading.rgb.shape[:2]
+    text = json.dumps(
+        {
+            "width": width,
+            "height": height,
+            "intrinsics": reading.intrinsics.tolist(),
+            "distortion": reading.distortion.tolist(),
+            "pose": (np.linalg.inv(body) @ reading.pose).tolist(),
+        }
+    )
+    with create(path) as stream:
+        stream.write(text.encode())
 
 
 def draw_image_detections(image: Image, detections: ImageDetections) -> Image:

@@ -56,6 +56,18 @@ class GeoReference:
             raise ValueError(f"<geoReference>: the projection is undefined at latitude and longitude {place}")
         return x, y
 
+    def geodetic(self, x: float, y: float) -> tuple[float, float]:
+        """Return latitude and longitude in WGS 84 [rad] of a point of the plane [m].
+
+        Raise ValueError if the projection is undefined there.
+        """
+        from pyproj.enums import TransformDirection
+
+        longitude, latitude = self.transformer.transform(x, y, radians=True, direction=TransformDirection.INVERSE)
+        if not (math.isfinite(latitude) and math.isfinite(longitude)):
+            raise ValueError(f"<geoReference>: the projection is undefined at x and y {x:g} m, {y:g} m")
+        return latitude, longitude
+
 
 def parse_geo_reference(text: str) -> GeoReference:
     """Parse a PROJ string or the EPSG number of a projected coordinate system. Raise ValueError if it is invalid.

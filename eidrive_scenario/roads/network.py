@@ -108,6 +108,19 @@ class RoadNetwork(RoadAttributes):
 
     # Road and lane coordinates to world coordinates
 
+    def geodetic(self, x: float, y: float) -> tuple[float, float]:
+        """Return latitude and longitude in WGS 84 [rad] of a point of the map [m], the inverse of `geographic`.
+
+        Raise PositionError if the map has no geographic reference, or if it is undefined there.
+        """
+        reference = self.geo_reference
+        dx, dy, _, turn = self.header.offset
+        cos, sin = math.cos(turn), math.sin(turn)
+        try:
+            return reference.geodetic(x * cos - y * sin + dx, x * sin + y * cos + dy)
+        except ValueError as error:
+            raise self._geo_reference_error(error) from error
+
     def geographic(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Return x and y [m] of a point in WGS 84 [rad]. Raise PositionError if the map has no position for it."""
         reference = self.geo_reference

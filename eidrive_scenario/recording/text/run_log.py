@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-import re
 import sys
 from pathlib import Path
 from typing import TextIO
 
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.text.decisions import Decisions
 from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_link
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
@@ -22,7 +22,6 @@ _VERBS = {
     ElementTransition.SKIP: "is skipped",
     None: "enters standbyState",
 }
-_NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 class RunLog:
@@ -38,7 +37,7 @@ class RunLog:
         self._paths: dict[tuple[str, str], str] = {}
         self._ambiguous: set[tuple[str, str]] = set()
         self._mentioned: set[tuple[str, str]] = set()
-        self._decisions: dict[str, str] = {}
+        self._decisions = Decisions()
 
     def observe(self, frame: Frame) -> None:
         """Write one line for each change, new decision of a planner and message of a radio channel in this frame.
@@ -50,20 +49,11 @@ class RunLog:
         for change in frame.changes:
             if change.transition is not None or change.path not in started:
                 self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {describe_change(change)}\n")
-        self._write_decisions(frame)
+        for name, plan in self._decisions.new(frame):
+            self._stream.write(f"{frame.view.time:9.3f} s  {name}: {plan.reason}\n")
         for link in frame.links:
             if link.path_loss_db is not None or link.reason in NOT_TRANSMITTED:
                 self._stream.write(f"{link.sent:9.3f} s  {describe_link(link)}\n")
-
-    def _write_decisions(self, frame: Frame) -> None:
-        """Write the reason of each plan that differs from that of the previous plan in more than its numbers."""
-        for name, step in frame.steps.items():
-            if step.plan is None:
-                continue
-            decision = _NUMBER.sub("", step.plan.reason)
-            if self._decisions.get(name) != decision:
-                self._decisions[name] = decision
-                self._stream.write(f"{frame.view.time:9.3f} s  {name}: {step.plan.reason}\n")
 
     def close(self) -> None:
         """Close the file."""

@@ -50,3 +50,13 @@ def test_export_of_truncated_recording_warns(eidrive: Eidrive, recorded: Path, t
     result = eidrive("export", tmp_path / "cut.mcap", "--osi", tmp_path / "trace.osi")
     assert result.exit_code == 0
     assert "warning: the recording is damaged" in result.stderr
+
+
+def test_export_writes_several_files_at_once(eidrive: Eidrive, recorded: Path, tmp_path: Path) -> None:
+    osi, foxglove = tmp_path / "osi.mcap", tmp_path / "foxglove.mcap"
+    result = eidrive("export", recorded, "--osi", osi, "--foxglove", foxglove)
+    assert result.stdout.splitlines() == [str(osi), str(foxglove)]
+    assert osi.read_bytes() != foxglove.read_bytes()
+    same = eidrive("export", recorded, "--osi", osi, "--foxglove", osi)
+    assert same.exit_code == 2
+    assert "--osi and --foxglove name the same file" in same.stderr

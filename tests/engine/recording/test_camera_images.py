@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,13 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.recording.camera_images import draw_image_detections, draw_projected_boxes
+from eidrive_scenario.recording.camera_images import (
+    camera_file,
+    draw_image_detections,
+    draw_projected_boxes,
+    image_file,
+)
+from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.recording.run_files import IMAGES
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.simulation import RunSettings
@@ -71,8 +78,33 @@ def test_run_writes_camera_images_of_all_stations(tmp_path: Path) -> None:
     assert kept.trace_hash == bare.trace_hash
     assert not (tmp_path / "bare" / IMAGES).exists()
     for station in ("Ego", "RSU"):
-        files = sorted((tmp_path / "kept" / IMAGES / station).iterdir())
+        *files, camera = sorted((tmp_path / "kept" / IMAGES / station).iterdir())
+        assert camera.name == "camera.json"
         assert [file.name for file in files] == [f"camera-{tick:06d}.jpg" for tick in (0, 2, 4, 6)]
         image = cv2.imread(str(files[0]))
         assert image is not None
         assert image.shape == (384, 512, 3)
+
+
+def test_description_of_camera_projects_points_into_its_image(tmp_path: Path) -> None:
+    """The front camera of the ego, 1 m above the ground, sees a point 10 m ahead of it at its height in the center."""
+    settings = RunSettings(detector="ssd", time_limit=0.1)
+    result = run_and_save("coop/scenario_1", settings=settings, out=tmp_path)
+    data = json.loads((tmp_path / IMAGES / "Ego" / camera_file("camera")).read_text())
+    image = cv2.imread(str(tmp_path / IMAGES / "Ego" / image_file("camera", 0)))
+    assert image is not None
+    assert image.shape[:2] == (data["height"], data["width"])
+    pose = np.array(data["pose"])
+    assert result.recording is not None
+    view = next(iter(read_recording(result.recording).frames())).view
+    row = view.row("Ego")
+    nose = view.offset[row, 0] + view.size[row, 0] / 2
+    assert nose <= pose[0, 3] < nose + 0.2
+    assert pose[1:3, 3] == pytest.approx([0.0, 1.0])
+    for aside, up in ((0.0, 0.0), (2.0, -0.5)):
+        ahead = np.array([pose[0, 3] + 10.0, aside, 1.0 + up, 1.0])
+        x, y, depth = np.array(data["intrinsics"]) @ (np.linalg.inv(pose) @ ahead)[:3]
+        focal = data["intrinsics"][0][0]
+        assert depth == pytest.approx(10.0)
+        assert x / depth == pytest.approx(data["width"] / 2 - focal * aside / 10.0)
+        assert y / depth == pytest.approx(data["height"] / 2 - focal * up / 10.0)

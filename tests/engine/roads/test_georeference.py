@@ -183,12 +183,17 @@ def test_offset_shifts_and_rotates_the_plane() -> None:
     assert east[1] < -4.0
     plain = RoadNetwork.parse(map_xml(road_xml(), header=text))
     assert plain.geographic(*angles) == pytest.approx(place)
+    for roads in (network, plain):
+        found = roads.geodetic(*roads.geographic(*angles))
+        assert found == pytest.approx(angles, abs=1e-12)
 
 
 def test_map_without_valid_geo_reference_has_no_geographic_positions() -> None:
     network = RoadNetwork.parse(map_xml(road_xml()))
     with pytest.raises(PositionError, match="add <geoReference>"):
         network.geographic(0.8, 0.1)
+    with pytest.raises(PositionError, match="add <geoReference>"):
+        network.geodetic(0.0, 0.0)
     invalid = "<geoReference>+proj=mars</geoReference>"
     network = RoadNetwork.parse(map_xml(road_xml(), header=f"\n{invalid}"), "mars.xodr")
     with pytest.raises(PositionError, match=r"mars.xodr:2: <geoReference>: .*'mars'.*\+proj=utm \+zone=32"):

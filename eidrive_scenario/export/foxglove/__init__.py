@@ -1,0 +1,1 @@
+"""Topics with the schemas of Foxglove, for Foxglove and Lichtblick."""

@@ -1,0 +1,136 @@
+"""Camera images beside a recording, their calibration, and the frames of cameras."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import unquote
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.export.foxglove.schemas import Foxglove, frame_of, set_stamp
+from eidrive_scenario.files.atomic import partial_path
+from eidrive_scenario.files.bounded import is_regular_file, read_regular_file
+from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.recording.camera_images import camera_file
+from eidrive_scenario.recording.run_files import IMAGES
+
+_NAME = re.compile(r"(.+)-(\d{6,})\.jpg")
+_LARGEST_IMAGE = 64 * 2**20
+"""Maximum size of an image file [bytes]."""
+_LARGEST_DESCRIPTION = 2**16
+"""Maximum size of the description of a camera [bytes]."""
+
+
+class Camera(NamedTuple):
+    """Camera of a station: image size and intrinsics [px], distortion, and pose (4, 4) camera to station."""
+
+    station: str
+    name: str
+    width: int
+    height: int
+    intrinsics: Array
+    distortion: Array
+    pose: Array
+
+
+class Picture(NamedTuple):
+    """Image file of a camera."""
+
+    station: str
+    camera: str
+    path: Path
+
+
+class CameraImages:
+    """Images of a run by tick. Damaged descriptions of cameras are omitted with a warning."""
+
+    def __init__(self, recording: Path, warnings: list[str]) -> None:
+        self.cameras: list[Camera] = []
+        self._pictures: dict[int, list[Picture]] = {}
+        folder = recording.parent / IMAGES
+        if not folder.is_dir():
+            folder = partial_path(folder)
+        for place in sorted(folder.iterdir()) if folder.is_dir() else ():
+            if place.is_dir():
+                self._read(unquote(place.name), place, warnings)
+
+    def at(self, tick: int) -> list[Picture]:
+        """Return the images of a tick."""
+        return self._pictures.get(tick, [])
+
+    def _read(self, station: str, folder: Path, warnings: list[str]) -> None:
+        names = set()
+        for path in sorted(folder.iterdir()):
+            match = _NAME.fullmatch(path.name)
+            if match is not None and is_regular_file(path):
+                camera = unquote(match[1])
+                names.add(camera)
+                self._pictures.setdefault(int(match[2]), []).append(Picture(station, camera, path))
+        for name in sorted(names):
+            try:
+                self.cameras.append(_camera(station, name, folder / camera_file(name)))
+            except (OSError, AttributeError, LookupError, TypeError, ValueError) as error:
+                warnings.append(f"{folder / camera_file(name)}: no calibration: {str(error)[:200]}")
+
+
+def _camera(station: str, name: str, path: Path) -> Camera:
+    """Read the description of a camera. Raise OSError, LookupError, TypeError or ValueError if it is invalid."""
+    data = load_json(read_regular_file(path, _LARGEST_DESCRIPTION), max_depth=5)
+    arrays = [np.array(data[key], dtype=float) for key in ("intrinsics", "distortion", "pose")]
+    if [array.shape for array in arrays] != [(3, 3), (5,), (4, 4)] or not all(np.isfinite(one).all() for one in arrays):
+        raise ValueError("matrices have other shapes or non-finite values")
+    return Camera(station, name, int(data["width"]), int(data["height"]), *arrays)
+
+
+def image_message(foxglove: Foxglove, picture: Picture, time: float) -> Any:
+    """Return an image. Raise OSError if it cannot be read."""
+    data = read_regular_file(picture.path, _LARGEST_IMAGE)
+    frame = frame_of(picture.station, picture.camera)
+    message = foxglove.image(frame_id=frame, format="jpeg", data=data)
+    set_stamp(message.timestamp, time)
+    return message
+
+
+def calibration_message(foxglove: Foxglove, camera: Camera, time: float) -> Any:
+    """Return the calibration of a camera, with Brown's distortion."""
+    lens = camera.intrinsics
+    message = foxglove.calibration(
+        frame_id=frame_of(camera.station, camera.name),
+        width=camera.width,
+        height=camera.height,
+        distortion_model="plumb_bob",
+        D=camera.distortion.tolist(),
+        K=lens.ravel().tolist(),
+        R=np.eye(3).ravel().tolist(),
+        P=np.column_stack([lens, np.zeros(3)]).ravel().tolist(),
+    )
+    set_stamp(message.timestamp, time)
+    return message
+
+
+def add_camera_transforms(transforms: Any, cameras: list[Camera], present: Iterator[str], time: float) -> None:
+    """Add the poses of cameras on the stations that are present."""
+    here = set(present)
+    for camera in cameras:
+        if camera.station in here:
+            found = transforms.transforms.add()
+            set_stamp(found.timestamp, time)
+            found.parent_frame_id = frame_of(camera.station)
+            found.child_frame_id = frame_of(camera.station, camera.name)
+            found.translation.x, found.translation.y, found.translation.z = camera.pose[:3, 3].tolist()
+            x, y, z, w = _quaternion(camera.pose[:3, :3])
+            found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w = x, y, z, w
+
+
+def _quaternion(turn: Array) -> tuple[float, float, float, float]:
+    """Return x, y, z, w of a rotation matrix."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
+    norm = math.hypot(x, y, z, w)
+    return x / norm, y / norm, z / norm, w / norm

@@ -1,0 +1,95 @@
+"""Center lines and edges of lanes as points in the world."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+
+SPACING = 2.0
+"""Maximum distance between the points of a line [m]."""
+_MAX_POINTS = 400_000
+"""Maximum number of points of all lines of a map, which increases the distance on large maps."""
+_MARKS: Mapping[str, str] = {
+    "none": "NO_LINE",
+    "broken": "DASHED_LINE",
+    "broken broken": "DASHED_LINE",
+    "botts dots": "BOTTS_DOTS",
+    "curb": "CURB",
+    "grass": "GRASS_EDGE",
+    "edge": "ROAD_EDGE",
+}
+"""Types of edges by road mark; all others are solid lines."""
+_COLORS = frozenset({"white", "yellow", "red", "blue", "green", "violet", "orange"})
+
+Line = list[list[float]]
+"""Points x, y, z [m]."""
+
+
+class LaneEdge(NamedTuple):
+    """Outer edge of a lane with one road mark, from one s to another [m]; types are those of OSI lane boundaries."""
+
+    start: float
+    end: float
+    type: str
+    color: str
+
+
+def point_spacing(roads: RoadNetwork) -> float:
+    """Return the distance between the points of lines, so that a large map has a limited number of points [m]."""
+    length = sum(
+        2.0 * section.length * len(section.lanes) for road in roads.roads.values() for section in road.sections
+    )
+    return max(SPACING, length / _MAX_POINTS)
+
+
+def lane_edges(section: LaneSection, lane: Lane | None) -> Iterator[LaneEdge]:
+    """Yield the outer edges of a lane in the order of s, one per road mark."""
+    if lane is None:
+        return
+    marks = [mark for mark in lane.road_marks if mark.s_offset < section.length]
+    starts = [section.s + max(mark.s_offset, 0.0) for mark in marks]
+    if not marks or starts[0] > section.s:
+        yield LaneEdge(section.s, starts[0] if marks else section.end, "NO_LINE", "none")
+    for mark, start, end in zip(marks, starts, [*starts[1:], section.end], strict=True):
+        if end > start:
+            color = mark.color if mark.color in _COLORS else "white"
+            yield LaneEdge(start, end, _MARKS.get(mark.type, "SOLID_LINE"), color)
+
+
+def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, spacing: float) -> Line:
+    """Return the center line of a lane in the direction of s, with the height of the lane above the road."""
+    stations = _stations(section.s, section.end, spacing)
+    aside = [lane.side * lane.center.value(s - section.s) + road.lane_offset.value(s) for s in stations]
+    points = _line(roads, road, stations, aside)
+    return [[x, y, z + _height(lane, s - section.s)] for s, (x, y, z) in zip(stations, points, strict=True)]
+
+
+def edge_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, edge: LaneEdge, spacing: float) -> Line:
+    """Return an outer edge of a lane on the surface of the road, in the direction of s."""
+    stations = _stations(edge.start, edge.end, spacing)
+    aside = [lane.side * lane.outer.value(s - section.s) + road.lane_offset.value(s) for s in stations]
+    return _line(roads, road, stations, aside)
+
+
+def _line(roads: RoadNetwork, road: Road, stations: list[float], aside: list[float]) -> Line:
+    poses = roads.road_pose(road.id, stations, aside)
+    points: Line = np.column_stack([poses.x, poses.y, poses.z]).tolist()
+    return points
+
+
+def _height(lane: Lane, along: float) -> float:
+    """Return the height of the middle of a lane above the road [m], for example of a sidewalk."""
+    index = bisect_right(lane.heights, along, key=lambda entry: entry.s_offset) - 1
+    return 0.5 * (lane.heights[index].inner + lane.heights[index].outer) if index >= 0 else 0.0
+
+
+def _stations(start: float, end: float, spacing: float) -> list[float]:
+    found: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
+    return found
