@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
@@ -25,8 +25,7 @@ from eidrive_scenario.openscenario.values.parameters import Assignment, Location
 from eidrive_scenario.openscenario.values.scalars import Version
 
 
-@dataclass(frozen=True)
-class CatalogFile:
+class CatalogFile(msgspec.Struct, frozen=True):
     """Catalog and its entries by name."""
 
     name: str

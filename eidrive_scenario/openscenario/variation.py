@@ -10,9 +10,9 @@ The parameters are declared in the file like all others; other engines use their
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
+import msgspec
 from pydantic import Field, model_validator
 
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, quoted, suggestion
@@ -75,8 +75,7 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
     return drawn
 
 
-@dataclass(frozen=True)
-class _Specification:
+class _Specification(msgspec.Struct, frozen=True):
     """Parameter and its bounds, as a command specifies them.
 
     lines  line of each setting of the command, by its dotted path

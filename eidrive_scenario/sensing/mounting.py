@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array
@@ -22,8 +22,7 @@ _OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Camera axes (x right, y down, z forward) as columns in a frame of x forward, y left, z up."""
 
 
-@dataclass(frozen=True)
-class Mounting:
+class Mounting(msgspec.Struct, frozen=True):
     """Pose of a sensor in the frame of the actor: position [m], yaw to the left and pitch downwards [rad]."""
 
     x: float

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+
+import msgspec
 
 from eidrive_scenario.driving.stack import DrivingStack, StackInputs
 from eidrive_scenario.evaluation.criteria_parser import (
@@ -27,8 +28,7 @@ from eidrive_scenario.world.environment_weather import weather_from_environment
 from eidrive_scenario.world.specs import actor_spec
 
 
-@dataclass
-class RunState:
+class RunState(msgspec.Struct):
     """Objects of a run that commands change.
 
     weather_fixed  True if an option of the run overrides the weather of the scenario
@@ -48,9 +48,9 @@ class RunState:
     declared: DeclaredCriteria
     criteria: list[Criterion]
     warnings: list[str]
-    inputs: StackInputs = field(default_factory=StackInputs)
+    inputs: StackInputs = msgspec.field(default_factory=StackInputs)
     exit: Verdict | None = None
-    executed: list[ExecutedCommand] = field(default_factory=list)
+    executed: list[ExecutedCommand] = msgspec.field(default_factory=list)
 
     @classmethod
     def of(cls, setup: RunSetup) -> RunState:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+
+import msgspec
 
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
@@ -26,8 +27,7 @@ FATAL_CRITERION = "criterion: "
 """Prefixes of the reasons for an end by an exit command, and by a fatal criterion; its name follows."""
 
 
-@dataclass(frozen=True)
-class RunEnd:
+class RunEnd(msgspec.Struct, frozen=True):
     """End of a run: the last frame, the reason, and the wall time until then [s]."""
 
     frame: Frame

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+import msgspec
 
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory, build_stack
 from eidrive_scenario.driving.stations import Stations
@@ -27,8 +28,7 @@ from eidrive_scenario.world import World
 from eidrive_scenario.world.weather import Weather, load_weather
 
 
-@dataclass(frozen=True)
-class RunSetup:
+class RunSetup(msgspec.Struct, frozen=True):
     """All parts of a run before its first tick.
 
     criteria           criteria of the StopTrigger; commands of the storyboard add the others

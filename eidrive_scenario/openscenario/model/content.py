@@ -6,21 +6,20 @@ Versions are written as in the file header: "1.2" is revMajor 1, revMinor 2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
+
+import msgspec
 
 Part: TypeAlias = "str | Sequence | Choice"
 
 
-@dataclass(frozen=True)
-class Sequence:
+class Sequence(msgspec.Struct, frozen=True):
     """Sequence of the parts in their order."""
 
     parts: tuple[Part, ...] = ()
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(msgspec.Struct, frozen=True):
     """Choice of one of the parts.
 
     minimum, maximum  number of repetitions; None for no limit
@@ -33,13 +32,11 @@ class Choice:
     empty_until: str = ""
 
 
-@dataclass(frozen=True)
-class All:
+class All(msgspec.Struct, frozen=True):
     """All children in any order, each at most once."""
 
 
-@dataclass(frozen=True)
-class Changed:
+class Changed(msgspec.Struct, frozen=True):
     """Content model that changes in a version."""
 
     before: Sequence | All

@@ -12,6 +12,8 @@ from dataclasses import MISSING, FrozenInstanceError, dataclass, field, fields
 from reprlib import recursive_repr
 from typing import Any, ClassVar, TypeVar, dataclass_transform
 
+import msgspec
+
 from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choice, Content, Sequence
 
 USAGE = "usage"
@@ -20,8 +22,7 @@ ABOUT = frozenset({"line", "source", "scope"})
 """Fields with the location of an element, not with its content."""
 
 
-@dataclass(frozen=True)
-class Usage:
+class Usage(msgspec.Struct, frozen=True):
     """Versions in which a field or literal exists, is required or deprecated; bounds are inclusive, "" is open."""
 
     since: str = ""

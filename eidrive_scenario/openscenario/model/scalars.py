@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
+import msgspec
 
-@dataclass(frozen=True)
-class Limits:
+
+class Limits(msgspec.Struct, frozen=True):
     """Minimum and maximum value of an integer type."""
 
     lowest: int
     highest: int
 
 
-@dataclass(frozen=True)
-class NameOf:
+class NameOf(msgspec.Struct, frozen=True):
     """Kind of the referenced element: entity, parameter, variable, monitor, controller, sensor and others."""
 
     kind: str

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import cast
 
+import msgspec
 from lxml import etree
 
 from eidrive_scenario.files.xml_lines import line_of
@@ -22,8 +22,7 @@ ROOTS = ("OpenSCENARIO", "OpenScenario")
 """Names of the root element; the schema declares both spellings."""
 
 
-@dataclass(frozen=True)
-class ReadDocument:
+class ReadDocument(msgspec.Struct, frozen=True):
     """Content of a file, with catalog references that are not resolved yet."""
 
     root: OpenScenario

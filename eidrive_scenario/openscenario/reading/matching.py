@@ -7,12 +7,12 @@ XML Schema requires that each model is deterministic. The states give the expect
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
 from itertools import pairwise
 
+import msgspec
 
-@dataclass(frozen=True)
-class Leaf:
+
+class Leaf(msgspec.Struct, frozen=True):
     """Child by its name, between `minimum` and `maximum` times; None for no limit."""
 
     name: str
@@ -20,8 +20,7 @@ class Leaf:
     maximum: int | None
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(msgspec.Struct, frozen=True):
     """Sequence or choice of parts, optional or repeated as a whole."""
 
     parts: tuple[Leaf | Group, ...]
@@ -30,12 +29,11 @@ class Group:
     repeated: bool = False
 
 
-@dataclass
-class Automaton:
+class Automaton(msgspec.Struct):
     """Automaton with state 0 before the first child; `steps` maps the name of the next child to the next state."""
 
-    steps: list[dict[str, int]] = field(default_factory=lambda: [{}])
-    accepting: set[int] = field(default_factory=set)
+    steps: list[dict[str, int]] = msgspec.field(default_factory=lambda: [{}])
+    accepting: set[int] = msgspec.field(default_factory=set)
 
     def after(self, state: int, name: str) -> int:
         """Return the state after a child of that name; for a misplaced child, the next state that it may reach."""
@@ -83,8 +81,7 @@ class Automaton:
         return distance
 
 
-@dataclass
-class _Piece:
+class _Piece(msgspec.Struct):
     """Part of the automaton: its first and last states, and whether it may be empty."""
 
     empty: bool

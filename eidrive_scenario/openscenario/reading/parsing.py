@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 from xml.etree import ElementTree
 
+import msgspec
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened
@@ -32,8 +32,7 @@ LIMITS = XmlLimits(max_bytes=64 * MIB, max_nodes=2_000_000)
 """Limits of a scenario, a catalog and a parameter value distribution."""
 
 
-@dataclass(frozen=True)
-class Document:
+class Document(msgspec.Struct, frozen=True):
     """Parsed file.
 
     name    name in messages

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, dataclass, replace
+from dataclasses import MISSING, replace
 from typing import Any, cast
 
+import msgspec
 from lxml import etree
 
 from eidrive_scenario.errors import quoted, suggestion
@@ -39,8 +40,7 @@ _WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
 _WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
 
 
-@dataclass(frozen=True)
-class FoundReference:
+class FoundReference(msgspec.Struct, frozen=True):
     """Catalog reference and the kinds of entries that are allowed for it."""
 
     reference: CatalogReference

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, Field, dataclass, fields
+from dataclasses import MISSING, Field, fields
 from datetime import datetime
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import msgspec
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model import Element, Enumeration
@@ -26,8 +28,7 @@ _SCALARS = {
 _PLAIN = Usage()
 
 
-@dataclass(frozen=True)
-class AttributeRule:
+class AttributeRule(msgspec.Struct, frozen=True):
     """Rule of an attribute: field of the class, type, and whether it is required."""
 
     field: str
@@ -38,8 +39,7 @@ class AttributeRule:
     """Kind of the element to which the attribute refers (see model.scalars.NameOf); "" if it is not a reference."""
 
 
-@dataclass(frozen=True)
-class ChildRule:
+class ChildRule(msgspec.Struct, frozen=True):
     """Rule of a child element: field of the class, type, and number of occurrences."""
 
     field: str
@@ -51,8 +51,7 @@ class ChildRule:
     deprecated: str
 
 
-@dataclass(frozen=True)
-class Rules:
+class Rules(msgspec.Struct, frozen=True):
     """Content that one version allows for an element of a class.
 
     order             automaton over the names of the children; None for any order

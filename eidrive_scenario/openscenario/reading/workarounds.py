@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass
 
+import msgspec
 from lxml import etree
 
 from eidrive_scenario.files.xml_lines import line_of
@@ -17,8 +17,7 @@ from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.values.scalars import Version
 
 
-@dataclass(frozen=True)
-class Workaround:
+class Workaround(msgspec.Struct, frozen=True):
     """Repair of one deviation in elements of one name.
 
     since, before  versions of the standard in which it is a deviation

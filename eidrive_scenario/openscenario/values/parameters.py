@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
+import msgspec
+
 from eidrive_scenario.errors import quoted, shortened, suggestion
 from eidrive_scenario.openscenario.budget import MAX_TEXT, Budget, BudgetError
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
@@ -42,8 +44,7 @@ TEXTUAL = (STRING, DOUBLE, BOOLEAN, DATE_TIME)
 """Types whose texts are converted unchanged. Other types are integers, which may have a zero fraction, such as -5.0."""
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(msgspec.Struct, frozen=True):
     """Parameter with its value as a text and in its type."""
 
     name: str

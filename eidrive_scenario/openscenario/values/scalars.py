@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
+
+import msgspec
 
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.openscenario.model import Enumeration
@@ -24,8 +25,7 @@ _WHITE_SPACE = " \t\r\n"
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 
-@dataclass(frozen=True)
-class Scalar:
+class Scalar(msgspec.Struct, frozen=True):
     """Simple type. `convert` raises ValueError with a hint if a text is invalid."""
 
     name: str

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
+import msgspec
+
 from eidrive_scenario.roads.model.curves import ReferenceLine
 from eidrive_scenario.roads.model.map_warnings import MapWarning
 from eidrive_scenario.roads.model.polynomials import Polynomials
@@ -26,8 +28,7 @@ DRIVABLE = frozenset(
 """Lane types for cars."""
 
 
-@dataclass(frozen=True)
-class Header:
+class Header(msgspec.Struct, frozen=True):
     """Header of an OpenDRIVE file.
 
     geo_reference       PROJ string or EPSG number; empty if the file omits it
@@ -44,8 +45,7 @@ class Header:
     offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class RoadMarkLine:
+class RoadMarkLine(msgspec.Struct, frozen=True):
     """Line of a road mark with an explicit pattern."""
 
     length: float
@@ -55,8 +55,7 @@ class RoadMarkLine:
     width: float
 
 
-@dataclass(frozen=True)
-class RoadMark:
+class RoadMark(msgspec.Struct, frozen=True):
     """Marking on the outer edge of a lane from s_offset on, counted from the start of the lane section."""
 
     s_offset: float
@@ -68,8 +67,7 @@ class RoadMark:
     lines: tuple[RoadMarkLine, ...] = ()
 
 
-@dataclass(frozen=True)
-class LaneHeight:
+class LaneHeight(msgspec.Struct, frozen=True):
     """Height of the inner and outer edge of a lane above the road from s_offset on."""
 
     s_offset: float
@@ -114,8 +112,7 @@ class Lane:
         return self.type in DRIVABLE
 
 
-@dataclass(frozen=True)
-class LaneSection:
+class LaneSection(msgspec.Struct, frozen=True):
     """Section of a road with constant lanes, from s over `length`; lanes by id from left to right."""
 
     index: int
@@ -129,8 +126,7 @@ class LaneSection:
         return self.s + self.length
 
 
-@dataclass(frozen=True)
-class RoadLink:
+class RoadLink(msgspec.Struct, frozen=True):
     """Successor or predecessor of a road."""
 
     element_type: Literal["road", "junction"]
@@ -139,8 +135,7 @@ class RoadLink:
     line: int | None = None
 
 
-@dataclass(frozen=True)
-class RoadType:
+class RoadType(msgspec.Struct, frozen=True):
     """Type of a road from s on, with its speed limit [m/s]; None if none is given, inf for no limit."""
 
     s: float
@@ -183,8 +178,7 @@ class Road:
         return self.sections[bisect_right(self.section_starts, s, 1) - 1]
 
 
-@dataclass(frozen=True)
-class Connection:
+class Connection(msgspec.Struct, frozen=True):
     """Connection through a junction. In a direct junction `connecting_road` is the linked road itself."""
 
     id: str
@@ -195,8 +189,7 @@ class Connection:
     line: int | None = None
 
 
-@dataclass(frozen=True)
-class Junction:
+class Junction(msgspec.Struct, frozen=True):
     """Junction of type default, direct or virtual."""
 
     id: str
@@ -206,8 +199,7 @@ class Junction:
     controllers: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class SignalPlace:
+class SignalPlace(msgspec.Struct, frozen=True):
     """Position and validity of a signal or of a signal reference along a road.
 
     orientation  '+' valid for traffic in the direction of s, '-' against it, 'none' for both
@@ -221,8 +213,7 @@ class SignalPlace:
     validity: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass(frozen=True)
-class Signal:
+class Signal(msgspec.Struct, frozen=True):
     """Traffic sign (dynamic False) or light (dynamic True). `references` are further roads for which it is valid."""
 
     id: str
@@ -242,8 +233,7 @@ class Signal:
     references: tuple[SignalPlace, ...] = ()
 
 
-@dataclass(frozen=True)
-class SignalController:
+class SignalController(msgspec.Struct, frozen=True):
     """Group of signals that switch together."""
 
     id: str
@@ -251,8 +241,7 @@ class SignalController:
     signals: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Corner:
+class Corner(msgspec.Struct, frozen=True):
     """Corner of the outline of an object: (s, t, dz) on the road, or (u, v, z) in the frame of the object."""
 
     on_road: bool
@@ -262,8 +251,7 @@ class Corner:
     height: float
 
 
-@dataclass(frozen=True)
-class Repeat:
+class Repeat(msgspec.Struct, frozen=True):
     """Repetition of an object along the road; distance 0 means without gaps."""
 
     s: float
@@ -275,8 +263,7 @@ class Repeat:
     z_offset: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class RoadObject:
+class RoadObject(msgspec.Struct, frozen=True):
     """Object at a road, such as a barrier, pole, tree, building, crosswalk or parking space."""
 
     id: str
@@ -299,8 +286,7 @@ class RoadObject:
     repeats: tuple[Repeat, ...] = ()
 
 
-@dataclass(frozen=True)
-class RoadMap:
+class RoadMap(msgspec.Struct, frozen=True):
     """Content of an OpenDRIVE file."""
 
     source: str

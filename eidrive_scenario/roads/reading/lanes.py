@@ -8,6 +8,7 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Literal
 
+import msgspec
 from lxml import etree
 
 from eidrive_scenario.files.xml_lines import line_of
@@ -61,7 +62,8 @@ def read_sections(
         read = _read_section(element, start, lane_offset, collector)
         if end - s <= 1e-6 and (sections or len(found) > 1):
             if sections:
-                sections[-1] = replace(sections[-1], lanes=_redirect_links(sections[-1].lanes, read, "successors"))
+                linked = _redirect_links(sections[-1].lanes, read, "successors")
+                sections[-1] = msgspec.structs.replace(sections[-1], lanes=linked)
             left_out.append(read)
             continue
         for between in reversed(left_out):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from lxml import etree
+from msgspec.structs import replace
 
 from eidrive_scenario.roads.geometry.poses import BEYOND
 from eidrive_scenario.roads.model.map_warnings import SIGNAL_OFF_ROAD

@@ -10,6 +10,7 @@ from functools import cached_property
 from itertools import groupby
 from typing import TypeVar
 
+import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array
@@ -26,8 +27,7 @@ LANE_CHANGE_LENGTH = 40.0
 """Length of a lane change if its section is long enough [m]."""
 
 
-@dataclass(frozen=True)
-class Leg:
+class Leg(msgspec.Struct, frozen=True):
     """Part of a route within one lane section: from s to s_end, from one lane to another (usually the same)."""
 
     road: str

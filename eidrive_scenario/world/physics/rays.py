@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
@@ -24,8 +24,7 @@ _STEPS = 12
 """Maximum number of continuations per skipped body: 40 m after the last."""
 
 
-@dataclass(frozen=True)
-class RayHits:
+class RayHits(msgspec.Struct, frozen=True):
     """First hits of rays.
 
     rows      (M,) row of the actor in the view; GROUND (-1) for the ground and buildings, NOTHING (-2)

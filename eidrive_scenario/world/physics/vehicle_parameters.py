@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
+
+import msgspec
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.world.actor import ActorSpec
@@ -39,8 +40,7 @@ class TrackAxle(NamedTuple):
     """Maximum angle of its wheels [rad]; 0 if they do not steer."""
 
 
-@dataclass(frozen=True)
-class VehicleParameters:
+class VehicleParameters(msgspec.Struct, frozen=True):
     """Parameters of the single-track model, with defaults in brackets.
 
     With more than two axles, front and rear are groups of axles at their mean positions. The axles of a group carry the
