@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+
+class TableName(StrEnum):
+    """Tables of a run for CSV and Parquet files."""
+
+    actors = "actors"
+    objects = "objects"
+    plans = "plans"
+    messages = "messages"
+    transitions = "transitions"
+    verdicts = "verdicts"
 
 
 def export(
@@ -18,18 +31,29 @@ def export(
         Path | None,
         typer.Option(metavar="FILE", help="MCAP file for Foxglove or Lichtblick: 3D scene, cameras, log, plots."),
     ] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as CSV.")] = None,
+    parquet: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as Parquet.")] = None,
+    table: Annotated[TableName, typer.Option(help="Table of --csv and --parquet.")] = TableName.actors,
 ) -> None:
     """Write a recorded run as files of other tools.
 
-    Example: eidrive export reports/scenario_1 --osi trace.mcap --foxglove run.mcap
+    Example: eidrive export reports/scenario_1 --osi trace.mcap --foxglove run.mcap --csv motion.csv
     """
+    from functools import partial
+
     from eidrive_scenario.cli.output_paths import check_output_paths
     from eidrive_scenario.errors import Diagnostic, SettingError
     from eidrive_scenario.export.foxglove.writer import write_foxglove
     from eidrive_scenario.export.osi.trace import write_osi
     from eidrive_scenario.export.recorded_run import open_run
+    from eidrive_scenario.export.table_files import write_csv, write_parquet
 
-    writers = {"--osi": (osi, write_osi), "--foxglove": (foxglove, write_foxglove)}
+    writers: dict[str, tuple[Path | None, Callable[..., None]]] = {
+        "--osi": (osi, write_osi),
+        "--foxglove": (foxglove, write_foxglove),
+        "--csv": (csv, partial(write_csv, table=table.value)),
+        "--parquet": (parquet, partial(write_parquet, table=table.value)),
+    }
     given = {option: (path, write) for option, (path, write) in writers.items() if path is not None}
     if not given:
         raise SettingError(Diagnostic("no output is given", f"give one or several of {', '.join(writers)}"))
@@ -38,5 +62,5 @@ def export(
     for path, write in given.values():
         write(run, path)
         typer.echo(str(path))
-    for warning in run.warnings:
+    for warning in dict.fromkeys(run.warnings):
         typer.secho(f"warning: {warning}", fg="yellow", err=True)

@@ -1,0 +1,147 @@
+"""Tables of a recorded run: rows of actors, objects, plans, messages, transitions and verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from eidrive_scenario.export.recorded_run import RecordedRun
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation.recorded_outcome import recorded_outcome
+
+Row = tuple[Any, ...]
+Columns = Mapping[str, type]
+"""Type of each column: float, int, str or bool. A value may be None."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Table with its columns and its rows for a run."""
+
+    columns: Columns
+    rows: Callable[[RecordedRun], Iterator[Row]]
+
+
+def _floats(*names: str) -> dict[str, type]:
+    return dict.fromkeys(names, float)
+
+
+def _of_frames(rows: Callable[[Frame], Iterable[Row]]) -> Callable[[RecordedRun], Iterator[Row]]:
+    """Return a function that yields the rows of all frames."""
+    return lambda run: (row for frame in run.frames() for row in rows(frame))
+
+
+def _actors(frame: Frame) -> Iterator[Row]:
+    view = frame.view
+    bodies = zip(view.names, view.categories, view.states, view.size.tolist(), strict=True)
+    for name, category, state, size in bodies:
+        pose = (state.x, state.y, state.z, state.yaw, state.pitch, state.roll)
+        motion = (*state[6:12], state.yaw_rate)
+        yield (view.time, name, *pose, state.speed, category, *motion, *size, view.tick)
+
+
+def _objects(frame: Frame) -> Iterator[Row]:
+    for station, step in frame.steps.items():
+        for kind, objects in (("detections", step.detections), ("fused", step.fused)):
+            existence = objects.existence.tolist() or [None] * len(objects)
+            tracks = objects.tracks or [None] * len(objects)
+            columns = (objects.classes, objects.boxes.tolist(), objects.scores.tolist(), existence)
+            rows = zip(*columns, objects.velocity.tolist(), tracks, strict=True)
+            for category, box, score, exists, velocity, track in rows:
+                yield (frame.view.time, station, kind, category, *box, score, exists, *velocity, track)
+
+
+def _plans(frame: Frame) -> Iterator[Row]:
+    for station, step in frame.steps.items():
+        if step.plan is not None:
+            plan, control = step.plan, step.control
+            speed = float(plan.speeds[0]) if len(plan.speeds) else None
+            held = (None,) * 3 if control is None else (control.throttle, control.brake, control.steering)
+            yield (frame.view.time, station, plan.reason, speed, plan.acceleration, plan.braking, *held)
+
+
+def _messages(frame: Frame) -> Iterator[Row]:
+    for event in frame.links:
+        radio = (event.path_loss_db, event.snr_db, event.los, ", ".join(event.blockers))
+        outcome = (event.outcome, event.arrives, event.reason, event.size)
+        yield (event.sent, event.sender, event.receiver, event.number, *outcome, *radio)
+
+
+def _transitions(frame: Frame) -> Iterator[Row]:
+    for change in frame.changes:
+        transition = None if change.transition is None else change.transition.value
+        yield (change.time, change.kind, change.path, transition, change.after.value, change.why)
+
+
+def _verdicts(run: RecordedRun) -> Iterator[Row]:
+    outcome = recorded_outcome(run.recording)
+    if outcome is None:
+        run.warnings.append("the recording contains no verdicts: the run did not end, or an older version recorded it")
+        return
+    for one in outcome.criteria:
+        yield (one.name, one.passed, one.value, one.limit, one.unit, one.first_violation, one.reason)
+
+
+_TIME = _floats("time")
+_BOX = _floats("x", "y", "z", "length", "width", "height", "yaw")
+TABLES: Mapping[str, Table] = {
+    "actors": Table(
+        {
+            **_TIME,
+            "name": str,
+            **_floats("x", "y", "z", "h", "p", "r", "speed"),
+            "category": str,
+            **_floats("vx", "vy", "vz", "ax", "ay", "az", "yaw_rate", "length", "width", "height"),
+            "tick": int,
+        },
+        _of_frames(_actors),
+    ),
+    "objects": Table(
+        {
+            **_TIME,
+            **dict.fromkeys(("station", "list", "class"), str),
+            **_BOX,
+            **_floats("score", "existence", "vx", "vy"),
+            "track": int,
+        },
+        _of_frames(_objects),
+    ),
+    "plans": Table(
+        {
+            **_TIME,
+            **dict.fromkeys(("station", "reason"), str),
+            **_floats("speed", "acceleration", "braking", "throttle", "brake", "steering"),
+        },
+        _of_frames(_plans),
+    ),
+    "messages": Table(
+        {
+            **_floats("sent"),
+            **dict.fromkeys(("sender", "receiver"), str),
+            "number": int,
+            "outcome": str,
+            **_floats("arrives"),
+            "reason": str,
+            "size": int,
+            **_floats("path_loss_db", "snr_db"),
+            **dict.fromkeys(("los", "blockers"), str),
+        },
+        _of_frames(_messages),
+    ),
+    "transitions": Table(
+        {**_TIME, **dict.fromkeys(("kind", "path", "transition", "state", "reason"), str)}, _of_frames(_transitions)
+    ),
+    "verdicts": Table(
+        {
+            "name": str,
+            "passed": bool,
+            **_floats("value", "limit"),
+            "unit": str,
+            **_floats("first_violation"),
+            "reason": str,
+        },
+        _verdicts,
+    ),
+}
+"""Tables by name."""
