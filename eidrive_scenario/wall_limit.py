@@ -16,8 +16,8 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from numbers import Real
 from types import FrameType, TracebackType
@@ -27,6 +27,8 @@ from eidrive_scenario.errors import Diagnostic, SettingError, WallLimitError, qu
 
 REPEAT = 1.0
 """Time from one interruption to the next [s]."""
+POSTPONEMENT = 0.01
+"""Time to the next interruption if one cannot be raised [s]."""
 GRACE = 3.0
 """Time from the first interruption to the last resort [s]."""
 _SIGNAL: int | None = getattr(signal, "SIGUSR2", None)
@@ -90,29 +92,16 @@ def set_last_resort(resort: LastResort | None) -> LastResort | None:
     return before
 
 
-@contextmanager
-def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
-    """Limit the wall time of the block [s]. None sets no limit, and an outer limit of the thread stays in force.
+def limit_wall_time(seconds: float | None) -> AbstractContextManager[Limit | None]:
+    """Return a context manager that limits the wall time of its block [s].
 
-    Raise WallLimitError when the limit is reached, and SettingError for a limit that is not positive. Outside of the
-    main thread, a waiting system call is not interrupted before it returns.
+    None sets no limit, and an outer limit of the thread stays in force. Raise SettingError for a limit that is not
+    positive; the block raises WallLimitError when the limit is reached. Outside of the main thread, a waiting system
+    call is not interrupted before it returns.
     """
     if seconds is not None and not _is_positive(seconds):
         raise SettingError(Diagnostic(f"wall_limit is {quoted(seconds)}", "give a positive number of seconds"))
-    if seconds is None or current_limit() is not None:
-        yield current_limit()
-        return
-    limit = _of_thread.limit = Limit(seconds)
-    limit.publish()
-    watchdog = _Watchdog(limit)
-    try:
-        with watchdog:
-            yield limit
-    except LimitReached as error:
-        raise WallLimitError(seconds, where=running_line(error.__traceback__)) from error
-    finally:
-        _of_thread.limit = None
-        limit.end()
+    return _LimitedBlock(seconds)
 
 
 def _is_positive(seconds: object) -> bool:
@@ -132,45 +121,100 @@ def running_line(trace: TracebackType | None) -> str:
     return f"{frames[-1].filename}:{frames[-1].lineno} in {frames[-1].name}" if frames else ""
 
 
+class _LimitedBlock:
+    """Context manager of a limit; it sets none within the block of another limit of its thread.
+
+    No interruption is raised in its own methods: a context manager that fails while it is left would stay in force.
+    """
+
+    def __init__(self, seconds: float | None) -> None:
+        self._seconds = seconds
+        self._watchdog: _Watchdog | None = None
+
+    def __enter__(self) -> Limit | None:
+        if self._seconds is None or current_limit() is not None:
+            return current_limit()
+        limit = Limit(self._seconds)
+        limit.publish()
+        self._watchdog = _Watchdog(limit)
+        _of_thread.limit = limit
+        self._watchdog.start()
+        return limit
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        watchdog = self._watchdog
+        if watchdog is None:
+            return
+        try:
+            watchdog.stop()
+        except LimitReached:  # of a thread other than the main thread: after the block, hence of no importance
+            watchdog.stop()
+        self._watchdog = _of_thread.limit = None
+        watchdog.limit.end()
+        if isinstance(error, LimitReached):
+            raise WallLimitError(watchdog.limit.seconds, where=running_line(error.__traceback__)) from error
+
+
+def _is_entered_or_left(frame: FrameType | None) -> bool:
+    """Whether a frame belongs to the beginning or the end of a limited block."""
+    while frame is not None:
+        if frame.f_code in _BOUNDARIES:
+            return True
+        frame = frame.f_back
+    return False
+
+
+_BOUNDARIES = frozenset({_LimitedBlock.__enter__.__code__, _LimitedBlock.__exit__.__code__})
+
+
 class _Watchdog:
-    """Context manager that interrupts its thread from the limit on."""
+    """Thread that interrupts the thread of its creation from the limit on."""
 
     def __init__(self, limit: Limit) -> None:
-        self._limit = limit
+        self.limit = limit
         self._target = threading.get_ident()
         self._by_signal = _SIGNAL is not None and threading.current_thread() is threading.main_thread()
         self._before: Callable[[int, FrameType | None], object] | int | None = None
+        self._is_postponed = False
+        """Whether the last interruption fell into the beginning or the end of the block."""
         self._ended = threading.Event()
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._watch, name="eidrive wall limit", daemon=True)
 
-    def __enter__(self) -> None:
+    def start(self) -> None:
+        """Watch the run from now on."""
         if self._by_signal and _SIGNAL is not None:
             self._before = signal.signal(_SIGNAL, self._interrupted)
         if _last_resort is not None and _last_resort.dump is not None:
-            deadline = self._limit.seconds + 2.0 * GRACE
+            deadline = self.limit.seconds + 2.0 * GRACE
             faulthandler.dump_traceback_later(deadline, exit=True, file=_last_resort.dump)
         self._thread.start()
 
-    def __exit__(self, *_: object) -> None:
-        self._limit.armed = False
+    def stop(self) -> None:
+        """Interrupt the run no more. A second call has no effect.
+
+        An interruption that is pending in a thread is raised here: to withdraw it by PyThreadState_SetAsyncExc would
+        make the interpreter check for it forever.
+        """
+        self.limit.armed = False
         with self._lock:
             self._ended.set()
         self._thread.join(REPEAT)
-        if not self._by_signal:
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._target), None)
         if _last_resort is not None and _last_resort.dump is not None:
             faulthandler.cancel_dump_traceback_later()
         if self._by_signal and _SIGNAL is not None:
             signal.signal(_SIGNAL, signal.SIG_DFL if self._before is None else self._before)
 
     def _watch(self) -> None:
-        if self._ended.wait(self._limit.seconds):
+        if self._ended.wait(self.limit.seconds):
             return
         last = time.monotonic() + GRACE
         while not self._ended.is_set():
+            self._is_postponed = False
             self._interrupt()
-            if self._ended.wait(min(REPEAT, max(last - time.monotonic(), 0.01))):
+            if self._ended.wait(POSTPONEMENT):
+                return
+            if not self._is_postponed and self._ended.wait(min(REPEAT, max(last - time.monotonic(), 0.01))):
                 return
             if time.monotonic() >= last:
                 self._resort()
@@ -178,17 +222,23 @@ class _Watchdog:
 
     def _interrupt(self) -> None:
         with self._lock:
-            if self._ended.is_set() or not self._limit.armed:
+            if self._ended.is_set() or not self.limit.armed:
                 return
             if self._by_signal and _SIGNAL is not None:
                 signal.pthread_kill(self._target, _SIGNAL)
+            elif _is_entered_or_left(sys._current_frames().get(self._target)):
+                self._is_postponed = True
             else:
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._target), ctypes.py_object(LimitReached))
 
     def _interrupted(self, number: int, frame: FrameType | None) -> None:
-        if self._limit.armed:
+        if not self.limit.armed:
+            return
+        if _is_entered_or_left(frame):
+            self._is_postponed = True
+        else:
             raise LimitReached
 
     def _resort(self) -> None:
         if _last_resort is not None:
-            _last_resort.end(self._limit, sys._current_frames().get(self._target))
+            _last_resort.end(self.limit, sys._current_frames().get(self._target))

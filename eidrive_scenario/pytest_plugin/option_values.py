@@ -7,11 +7,12 @@ from typing import Any
 
 NO_LIMIT = "none"
 """Value of the wall limit for no limit."""
+_MOST_DIGITS = 18
 
 
 def parse_count(text: str) -> int:
     """Return a positive integer. Raise ArgumentTypeError for another text."""
-    if not text.isdecimal() or int(text) < 1:
+    if not text.isdecimal() or len(text) > _MOST_DIGITS or int(text) < 1:
         raise ArgumentTypeError(f"not a positive integer (got {text!r})")
     return int(text)
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import pytest
 from faulty_extensions import line_of, write_scenario
 
 import eidrive_scenario
+from eidrive_scenario import wall_limit
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import read_recording
@@ -21,6 +26,11 @@ from eidrive_scenario.wall_limit import current_limit, limit_wall_time
 pytestmark = pytest.mark.timeout(600)
 LONG = 3600.0
 """A limit that no run here reaches [s]."""
+
+
+def watchdogs() -> list[threading.Thread]:
+    """Return the running threads of limits."""
+    return [thread for thread in threading.enumerate() if thread.name == "eidrive wall limit" and thread.is_alive()]
 
 
 def hung(tmp_path: Path, detector: str) -> WallLimitError:
@@ -83,7 +93,7 @@ def test_limit_that_is_not_reached_changes_nothing(package: Path, tmp_path: Path
     assert limited.settings == free.settings
     assert signal.getsignal(signal.SIGUSR2) is before
     assert current_limit() is None
-    assert not [thread for thread in threading.enumerate() if thread.name == "eidrive wall limit" and thread.is_alive()]
+    assert not watchdogs()
 
 
 def test_limit_of_block_without_run_names_the_line(tmp_path: Path) -> None:
@@ -95,6 +105,58 @@ def test_outer_limit_stays_within_an_inner_one(tmp_path: Path) -> None:
     with limit_wall_time(LONG) as outer, limit_wall_time(0.001) as inner:
         assert inner is outer
         time.sleep(0.05)
+
+
+def test_interruption_while_a_block_ends_leaves_no_limit() -> None:
+    """The handler is called at each call and line of the code that ends the block, in one repetition each.
+
+    A signal within a trace function would stop the interpreter: its check for signals is repeated forever.
+    """
+    before = signal.getsignal(signal.SIGUSR2)
+    seen = event = 0
+
+    def trace(frame: FrameType, kind: str, argument: object) -> Any:
+        nonlocal seen
+        if frame.f_code.co_filename == wall_limit.__file__ and frame.f_code.co_name in ("__exit__", "stop"):
+            handler = signal.getsignal(signal.SIGUSR2)
+            if seen == event and handler is not before:
+                assert callable(handler)
+                handler(signal.SIGUSR2, frame)
+            seen += 1
+        return trace
+
+    usual = sys.gettrace()
+    for event in range(100):
+        seen = 0
+        try:
+            with suppress(WallLimitError), limit_wall_time(LONG):
+                sys.settrace(trace)
+        finally:
+            sys.settrace(usual)
+        assert current_limit() is None, f"event {event}"
+        assert signal.getsignal(signal.SIGUSR2) is before, f"event {event}"
+        assert not watchdogs(), f"event {event}"
+        if seen <= event:
+            break
+    assert 8 < event < 99
+
+
+def test_limits_that_end_with_their_blocks_leave_none() -> None:
+    """The limit is reached about when the block ends, in the main thread and in another one."""
+
+    def blocks(count: int) -> None:
+        for number in range(count):
+            with suppress(WallLimitError), limit_wall_time(0.01):
+                end = time.perf_counter() + 0.009 + 0.00002 * number
+                while time.perf_counter() < end:
+                    pass
+            assert current_limit() is None
+
+    blocks(100)
+    thread = threading.Thread(target=blocks, args=(100,))
+    thread.start()
+    thread.join()
+    assert not watchdogs()
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf"), "60", True])

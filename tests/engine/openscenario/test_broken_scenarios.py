@@ -1,9 +1,9 @@
 """Invalid files of tests/data/broken: each is rejected with line, message and hint."""
 
-import time
 from pathlib import Path
 
 import pytest
+from processor_time import work_within
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
@@ -63,7 +63,5 @@ def test_broken_file_error_has_line_and_message(name: str, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("name", ["xml_bomb", "external_entity"])
 def test_dangerous_files_are_rejected_immediately(name: str) -> None:
-    started = time.process_time()
-    with pytest.raises(ScenarioError):
+    with work_within(1), pytest.raises(ScenarioError):
         load_scenario(BROKEN / f"{name}.xosc")
-    assert time.process_time() - started < 0.5

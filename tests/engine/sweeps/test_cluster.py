@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,7 +56,5 @@ def test_sweep_on_cluster_equals_local_one_with_killed_worker(cluster: object, s
 
 def test_connect_without_scheduler_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("eidrive_scenario.experiments.sweeps.cluster.START", 0.5)
-    start = time.monotonic()
     with pytest.raises(SimulationError, match="no worker"):
         DaskWorkers.connect("tcp://127.0.0.1:9", None)
-    assert time.monotonic() - start < 60.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from itertools import groupby, pairwise
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 import pytest
+from processor_time import work_within
 from pydantic import TypeAdapter, ValidationError
 from radio_traffic import composed
 
@@ -68,9 +68,8 @@ def test_burst_loss_of_a_late_receiver_equals_that_of_an_early_one() -> None:
     for number in (4095, 4096, 4200, 9990, 9999):
         assert (late.send(message(number), ["Ego"], number * DT)[0].outcome == "delivered") == early[number]
     far = composed(6, loss=burst(0.3, 4))
-    begun = process_time()
-    far.send(message(10**9), ["Ego"], 1e8)
-    assert process_time() - begun < 1.0
+    with work_within(2):
+        far.send(message(10**9), ["Ego"], 1e8)
 
 
 def test_messages_delivered_with_more_bursts_are_delivered_with_fewer() -> None:
