@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,6 +23,14 @@ from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.recording import Explanation
+
+
+class Keep(StrEnum):
+    """Values of --record."""
+
+    always = "always"
+    on_failure = "on-failure"
+    never = "never"
 
 
 def run(
@@ -95,6 +104,9 @@ def run(
         typer.Option(help="Folder of a subfolder per run: recording, result.json."),
     ] = None,
     no_record: Annotated[bool, rare("--no-record", help="Omit recording.mcap and camera images.")] = False,
+    record: Annotated[
+        Keep | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")
+    ] = None,
     csv: Annotated[Path | None, rare(help="File for one row per actor and tick.")] = None,
     log: Annotated[
         str | None,
@@ -134,6 +146,10 @@ def run(
     if json and log == STANDARD_OUTPUT:
         raise SettingError(Diagnostic("--log - and --json both write to standard output", "give a file to --log"))
 
+    if no_record and record not in (None, Keep.never):
+        message = f"--no-record and --record {record} contradict each other"
+        raise SettingError(Diagnostic(message, "remove one of them"))
+    kept = Keep.never.value if no_record else (record or Keep.always).value
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
     for option, seconds in (("--dt", dt), ("--time-limit", time_limit), ("--wall-limit", wall_limit)):
         if seconds is not None:
@@ -182,7 +198,7 @@ def run(
                     seed=each,
                     settings=settings,
                     below=out,
-                    record=not no_record,
+                    record=kept,
                     csv=_with_suffixes(csv, suffixes) if csv is not None else None,
                     log=_with_suffixes(Path(log), suffixes) if log is not None and log != STANDARD_OUTPUT else log,
                     explanations=explanations,

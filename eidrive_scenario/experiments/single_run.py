@@ -7,10 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.commands import command_of
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.files.atomic import atomic_output, exclusive
@@ -30,6 +31,25 @@ if TYPE_CHECKING:
     from eidrive_scenario.recording import Explanation
 
 
+class RecordMode(StrEnum):
+    """Runs whose recording and camera images are kept."""
+
+    ALWAYS = "always"
+    ON_FAILURE = "on-failure"
+    NEVER = "never"
+
+
+def record_mode(value: bool | str) -> RecordMode:
+    """Return the mode of a setting; True for always, False for never. Raise SettingError for another value."""
+    if isinstance(value, bool):
+        return RecordMode.ALWAYS if value else RecordMode.NEVER
+    try:
+        return RecordMode(value)
+    except ValueError:
+        known = ", ".join(mode.value for mode in RecordMode)
+        raise SettingError(Diagnostic(f"record is {value!r}", f"give one of {known}")) from None
+
+
 def run_and_save(
     source: Scenario | Source | ConcreteRun,
     *,
@@ -37,7 +57,7 @@ def run_and_save(
     settings: RunSettings | None = None,
     out: str | Path | None = None,
     below: str | Path | None = None,
-    record: bool = True,
+    record: bool | str = True,
     csv: str | Path | None = None,
     log: str | Path | None = None,
     explanations: Sequence[Explanation] = (),
@@ -46,8 +66,10 @@ def run_and_save(
 ) -> RunResult:
     """Run a scenario, given as any source of load_scenario, or one run of a parameter value distribution.
 
-    out           folder of `result.json` and, unless `record` is False, of `recording.mcap` and `images`
+    out           folder of `result.json` and, by `record`, of `recording.mcap` and `images`
     below         parent of such a folder, whose name contains the hash of all settings; see `run_folder`
+    record        `always` (True), `never` (False), or `on-failure`: a run that passes keeps no recording and no
+                  images
     csv           file for one row per actor and tick
     log           file for one line per storyboard transition with its reason; `-` is standard output
     explanations  explanations that observe the run
@@ -62,6 +84,7 @@ def run_and_save(
     """
     settings = settings or RunSettings()
     seed = checked_seed(seed)
+    kept = record_mode(record)
     command = _command(source, seed, settings) or command
     recording: Path | None = None
     simulation: Simulation | None = None
@@ -88,13 +111,13 @@ def run_and_save(
                 from eidrive_scenario.recording import CsvWriter
 
                 simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(Path(csv)))))
-            if folder is not None and record:
+            if folder is not None and kept is not RecordMode.NEVER:
                 recording = folder.recording
                 if limit is not None:
                     limit.add_note(f"recording: {recording}")
                 _record(simulation, folder, source, settings, command)
             result = replace(simulation.run(), command=command)
-            return result if folder is None else _keep(result, folder, record)
+            return result if folder is None else _keep(result, folder, kept)
     except InputError:
         raise
     except BaseException as error:
@@ -155,15 +178,18 @@ def _text(source: Scenario | Source | ConcreteRun) -> bytes:
     return text_of(resolve_scenario(source) if isinstance(source, str | Path) else source)
 
 
-def _keep(result: RunResult, folder: RunFolder, record: bool) -> RunResult:
-    """Write the result and rename the partial files of the run."""
+def _keep(result: RunResult, folder: RunFolder, record: RecordMode) -> RunResult:
+    """Write the result and rename the partial files of the run, or remove those that are not to be kept."""
     earlier = folder.earlier_trace()
+    is_kept = record is RecordMode.ALWAYS or (record is RecordMode.ON_FAILURE and not result.passed)
+    if not is_kept:
+        folder.prepare()
     folder.commit(as_json_text(result, indent=2).encode() + b"\n")
     warnings = result.warnings
     if earlier not in (None, result.trace_hash):
         cause = f"an earlier run with equal settings had another trace hash ({earlier})"
         warnings = (*warnings, f"{folder.path}: the former result is replaced: {cause}")
-    recording = folder.path / RECORDING if record else None
+    recording = folder.path / RECORDING if is_kept else None
     return replace(result, warnings=warnings, folder=folder.path, recording=recording)
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 NO_LIMIT = "none"
 """Value of the wall limit for no limit."""
+RECORD = ("always", "on-failure", "never")
+"""Runs whose recording is kept."""
 _MOST_DIGITS = 18
 
 
@@ -44,6 +46,13 @@ def parse_listed_channels(text: str) -> str:
     """Return a text that lists at least one channel. Raise ArgumentTypeError for another text."""
     if not split_channels(text):
         raise ArgumentTypeError(f"no channel is listed (got {text!r})")
+    return text
+
+
+def parse_record(text: str) -> str:
+    """Return the runs whose recording is kept. Raise ArgumentTypeError for an unknown text."""
+    if text not in RECORD:
+        raise ArgumentTypeError(f"not one of {', '.join(RECORD)} (got {text!r})")
     return text
 
 

@@ -18,12 +18,24 @@ from eidrive_scenario.pytest_plugin.option_values import (
     parse_given,
     parse_listed_channels,
     parse_rate,
+    parse_record,
     parse_seconds,
     parse_seconds_or_none,
 )
 
 _DEFAULT_MAX_RUNS = 100
-_SHOWN = ("channel", "drive", "criterion", "detector", "planner", "seeds", "success_rate", "time_limit", "out")
+_SHOWN = (
+    "channel",
+    "drive",
+    "criterion",
+    "detector",
+    "planner",
+    "seeds",
+    "success_rate",
+    "time_limit",
+    "out",
+    "record",
+)
 """Options that the header of a report lists."""
 _COMBINED = ("drive", "criterion")
 """Options whose values are added to those of the ini file."""
@@ -98,6 +110,12 @@ OPTIONS = (
         parse_count_or_all,
     ),
     Option("out", "DIR", "keep recording.mcap and result.json of every run below DIR"),
+    Option(
+        "record",
+        "always|on-failure|never",
+        "runs whose recording and camera images --eidrive-out keeps (default: always)",
+        parse_record,
+    ),
     Option(
         "time_limit", "SECONDS", "maximum simulated time of each run; an error if reached (default: 120)", parse_seconds
     ),

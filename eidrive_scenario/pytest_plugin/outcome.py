@@ -28,7 +28,7 @@ Properties = list[tuple[str, object]]
 
 WARNING = "warning"
 """Name of the properties with the warnings of a run."""
-_NOT_REPEATED = ("out", "max_runs")
+_NOT_REPEATED = ("out", "record", "max_runs")
 """Options that the command of a test omits, as they do not change its run."""
 
 
@@ -126,6 +126,7 @@ def _run_and_report(
         seed=variant.seed,
         settings=RunSettings(**settings),
         below=below,
+        record=option_value(config, "record") or True,
         wall_limit=wall_limit,
         command=command,
     )

@@ -88,6 +88,38 @@ def test_no_record_option_writes_result_folder_per_seed(eidrive: Eidrive, passin
     assert len(files) == 4
 
 
+@pytest.mark.parametrize(
+    ("options", "kept"),
+    [
+        (("--record", "on-failure"), {"near"}),
+        (("--record", "always"), {"far", "near"}),
+        (("--record", "never"), set()),
+        (("--no-record",), set()),
+    ],
+)
+def test_record_option_selects_runs_whose_recording_is_kept(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, options: tuple[str, ...], kept: set[str]
+) -> None:
+    for name, other_y in (("far", "5"), ("near", "0")):
+        eidrive("run", passing_by, "--out", tmp_path / name, "--param", f"OtherY={other_y}", *options)
+    assert {path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*.mcap")} == kept
+    assert len(list(tmp_path.rglob("result.json"))) == 2
+
+
+def test_record_on_failure_removes_recording_of_earlier_run(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    assert len(list(tmp_path.rglob("*.mcap"))) == 1
+    result = eidrive("run", passing_by, "--out", tmp_path, "--record", "on-failure")
+    assert result.exit_code == 0
+    assert list(tmp_path.rglob("*.mcap")) == []
+
+
+def test_contradicting_record_options_are_invalid_input(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by, "--no-record", "--record", "on-failure")
+    assert result.exit_code == 2
+    assert "--no-record and --record on-failure contradict each other" in result.stderr
+
+
 def test_csv_option_writes_motion_of_all_actors(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--csv", tmp_path / "motion.csv", "--dt", "0.1")
     with (tmp_path / "motion.csv").open(encoding="utf-8", newline="") as stream:

@@ -31,6 +31,11 @@ def test_evaluate_criteria_of_recording_equals_verdicts_of_run(tmp_path: Path, o
     assert recording.frame_count == round(result.simulated_s / 0.05) + 1
 
 
+def test_unknown_record_mode_raises_setting_error(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="record is 'failed'; give one of always, on-failure, never"):
+        run_and_save(PASSING_BY, out=tmp_path, record="failed")
+
+
 def test_recording_metadata_contain_given_settings(tmp_path: Path) -> None:
     settings = RunSettings(parameters={"OtherY": "7"}, cooperate=(), channel="none")
     run_and_save(PASSING_BY, seed=4, settings=settings, out=tmp_path)

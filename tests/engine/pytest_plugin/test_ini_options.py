@@ -33,7 +33,7 @@ def test_every_option_is_in_one_help_group_with_ini_option(pytester: pytest.Pyte
     lines = pytester.runpytest_inprocess("--help").outlines
     begin = lines.index("OpenSCENARIO files:")
     group = " ".join(" ".join(lines[begin : lines.index("", begin)]).split())
-    assert len(OPTIONS) == 11
+    assert len(OPTIONS) == 12
     for option in OPTIONS:
         assert f"{option.flag}=" in group
         assert f"ini option: {option.key}" in group
@@ -107,6 +107,7 @@ def test_ini_options_configure_runs(project: pytest.Pytester) -> None:
         ("planner", "rout", "unknown planner 'rout'*did you mean 'route'?"),
         ("drive", "=stack", "no entity or stack is given (got '=stack')"),
         ("criterion", "{", "*not valid YAML*"),
+        ("record", "failed", "not one of always, on-failure, never (got 'failed')"),
     ],
 )
 def test_invalid_ini_value_is_usage_error(project: pytest.Pytester, name: str, value: str, message: str) -> None:

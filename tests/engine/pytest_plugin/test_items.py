@@ -73,6 +73,17 @@ def test_out_option_writes_folder_per_run(project: pytest.Pytester) -> None:
     assert json.loads((project.path / kept[1]).read_text())["passed"] is True
 
 
+def test_record_option_keeps_recordings_of_failed_runs(project: pytest.Pytester) -> None:
+    arguments = ("xosc/far.xosc", "xosc/near.xosc", "--eidrive-out", "runs", "--eidrive-record", "on-failure")
+    project.runpytest_subprocess(*arguments, "-p", "no:cacheprovider").assert_outcomes(passed=1, failed=1)
+    kept = [path.relative_to(project.path / "runs/xosc") for path in project.path.glob("runs/**/*.*")]
+    assert sorted((path.parts[0], path.name) for path in kept) == [
+        ("far", "result.json"),
+        ("near", "recording.mcap"),
+        ("near", "result.json"),
+    ]
+
+
 def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> None:
     def hashes(*arguments: str) -> dict[str, str]:
         project.runpytest_subprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
