@@ -72,18 +72,20 @@ def _encode_float(value: float) -> Json:
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
-def _array(dtype: np.dtype[Any]) -> Codec:
-    def encode(array: Any) -> Json:
-        if array.size == 0:
-            return {"shape": list(array.shape)}
-        nested = array.tolist()
-        return nested if dtype.kind != "f" or math.isfinite(np.vdot(array, array)) else _spell(nested)
+def encode_array(array: Any) -> Json:
+    """Return an array as nested lists with spelled non-finite numbers, or the shape of an empty array."""
+    if array.size == 0:
+        return {"shape": list(array.shape)}
+    nested = array.tolist()
+    return nested if array.dtype.kind != "f" or math.isfinite(np.vdot(array, array)) else _spell(nested)
 
+
+def _array(dtype: np.dtype[Any]) -> Codec:
     def decode(data: Json) -> Any:
         return _empty(data["shape"], dtype) if isinstance(data, dict) else np.array(data, dtype)
 
     empty = {"type": "object", "properties": {"shape": {"type": "array", "items": {"type": "integer"}}}}
-    return Codec(encode, decode, {"anyOf": [{"type": "array"}, empty]})
+    return Codec(encode_array, decode, {"anyOf": [{"type": "array"}, empty]})
 
 
 def _empty(shape: Json, dtype: np.dtype[Any]) -> Any:

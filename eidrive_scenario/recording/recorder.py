@@ -10,6 +10,7 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.json_text import JsonText
 from eidrive_scenario.recording.seal import NAME as SEAL
 from eidrive_scenario.recording.seal import Seal
 from eidrive_scenario.resolved_settings import package_versions
@@ -53,8 +54,8 @@ class Recorder:
         for name, data in (attachments or {}).items():
             self.attach(name, data)
         self._due = 0
-        self._codec = codec(Frame)
-        schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Frame", **self._codec.schema}
+        self._text = JsonText(Frame)
+        schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Frame", **codec(Frame).schema}
         schema_id = self._writer.register_schema("eidrive.Frame", "jsonschema", json.dumps(schema).encode())
         self._channel = self._writer.register_channel(TOPIC, "json", schema_id)
 
@@ -68,8 +69,7 @@ class Recorder:
     def observe(self, frame: Frame) -> None:
         """Append one frame. Raise SimulationError if the file is closed: each run needs its own recorder."""
         self._check_open()
-        text = json.dumps(self._codec.encode(frame), separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-        data, instant = text.encode(), round(frame.view.time * 1e9)
+        data, instant = self._text.encode(frame), round(frame.view.time * 1e9)
         self._writer.add_message(self._channel, instant, data, instant, sequence=frame.view.tick)
         self._seal.add_frame(frame.view.tick, instant, data)
         if instant >= self._due:

@@ -1,0 +1,116 @@
+"""JSON text of records in the encoding of `codec`, written by msgspec where it agrees with that encoding.
+
+msgspec writes non-finite numbers as null. Such numbers in arrays are spelled by a hook. A record with a non-finite
+number outside of arrays is encoded by the codec.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from functools import cache
+from math import isfinite
+from operator import attrgetter
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+import numpy as np
+from numpy import vdot
+
+from eidrive_scenario.recording.codec import codec, encode_array
+
+Check = Callable[[Any], bool]
+"""Function that returns whether all numbers of a value outside of arrays are finite."""
+
+
+class JsonText:
+    """Encoder of records of one type as JSON text in UTF-8. Raise TypeError for a type without an encoding."""
+
+    def __init__(self, kind: type) -> None:
+        self._codec = codec(kind)
+        self._is_finite = _check(kind)
+        self._encoder = msgspec.json.Encoder(enc_hook=_plain)
+
+    def encode(self, record: Any) -> bytes:
+        """Return the text, which `codec(kind).decode` reads after parsing."""
+        if self._is_finite is None or self._is_finite(record):
+            return self._encoder.encode(record)
+        return msgspec.json.encode(self._codec.encode(record))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of a type that msgspec does not know as one that it knows."""
+    if type(value) is np.ndarray:  # the frequent case, in line
+        if not value.size:
+            return {"shape": list(value.shape)}
+        return value.tolist() if value.dtype.kind != "f" or isfinite(vdot(value, value)) else encode_array(value)
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, Sequence):
+        return list(value)
+    raise TypeError(f"{type(value).__name__}: no JSON encoding is defined for this type")
+
+
+@cache
+def _check(kind: Any) -> Check | None:
+    """Return the check of a type; None if it contains no number outside of arrays."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind is float:
+        return isfinite
+    if origin in (Union, types.UnionType):
+        return _optional(next((found for one in arguments if (found := _check(one)) is not None), None))
+    if origin is frozenset:
+        raise TypeError(f"{kind!r}: the order of its members is undefined")
+    if origin is tuple and arguments[-1] is not Ellipsis:
+        checks = [_check(one) for one in arguments]
+        return None if not any(checks) else lambda values: _all(checks, values)
+    if origin in (tuple, Sequence):
+        return _several(_check(arguments[0]))
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        inner = _several(_check(arguments[1]))
+        return None if inner is None else lambda mapping: inner(mapping.values())
+    if isinstance(kind, type) and (is_dataclass(kind) or issubclass(kind, msgspec.Struct)):
+        return _record(kind)
+    return None
+
+
+def _optional(inner: Check | None) -> Check | None:
+    return None if inner is None else lambda value: value is None or inner(value)
+
+
+def _several(inner: Check | None) -> Check | None:
+    return None if inner is None else lambda values: all(map(inner, values))
+
+
+def _all(checks: Sequence[Check | None], values: Sequence[Any]) -> bool:
+    return all(check is None or check(value) for check, value in zip(checks, values, strict=True))
+
+
+def _record(kind: type) -> Check | None:
+    """Return the check of a record, which reads only the fields with numbers."""
+    hints = get_type_hints(kind)
+    names = msgspec.structs.fields(kind) if issubclass(kind, msgspec.Struct) else fields(kind)  # type: ignore[arg-type]
+    found = [(field.name, check) for field in names if (check := _check(hints[field.name])) is not None]
+    numbers = [name for name, check in found if check is isfinite]
+    others = [(attrgetter(name), check) for name, check in found if check is not isfinite]
+    if not found:
+        return None
+    several = attrgetter(*numbers) if len(numbers) > 1 else None
+    first = attrgetter(numbers[0]) if len(numbers) == 1 else None
+
+    def is_finite(record: Any) -> bool:
+        if several is not None:
+            # The sum of finite numbers is finite but for an overflow, which only costs time
+            if not isfinite(sum(several(record))):
+                return False
+        elif first is not None and not isfinite(first(record)):
+            return False
+        for field, check in others:  # noqa: SIM110 - faster than all()
+            if not check(field(record)):
+                return False
+        return True
+
+    return is_finite
