@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
+
+Part = TypeVar("Part")
 
 
 @dataclass
@@ -38,6 +41,21 @@ class RecordedRun:
         if not count:
             hint = "; ".join(self.warnings) or "record the run again"
             raise SettingError(Diagnostic("the recording contains no readable frame", hint, str(self.recording.path)))
+
+    def converted(self, frame: Frame, convert: Callable[[Frame], Iterable[Part]]) -> list[Part]:
+        """Return the parts of a file for a frame.
+
+        Inconsistent content of a damaged recording gives no part and a warning. Raise InputError for such content of
+        an undamaged recording.
+        """
+        try:
+            return list(convert(frame))
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            reason = f"frame {frame.view.tick} cannot be exported: {type(error).__name__}: {error}"[:300]
+            if not self.recording.damage:
+                raise InputError(Diagnostic(reason, "record the run again", str(self.recording.path))) from error
+            self._skip(reason)
+            return []
 
     def _skip(self, reason: str) -> None:
         if reason not in self.warnings:

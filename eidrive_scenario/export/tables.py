@@ -29,7 +29,7 @@ def _floats(*names: str) -> dict[str, type]:
 
 def _of_frames(rows: Callable[[Frame], Iterable[Row]]) -> Callable[[RecordedRun], Iterator[Row]]:
     """Return a function that yields the rows of all frames."""
-    return lambda run: (row for frame in run.frames() for row in rows(frame))
+    return lambda run: (row for frame in run.frames() for row in run.converted(frame, rows))
 
 
 def _actors(frame: Frame) -> Iterator[Row]:

@@ -41,7 +41,7 @@ def _write(foxglove: Foxglove, run: RecordedRun, stream: BinaryIO, register: Any
     time = 0.0
     for frame in run.frames():
         time = frame.view.time
-        for entry in topics.of_frame(frame):
+        for entry in run.converted(frame, topics.of_frame):
             file.add(entry, time)
     for entry in topics.at_end():
         file.add(entry, time)

@@ -54,8 +54,8 @@ def write_osi(run: RecordedRun, path: Path) -> None:
 def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
     builder = GroundTruthBuilder(osi, run.roads, Identifiers())
     for frame in run.frames():
-        data = builder.build(frame).SerializeToString()
-        stream.write(struct.pack("<I", len(data)) + data)
+        for data in run.converted(frame, lambda one: [builder.build(one).SerializeToString()]):
+            stream.write(struct.pack("<I", len(data)) + data)
 
 
 def _write_multi_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
@@ -77,7 +77,7 @@ def _write_multi_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
     channels: dict[str, int] = {}
     traces = _Traces(osi, run)
     for frame in run.frames():
-        for topic, text, message in traces.messages(frame):
+        for topic, text, message in run.converted(frame, traces.messages):
             kind = type(message).DESCRIPTOR.full_name
             if kind not in schemas:
                 schemas[kind] = register_schema(writer, type(message))

@@ -292,3 +292,18 @@ def test_missing_library_raises_error_with_install_command(tmp_path: Path, monke
     monkeypatch.setitem(sys.modules, "foxglove_schemas_protobuf", None)
     with pytest.raises(SettingError, match=r"foxglove-schemas-protobuf is not installed; install it: pip install"):
         write_foxglove(run, tmp_path / "f.mcap")
+
+
+def test_inconsistent_frame_is_an_error_or_a_warning_of_damaged_recording(tmp_path: Path) -> None:
+    """The points of a plan have one dimension in the frame 1; the seal of the copy is cut off."""
+    plans = [Plan(np.zeros((2, 2)), np.zeros(2), "drive"), Plan(np.zeros(3), np.zeros(2), "drive")]
+    frames = [Frame(view({"A": {}}, tick), {"A": step(detected(0.0, []), plan=plans[tick == 1])}) for tick in range(15)]
+    run = write_run(tmp_path, frames)
+    with pytest.raises(InputError, match="frame 1 cannot be exported: IndexError"):
+        write_foxglove(run, tmp_path / "f.mcap")
+    data = (tmp_path / "made.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: data.rindex(b"sha256") - 100])
+    damaged = open_run(tmp_path / "cut.mcap")
+    write_foxglove(damaged, tmp_path / "f.mcap")
+    assert any("frame 1 cannot be exported" in warning for warning in damaged.warnings)
+    assert len(decoded(tmp_path / "f.mcap")[0]["/ground_truth"]) == damaged.recording.frame_count - 1 > 0
