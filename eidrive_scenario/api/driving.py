@@ -19,7 +19,8 @@ from eidrive_scenario.driving.stack import (
     StackInputs,
     StackSettings,
 )
-from eidrive_scenario.driving.step import AgentStep, Plan
+from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.step import AgentStep, Plan, StationPerception
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
@@ -43,6 +44,8 @@ __all__ = [
     "StackFactory",
     "StackInputs",
     "StackSettings",
+    "StationAction",
+    "StationPerception",
     "VehicleController",
     "ViewSector",
 ]

@@ -5,6 +5,7 @@ Stable: all names.
 
 from eidrive_scenario.checks.report import CheckReport
 from eidrive_scenario.checks.scenario_checks import check_scenario
+from eidrive_scenario.driving.station_action import StationAction
 from eidrive_scenario.exit_codes import ABORTED, FAILED, INVALID_INPUT, PASSED
 from eidrive_scenario.experiments.judgement import Judgement, judge_recording
 from eidrive_scenario.experiments.single_run import run_and_save
@@ -16,6 +17,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, read_recording
 from eidrive_scenario.recording.text.csv_writer import text_of_csv
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed, run_file
+from eidrive_scenario.simulation.tick_start import TickStart
 from eidrive_scenario.wall_limit import limit_wall_time
 
 __all__ = [
@@ -32,6 +34,8 @@ __all__ = [
     "RunResult",
     "RunSettings",
     "Simulation",
+    "StationAction",
+    "TickStart",
     "check_scenario",
     "judge_recording",
     "limit_wall_time",

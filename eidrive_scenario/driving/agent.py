@@ -19,7 +19,8 @@ from eidrive_scenario.driving.control.vehicle_controller import VehicleControlle
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.result_checks import check_control, check_followed, check_plan, is_valid_control
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.step import AgentStep, Plan
+from eidrive_scenario.driving.station_action import OWN_DECISIONS, StationAction
+from eidrive_scenario.driving.step import AgentStep, Plan, StationPerception
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
@@ -111,9 +112,25 @@ class Agent:
         message_interval: float = 0.0,
         own_perception: bool = False,
     ) -> AgentStep:
-        """Return the step of the station at `now` [s].
+        """Return the step of the station at `now` [s]; the arguments are those of `perceive`."""
+        return self.decide(
+            self.perceive(readings, inbox, now, goal, message_interval=message_interval, own_perception=own_perception)
+        )
+
+    def perceive(
+        self,
+        readings: Readings,
+        inbox: Sequence[ReceivedMessage],
+        now: float,
+        goal: Goal | None,
+        *,
+        message_interval: float = 0.0,
+        own_perception: bool = False,
+    ) -> StationPerception:
+        """Return what the station perceives at `now` [s]; `decide` completes its step.
 
         inbox             messages delivered since the last tick
+        goal              request of the scenario
         message_interval  minimum time between two messages under congestion control [s]
         own_perception    whether the channel carries the detections of a station back to itself; a receiving station
                           then uses its own detections only after that delay
@@ -135,28 +152,49 @@ class Agent:
         fused = self.fusion.fuse(list(self._reports.values()), now)
         if self._fusion_checked:
             check_detections(self.fusion, "fuse", fused)
+        obeys = self.planner is not None and self.settings.obey_signals
+        return StationPerception(
+            now,
+            ego,
+            state,
+            detections,
+            tuple(inbox),
+            fused,
+            goal,
+            self.perception.signals(readings) if obeys else (),
+            message_interval,
+        )
+
+    def decide(self, perceived: StationPerception, action: StationAction = OWN_DECISIONS) -> AgentStep:
+        """Return the step of the station from what it perceives in this tick.
+
+        action  decisions from outside, which replace those of planner, controller and message generator
+        """
+        ego, now, detections = perceived.ego, perceived.time, perceived.detections
         plan = None
         if self.planner is not None:
             if self.settings.obey_signals:
-                self.planner.observe_signals(self.perception.signals(readings))
+                self.planner.observe_signals(perceived.signals)
             if self._regions is not None:
                 self.planner.observe_regions(self._regions.newest(now))
-            plan = self.planner.plan(ego, fused, goal, now)
+            plan = self.planner.plan(ego, perceived.fused, action.requested_goal(perceived.goal), now)
             if self._planner_checked:
                 check_plan(self.planner, plan)
         return AgentStep(
             detections=detections,
-            inbox=tuple(inbox),
-            fused=fused,
+            inbox=perceived.inbox,
+            fused=perceived.fused,
             plan=plan,
-            control=self._control(ego, plan),
+            control=self._control(ego, plan) if action.control is None else action.control,
             outbox=self._message_generator.generate(
-                state,
-                detections,
+                perceived.state,
+                action.shared(detections),
                 now,
                 self.points.own if self.points is not None else None,
-                interval=message_interval,
-            ),
+                interval=perceived.message_interval,
+            )
+            if action.send
+            else (),
             estimate=None if self.perception.has_exact_pose else ego,
         )
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import msgspec
 
-from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.step import AgentStep, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import Scope
@@ -55,10 +56,12 @@ class StackInputs(msgspec.Struct, frozen=True):
 
     goals    requests to driven vehicles, by name; a vehicle without an entry uses its own settings
     signals  states of the traffic signals, by id
+    actions  decisions from outside, by station
     """
 
     goals: Mapping[str, Goal] = msgspec.field(default_factory=dict)
     signals: Mapping[str, str] = msgspec.field(default_factory=dict)
+    actions: Mapping[str, StationAction] = msgspec.field(default_factory=dict)
 
 
 class StackSettings(msgspec.Struct, frozen=True):
@@ -98,6 +101,13 @@ class DrivingStack(ABC):
     @abstractmethod
     def drivers(self) -> frozenset[str]:
         """Present actors that the stack drives while their controller is active."""
+
+    def perceive(self, world: World, view: WorldView, inputs: StackInputs) -> Mapping[str, StationPerception]:
+        """Return what each present station perceives at the time of the view, by name, before it acts.
+
+        It may be called before `act` with the same view, and must not change what `act` returns.
+        """
+        return {}
 
     @abstractmethod
     def act(self, world: World, view: WorldView, inputs: StackInputs) -> Mapping[str, AgentStep]:
@@ -144,6 +154,11 @@ class DrivingStack(ABC):
     @property
     def possible_drivers(self) -> Collection[str]:
         """Entities that the stack drives once they are present and their controller is active."""
+        return ()
+
+    @property
+    def controllable(self) -> Collection[str]:
+        """Stations of the scenario, present or not, that accept actions from outside."""
         return ()
 
     @property

@@ -18,6 +18,7 @@ from eidrive_scenario.driving.planning.area_checks import areas_off_road
 from eidrive_scenario.driving.resolved_stations import resolved_stations
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackInputs, StackSettings
+from eidrive_scenario.driving.station_action import OWN_DECISIONS
 from eidrive_scenario.driving.station_declarations import (
     declared_detectors,
     declared_encoders,
@@ -25,7 +26,8 @@ from eidrive_scenario.driving.station_declarations import (
     possible_drivers,
     without_speed,
 )
-from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.driving.station_readings import read_stations
+from eidrive_scenario.driving.step import AgentStep, StationPerception
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError
 from eidrive_scenario.library import library_path
@@ -34,7 +36,7 @@ from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.requests import Overrides
 from eidrive_scenario.sensing.readings import Readings
-from eidrive_scenario.sensing.rig import Rig, read_all
+from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.channel_checks import check_delivered, check_events, check_interval, check_statistics
@@ -42,7 +44,7 @@ from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents
-from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics, message_counts
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
@@ -66,6 +68,8 @@ class Stations(DrivingStack):
         self._channel_name = NO_COOPERATION
         self._channel_profile: ChannelProfile | None = None
         self._readings: Mapping[str, Readings] = {}
+        self._perceived_view: WorldView | None = None
+        self._perceived: Mapping[str, StationPerception] = {}
         self._min_existence: dict[str, float] = {}
         self._agents: dict[str, Agent] = {}
         self._rigs: dict[str, Rig] = {}
@@ -103,6 +107,10 @@ class Stations(DrivingStack):
     @property
     def possible_drivers(self) -> Collection[str]:
         return possible_drivers(self._context.scenario, self._settings)
+
+    @property
+    def controllable(self) -> Collection[str]:
+        return self._settings.keys()
 
     @property
     def undirected(self) -> Collection[str]:
@@ -177,19 +185,24 @@ class Stations(DrivingStack):
         self._set_channel(profile, origin=source, line=line, scope=scope)
         return short_channel_delay(self._channel_profile, self._context.dt, source, line)
 
-    def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:
-        """Read all sensors, deliver messages, and let every agent act."""
+    def perceive(self, world: World, view: WorldView, inputs: StackInputs) -> Mapping[str, StationPerception]:
+        """Read all sensors, deliver messages, and let every agent perceive: once for each view."""
+        if view is not self._perceived_view:
+            self._perceived_view, self._perceived = view, self._perceive(world, view, inputs)
+        return self._perceived
+
+    def _perceive(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, StationPerception]:
         self._readings = {}
         if not self._agents:
             return {}
         if self._channel is not None:
             self._statistics = None
             self._channel.update_environment(self._radio_environment(world, view))
-        self._readings = readings = self._read(world, view, inputs.signals)
+        self._readings = readings = read_stations(self._rigs, self._signal_sensors, world, view, inputs.signals)
         now, own_perception = view.time, self._own_perception
         intervals = {name: self._min_message_interval(name) for name in self._agents}
         return {
-            name: agent.act(
+            name: agent.perceive(
                 readings[name],
                 self._deliver(name, now),
                 now,
@@ -197,6 +210,14 @@ class Stations(DrivingStack):
                 message_interval=intervals[name],
                 own_perception=own_perception,
             )
+            for name, agent in self._agents.items()
+        }
+
+    def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:
+        """Let every agent act on what it perceives, with the actions from outside."""
+        perceived, actions = self.perceive(world, view, inputs), inputs.actions
+        return {
+            name: agent.decide(perceived[name], actions.get(name, OWN_DECISIONS))
             for name, agent in self._agents.items()
         }
 
@@ -238,13 +259,7 @@ class Stations(DrivingStack):
         """Return the counts of messages over all links."""
         if self._channel is None and self._retired_channel is None:
             return {}
-        links = self.link_statistics(now).values()
-        return {
-            "messages.sent": sum(link.sent for link in links),
-            "messages.received": sum(link.received for link in links),
-            "messages.lost": sum(link.lost for link in links),
-            "messages.bytes": sum(link.bytes_sent for link in links),
-        }
+        return message_counts(self.link_statistics(now).values())
 
     def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         channel = self._channel or self._retired_channel
@@ -255,17 +270,6 @@ class Stations(DrivingStack):
             if not is_built_in(type(channel)):
                 check_statistics(channel, self._statistics[1])
         return self._statistics[1]
-
-    def _read(self, world: World, view: WorldView, signals: Mapping[str, str]) -> dict[str, Readings]:
-        readings = read_all(list(self._rigs.values()), world, view)
-        for name, reading in readings.items():
-            attached = [view.row(other) for other in world.attached(name)]
-            if attached:
-                readings[name] = replace(reading, attached=view.boxes[attached])
-        for name, sensor in self._signal_sensors.items():
-            visible = sensor.read(world, view, view.row(name), signals)
-            readings[name] = replace(readings[name], signals=visible)
-        return readings
 
     def _radio_environment(self, world: World, view: WorldView) -> RadioEnvironment:
         antennas = {

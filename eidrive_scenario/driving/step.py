@@ -1,13 +1,16 @@
-"""Trajectory of a planner, and the step of an agent in one tick."""
+"""Trajectory of a planner; perception and step of an agent in one tick."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import msgspec
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.sensing.readings import EgoState
-from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage
+from eidrive_scenario.requests import Goal
+from eidrive_scenario.sensing.readings import EgoState, SignalReading
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import Control
 
 
@@ -23,6 +26,31 @@ class Plan(msgspec.Struct, frozen=True):
     """Deceleration that overrides the speeds [m/s²]."""
     objects: tuple[int, ...] = ()
     """Objects that are the reason for the plan, as rows of the objects passed to the planner."""
+
+
+class StationPerception(msgspec.Struct, frozen=True):
+    """Perception of one station in one tick, before it plans: the input of its step.
+
+    time              of the tick [s]
+    ego               estimated ego state
+    state             ego state as its messages report it
+    detections        newest detections by its sensors
+    inbox             received messages
+    fused             objects after fusion
+    goal              request of the scenario; None if there is none
+    signals           traffic lights and stop signs in sight, if the station obeys them
+    message_interval  minimum time between two messages under congestion control [s]
+    """
+
+    time: float
+    ego: EgoState
+    state: StationState
+    detections: Detections
+    inbox: tuple[ReceivedMessage, ...]
+    fused: Detections
+    goal: Goal | None = None
+    signals: Sequence[SignalReading] = ()
+    message_interval: float = 0.0
 
 
 class AgentStep(msgspec.Struct, frozen=True):

@@ -105,6 +105,11 @@ def end_reason(state: RunState, storyboard: Storyboard, time: float, time_limit:
     for criterion in state.criteria:
         if criterion.fatal and (verdict := checked_verdict(criterion)).fatal and not verdict.passed:
             return f"{FATAL_CRITERION}{criterion.name}"
+    return scheduled_end(storyboard, time, time_limit)
+
+
+def scheduled_end(storyboard: Storyboard, time: float, time_limit: float) -> str | None:
+    """Return the reason for which the storyboard or the time limit [s] ends a run at this time [s], or None."""
     if storyboard.ended is not None:
         return storyboard.ended
     return TIME_LIMIT if time >= time_limit - TIME_TOLERANCE else None

@@ -8,8 +8,11 @@ from contextlib import ExitStack
 from types import FrameType
 from typing import Self
 
+from msgspec.structs import replace
+
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stack import StackFactory
+from eidrive_scenario.driving.station_action import StationAction
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SimulationError, WallLimitError
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
@@ -31,17 +34,19 @@ from eidrive_scenario.simulation.run import (
     as_setting_text,
     checked_seed,
 )
-from eidrive_scenario.simulation.run_outcome import RunEnd, build_result, end_reason, late_warnings
+from eidrive_scenario.simulation.run_outcome import RunEnd, build_result, end_reason, late_warnings, scheduled_end
 from eidrive_scenario.simulation.run_setup import set_up_run
 from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.simulation.spawn_checks import check_spawns
 from eidrive_scenario.simulation.spawn_warnings import spawn_warnings
+from eidrive_scenario.simulation.tick_start import TickStart, check_action
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.view import WorldView
 
 
 class Simulation:
@@ -83,6 +88,8 @@ class Simulation:
         self._motionless = MotionlessStations(self.stack.possible_drivers)
         self._user_values = dict(self.settings.user_values)
         self._external_poses: dict[str, ExternalPose] = {}
+        self._actions: dict[str, StationAction] = {}
+        self._begun: tuple[TickStart, Commands] | None = None
         self._links: Sequence[LinkEvent] = ()
         try:
             add_criteria(setup.criteria, self._state)
@@ -156,6 +163,14 @@ class Simulation:
         self.storyboard.check_accepts_external_poses(name)
         self._external_poses[name] = ExternalPose(pose, speed)
 
+    def set_action(self, name: str, action: StationAction) -> None:
+        """Set the decisions of a station for the next tick, or for the second half of a begun one.
+
+        Raise SettingError if there is no such station, or if it does not drive and the action does.
+        """
+        check_action(name, action, self.stack)
+        self._actions[name] = action
+
     @attributed
     def run(self, *, wall_limit: float | None = None) -> RunResult:
         """Run to the end, for at most `wall_limit` seconds of wall time.
@@ -176,32 +191,57 @@ class Simulation:
         Raise ExtensionError if an extension raises an exception or returns an invalid result, SimulationError after
         the end.
         """
-        if self._ended is not None or self._is_closed:
-            what = "the simulation is closed" if self._ended is None else "the run has ended"
-            raise SimulationError(f"{what}; a second run needs a second Simulation")
+        self._check_continues()
         try:
             return self._tick()
         except BaseException as error:
             self.attribute(error)
             raise
 
-    def _tick(self) -> tuple[Frame, str | None]:
-        view = self.world.view()
-        steps = self.stack.act(self.world, view, self._state.inputs)
+    def _check_continues(self) -> None:
+        if self._ended is not None or self._is_closed:
+            what = "the simulation is closed" if self._ended is None else "the run has ended"
+            raise SimulationError(f"{what}; a second run needs a second Simulation")
+
+    @attributed
+    def begin_tick(self) -> TickStart:
+        """Execute the first half of a time step, before the stations decide; `tick` executes the second half.
+
+        It is optional. Between both halves `set_action` gives stations decisions that depend on what they perceive now.
+        Values that are set by other methods apply from the next tick on. Raise the errors of `tick`.
+        """
+        self._check_continues()
+        if self._begun is None:
+            view = self.world.view()
+            perceived = self.stack.perceive(self.world, view, self._state.inputs)
+            commands = self._tick_storyboard(view)
+            end = self._state.exit or scheduled_end(self.storyboard, view.time, self.settings.time_limit)
+            self._begun = TickStart(view, perceived, end is not None), commands
+        return self._begun[0]
+
+    def _tick_storyboard(self, view: WorldView) -> Commands:
         commands = self.storyboard.tick(view, user_values=self._user_values, external_poses=self._external_poses)
         self._external_poses = {}
-        signals, appearances, monitors = commands.signals, commands.appearances, commands.monitors
-        environment = self._environment = commands.environment or self._environment
-        changes = self.storyboard.changes
+        return commands
+
+    def _tick(self) -> tuple[Frame, str | None]:
+        begun, self._begun = self._begun, None
+        view = self.world.view() if begun is None else begun[0].view
+        inputs = self._state.inputs
+        if self._actions:
+            inputs, self._actions = replace(inputs, actions=self._actions), {}
+        steps = self.stack.act(self.world, view, inputs)
+        commands = self._tick_storyboard(view) if begun is None else begun[1]
+        self._environment = commands.environment or self._environment
         frame = Frame(
             view,
             steps,
-            changes,
+            self.storyboard.changes,
             self._links,
-            signals,
-            appearances,
-            environment,
-            monitors,
+            commands.signals,
+            commands.appearances,
+            self._environment,
+            commands.monitors,
             commands.routes,
             self._state.take_executed(),
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -100,3 +100,13 @@ class LinkCounters:
             ),
             channel_busy_ratio=channel_busy_ratio,
         )
+
+
+def message_counts(links: Collection[LinkStatistics]) -> dict[str, float]:
+    """Return the counts of messages over all links, as metrics of a run."""
+    return {
+        "messages.sent": sum(link.sent for link in links),
+        "messages.received": sum(link.received for link in links),
+        "messages.lost": sum(link.lost for link in links),
+        "messages.bytes": sum(link.bytes_sent for link in links),
+    }
