@@ -42,6 +42,7 @@ bench: install  ## measure simulated seconds per wall second, and the time per p
 	$(BIN)/python benchmarks/bench_fusion.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/bench_perception.py
 	$(BIN)/python benchmarks/bench_radio.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/bench_gym.py
 	@test -z "$$EIDRIVE_MAPS" && echo 'bench_traffic is skipped: EIDRIVE_MAPS is not set' || $(BIN)/python benchmarks/bench_traffic.py
 	@test -z "$$EIDRIVE_CORPORA" && echo 'bench_corpora is skipped: EIDRIVE_CORPORA is not set' || $(BIN)/python benchmarks/bench_corpora.py
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from eidrive_criteria.swept_boxes import axes, half_projection
 from eidrive_scenario.api.common import WorldView
+from eidrive_scenario.api.criteria import half_projection, separating_axes
 
 MAX_ACCELERATION = 15.0
 """Maximum longitudinal acceleration of a vehicle; a larger one is a step of a scripted speed and counts as 0 [m/s²]."""
@@ -53,7 +53,7 @@ def accelerated_contact(a: Sequence[float], b: Sequence[float], first: Course, s
     In each phase between the standstills, the projections on the separating axes are quadratic in time. They all
     overlap, or not, in the intervals between the times at which one of them begins or ends to overlap.
     """
-    tests = [(axis, half_projection(a, *axis) + half_projection(b, *axis)) for axis in axes(a, b)]
+    tests = [(axis, half_projection(a, *axis) + half_projection(b, *axis)) for axis in separating_axes(a, b)]
     gap = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
     for phase in _phases(gap, first, second):
         events = {0.0, phase.end - phase.start}

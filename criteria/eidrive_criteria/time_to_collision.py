@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 from eidrive_criteria.accelerated_contact import accelerated_contact, course
 from eidrive_criteria.pair import PairCriterion, PairSettings
-from eidrive_criteria.swept_boxes import time_to_contact
 from eidrive_scenario.api.common import WorldView
+from eidrive_scenario.api.criteria import time_to_contact
 
 
 class TimeToCollisionSettings(PairSettings):

@@ -20,6 +20,7 @@ from eidrive_scenario.evaluation.route_progress import Place, RouteProgress, rou
 from eidrive_scenario.evaluation.safe_distance import SafeDistanceModel
 from eidrive_scenario.evaluation.stop_line_crossings import Crossing, StopLineCrossings, along, beside
 from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
+from eidrive_scenario.evaluation.swept_boxes import half_projection, separating_axes, time_to_contact
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads.model.signal_states import lamp_colors, shows_red
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
@@ -53,9 +54,12 @@ __all__ = [
     "beside",
     "corners",
     "evaluate_criteria",
+    "half_projection",
     "judge_impact",
     "known_actors",
     "lamp_colors",
     "route_through",
+    "separating_axes",
     "shows_red",
+    "time_to_contact",
 ]

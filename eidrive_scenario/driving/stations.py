@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -104,7 +104,7 @@ class Stations(DrivingStack):
     def drivers(self) -> frozenset[str]:
         return frozenset(name for name, agent in self._agents.items() if agent.controller is not None)
 
-    @property
+    @cached_property
     def possible_drivers(self) -> Collection[str]:
         return possible_drivers(self._context.scenario, self._settings)
 

@@ -16,8 +16,8 @@ from eidrive_scenario.world.specs import actor_spec
 OPTION = "--planner"
 
 
-def select_planner(scenario: Scenario, planner: str | None) -> Scenario:
-    """Return the scenario with this planner for all driven stations; unchanged for None.
+def select_planner(scenario: Scenario, planner: str | None, *, only: str | None = None) -> Scenario:
+    """Return the scenario with this planner for all driven stations, or `only` for one; unchanged for None.
 
     A parked station, whose planner is `none`, remains parked. The property `planner_settings` of the file applies to
     the planner of the file only. Raise SettingError if the planner does not exist or no station drives.
@@ -27,7 +27,9 @@ def select_planner(scenario: Scenario, planner: str | None) -> Scenario:
     if planner not in registry("planners"):
         raise SettingError(registry("planners").unknown(planner, source=OPTION))
     controllers = {
-        name: tuple(_with_planner(scenario, name, controller, planner) for controller in assigned)
+        name: assigned
+        if only not in (None, name)
+        else tuple(_with_planner(scenario, name, controller, planner) for controller in assigned)
         for name, assigned in scenario.controllers.items()
     }
     if controllers == dict(scenario.controllers) and not _has_driver(scenario):

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 from eidrive_criteria.accelerated_contact import Course, accelerated_contact
-from eidrive_criteria.swept_boxes import time_to_contact
 from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionSettings
 from msgspec.structs import replace
 
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
+from eidrive_scenario.evaluation.swept_boxes import time_to_contact
 from eidrive_scenario.geometry import overlap
 
 

@@ -15,7 +15,7 @@ def time_to_contact(a: Sequence[float], b: Sequence[float], velocity: Sequence[f
     (Ericson, Real-Time Collision Detection, 2005, section 5.5.8, for upright boxes).
     """
     enter, leave = 0.0, math.inf
-    for x, y, z in axes(a, b):
+    for x, y, z in separating_axes(a, b):
         gap = x * (b[0] - a[0]) + y * (b[1] - a[1]) + z * (b[2] - a[2])
         reach = half_projection(a, x, y, z) + half_projection(b, x, y, z)
         rate = x * velocity[0] + y * velocity[1] + z * velocity[2]
@@ -28,7 +28,7 @@ def time_to_contact(a: Sequence[float], b: Sequence[float], velocity: Sequence[f
     return enter if enter <= leave else math.inf
 
 
-def axes(a: Sequence[float], b: Sequence[float]) -> list[tuple[float, float, float]]:
+def separating_axes(a: Sequence[float], b: Sequence[float]) -> list[tuple[float, float, float]]:
     """Return the separating axes of two upright boxes."""
     axes = [(0.0, 0.0, 1.0)]
     for yaw in (a[6], b[6]):

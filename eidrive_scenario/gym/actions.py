@@ -1,0 +1,124 @@
+"""Actions: spaces, and conversion to the decisions of a station."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from msgspec.structs import replace
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.station_action import OWN_DECISIONS, StationAction
+from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.gym.action_settings import ActionSettings, MetaSpeed, Pedals, SendMessages, TargetSpeed
+from eidrive_scenario.gym.libraries import spaces
+from eidrive_scenario.gym.object_table import nearest_rows
+from eidrive_scenario.world.actor import ActorSpec, Control
+
+_TOLERANCE = 1e-6
+"""Excess over the bounds of a space that is accepted, for rounding."""
+
+
+class ActionDecoder:
+    """Actions of one station: their space, and their conversion.
+
+    Of several actions the space is a `Dict` by their kinds.
+    """
+
+    def __init__(self, actions: Sequence[ActionSettings], spec: ActorSpec) -> None:
+        self._actions = actions
+        self._spec = spec
+        self._level = 0
+        by_kind: dict[str, spaces.Space[Any]] = {action.kind: _space(action) for action in actions}
+        self.space: spaces.Space[Any] = spaces.Dict(by_kind) if len(actions) > 1 else by_kind[actions[0].kind]
+
+    def reset(self, speed: float) -> None:
+        """Begin an episode at a speed [m/s]: relative speeds start from the nearest one."""
+        for action in self._actions:
+            if isinstance(action, MetaSpeed):
+                self._level = min(range(len(action.speeds)), key=lambda level: abs(action.speeds[level] - speed))
+
+    def decode(self, given: Any, perceived: StationPerception) -> StationAction:
+        """Return the decisions of an action for a step that starts with this perception.
+
+        Raise SettingError if the space does not contain the action.
+        """
+        decided = OWN_DECISIONS
+        for action in self._actions:
+            one = given
+            if len(self._actions) > 1:
+                if not isinstance(given, Mapping) or action.kind not in given:
+                    raise _outside(given, "a mapping with the keys " + ", ".join(each.kind for each in self._actions))
+                one = given[action.kind]
+            decided = self._decode(action, one, perceived, decided)
+        return decided
+
+    def _decode(
+        self, action: ActionSettings, given: Any, perceived: StationPerception, decided: StationAction
+    ) -> StationAction:
+        if isinstance(action, TargetSpeed):
+            (share,) = _numbers(given, 1)
+            return replace(decided, target_speed=(share + 1.0) / 2.0 * action.max_speed)
+        if isinstance(action, Pedals):
+            pedal, wheel = _numbers(given, 2)
+            steering = wheel * self._spec.max_steering
+            return replace(decided, control=Control(max(pedal, 0.0), max(-pedal, 0.0), steering))
+        if isinstance(action, MetaSpeed):
+            last = len(action.speeds) - 1
+            if action.relative:
+                self._level = min(max(self._level + _index(given, 3) - 1, 0), last)
+            else:
+                self._level = _index(given, last + 1)
+            return replace(decided, target_speed=action.speeds[self._level])
+        if isinstance(action, SendMessages):
+            return replace(decided, send=bool(_index(given, 2)))
+        mask = _mask(given, action.count)
+        rows = nearest_rows(perceived.detections, perceived.ego)[: action.count]
+        shared = tuple(row for row, chosen in zip(rows, mask, strict=False) if chosen)
+        return replace(decided, send=bool(mask.any()), share=shared)
+
+
+def _space(action: ActionSettings) -> spaces.Space[Any]:
+    if isinstance(action, TargetSpeed):
+        return spaces.Box(-1.0, 1.0, (1,), np.float32)
+    if isinstance(action, Pedals):
+        return spaces.Box(-1.0, 1.0, (2,), np.float32)
+    if isinstance(action, MetaSpeed):
+        return spaces.Discrete(3 if action.relative else len(action.speeds))
+    if isinstance(action, SendMessages):
+        return spaces.Discrete(2)
+    return spaces.MultiBinary(action.count)
+
+
+def _numbers(given: Any, count: int) -> list[float]:
+    """Return numbers in [-1, 1]."""
+    expected = f"{count} numbers from -1 to 1"
+    try:
+        values = np.asarray(given, dtype=float).reshape(-1).tolist()
+    except (TypeError, ValueError):
+        raise _outside(given, expected) from None
+    if len(values) != count or not all(abs(value) <= 1.0 + _TOLERANCE for value in values):
+        raise _outside(given, expected)
+    return [min(max(value, -1.0), 1.0) for value in values]
+
+
+def _index(given: Any, count: int) -> int:
+    """Return an integer from 0 to `count` - 1."""
+    value = np.asarray(given)
+    if value.size != 1 or value.dtype.kind not in "iu" or not 0 <= int(value.item()) < count:
+        raise _outside(given, f"an integer from 0 to {count - 1}")
+    return int(value.item())
+
+
+def _mask(given: Any, count: int) -> Array:
+    """Return `count` truth values."""
+    value = np.asarray(given)
+    if value.shape != (count,) or not np.isin(value, (0, 1)).all():
+        raise _outside(given, f"{count} numbers out of 0 and 1")
+    return value.astype(bool)
+
+
+def _outside(given: Any, expected: str) -> SettingError:
+    return SettingError(Diagnostic(f"the action is {quoted(given)}", f"give {expected}"))

@@ -1,0 +1,121 @@
+"""Episode: one run whose stations are controlled from outside, in steps that end with the perceptions after them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
+
+import msgspec
+
+from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory
+from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.stations import Stations
+from eidrive_scenario.driving.step import AgentStep, StationPerception
+from eidrive_scenario.openscenario import ConcreteRun, Scenario
+from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
+from eidrive_scenario.simulation.added_settings import criteria_sources
+from eidrive_scenario.simulation.planner_option import select_planner
+from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
+from eidrive_scenario.simulation.tick_start import TickStart
+from eidrive_scenario.world.view import WorldView
+
+Decide = Callable[[Mapping[str, StationPerception]], Mapping[str, StationAction]]
+"""Returns the actions of stations for the tick that starts with these perceptions."""
+
+
+class Transition(msgspec.Struct, frozen=True):
+    """One tick: ground truth before and after it, and the steps of the stations in it."""
+
+    before: WorldView
+    after: WorldView
+    steps: Mapping[str, AgentStep]
+
+
+class Episode:
+    """One run of a scenario. It is closed when it ends, or by `close`.
+
+    planners       planners of stations that replace those of the scenario, by station
+    colliding      stations whose first contact ends the run, as a failure of the criterion `collision`
+    """
+
+    def __init__(
+        self,
+        source: Scenario | ConcreteRun,
+        seed: int,
+        settings: RunSettings,
+        *,
+        planners: Mapping[str, str],
+        colliding: Collection[str],
+        load_weights: bool = True,
+    ) -> None:
+        added = [{"collision": {"of": name, "fatal": True}} for name in colliding]
+        self._colliding = frozenset(colliding)
+        self.simulation = Simulation(
+            source,
+            seed=seed,
+            settings=replace(settings, criteria=(*criteria_sources(settings.criteria), *added)),
+            stack=stations_with_planners(planners),
+            load_weights=load_weights,
+        )
+        self.result: RunResult | None = None
+        """Result of the run; None before its end."""
+
+    def begin(self) -> None:
+        """Begin the first tick."""
+        self.start: TickStart = self.simulation.begin_tick()
+
+    @property
+    def perceived(self) -> Mapping[str, StationPerception]:
+        """Perceptions of the present stations, by name."""
+        return self.start.perceived
+
+    @property
+    def is_truncated(self) -> bool:
+        """Whether the run has ended by its time limit."""
+        return self.result is not None and self.result.end_reason == TIME_LIMIT
+
+    def close(self) -> None:
+        """Free the world."""
+        self.simulation.close()
+
+    def advance(self, decide: Decide) -> Transition:
+        """Execute one tick and begin the next one.
+
+        If the run ends with the begun tick, whatever the stations decide, that tick is completed as well.
+        """
+        before = self.start.view
+        steps, end = self._tick(decide)
+        if end is None:
+            self.start = self.simulation.begin_tick()
+            if self.start.ends or self._has_collided(self.start.view):
+                _, end = self._tick(decide)
+                if end is None:
+                    self.start = self.simulation.begin_tick()
+        if end is not None:
+            self.result = self.simulation.result()
+            self.simulation.close()
+        return Transition(before, self.start.view, steps)
+
+    def _tick(self, decide: Decide) -> tuple[Mapping[str, AgentStep], str | None]:
+        for name, action in decide(self.start.perceived).items():
+            self.simulation.set_action(name, action)
+        frame, end = self.simulation.tick()
+        return frame.steps, end
+
+    def _has_collided(self, view: WorldView) -> bool:
+        return any(contact.first in self._colliding or contact.second in self._colliding for contact in view.contacts)
+
+
+def stations_with_planners(planners: Mapping[str, str]) -> StackFactory:
+    """Return a factory of `Stations` in which some stations have another planner.
+
+    The factory raises SettingError if a planner does not exist.
+    """
+
+    def build(context: StackContext) -> DrivingStack:
+        scenario = context.scenario
+        for name, planner in planners.items():
+            scenario = select_planner(scenario, planner, only=name)
+        return Stations(replace(context, scenario=scenario))
+
+    return build

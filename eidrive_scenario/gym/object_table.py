@@ -1,0 +1,88 @@
+"""Table of the nearest objects in the frame of a vehicle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.sensing.readings import EgoState
+
+MAX_SPEED = 70.0
+"""Bound of speeds in observations [m/s]."""
+MAX_SIZE = 30.0
+"""Bound of lengths and widths of objects [m]."""
+MAX_DEVIATION = 10.0
+"""Bound of standard deviations of positions [m]."""
+MAX_AGE = 10.0
+"""Bound of ages [s]."""
+
+COLUMNS = (
+    "present", "x", "y", "velocity_x", "velocity_y", "velocity_known", "length", "width", "cos", "sin", "existence",
+    "deviation_x", "deviation_y", "covariance_known", "age", *CLASSES,
+)  # fmt: skip
+"""Columns of the table. Positions [m], velocities over ground [m/s] and headings are in the axes of the vehicle."""
+_SIGNED = ("x", "y", "velocity_x", "velocity_y", "cos", "sin")
+_CLASS = {name: COLUMNS.index(name) for name in CLASSES}
+
+
+def column_bounds(reach: float) -> tuple[Array, Array]:
+    """Return lower and upper bounds of the columns in SI units for objects within `reach` [m]."""
+    high = np.ones(len(COLUMNS))
+    for name, bound in (
+        ("x", reach),
+        ("y", reach),
+        ("velocity_x", MAX_SPEED),
+        ("velocity_y", MAX_SPEED),
+        ("length", MAX_SIZE),
+        ("width", MAX_SIZE),
+        ("deviation_x", MAX_DEVIATION),
+        ("deviation_y", MAX_DEVIATION),
+        ("age", MAX_AGE),
+    ):
+        high[COLUMNS.index(name)] = bound
+    low = np.where([name in _SIGNED for name in COLUMNS], -high, 0.0)
+    return low, high
+
+
+def nearest_rows(objects: Detections, ego: EgoState, reach: float = math.inf) -> list[int]:
+    """Return the rows of the objects within `reach` [m], nearest first; equal distances in the order of the rows."""
+    if not len(objects):
+        return []
+    away = objects.boxes[:, :2] - ego.position[:2]
+    distance = np.hypot(away[:, 0], away[:, 1])
+    order = np.argsort(distance, kind="stable")
+    return [row for row in order.tolist() if distance[row] <= reach]
+
+
+def object_table(objects: Detections, ego: EgoState, now: float, *, count: int, reach: float) -> Array:
+    """Return the table (count, C) of the nearest objects in SI units; rows without an object are 0."""
+    table = np.zeros((count, len(COLUMNS)))
+    rows = nearest_rows(objects, ego, reach)[:count]
+    if not rows:
+        return table
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    axes = np.array([[cos, -sin], [sin, cos]])
+    boxes = objects.boxes[rows]
+    filled = table[: len(rows)]
+    filled[:, 0] = 1.0
+    filled[:, 1:3] = (boxes[:, :2] - ego.position[:2]) @ axes
+    velocity = objects.velocity[rows] @ axes
+    known = np.isfinite(velocity[:, 0]) & np.isfinite(velocity[:, 1])
+    filled[:, 3:5] = np.where(np.reshape(known, (-1, 1)), velocity, 0.0)
+    filled[:, 5] = known
+    filled[:, 6:8] = boxes[:, 3:5]
+    heading = boxes[:, 6] - ego.yaw
+    filled[:, 8], filled[:, 9] = np.cos(heading), np.sin(heading)
+    filled[:, 10] = objects.confidence[rows]
+    covariance = objects.covariance[rows]
+    certain = np.isfinite(covariance.sum(axis=(1, 2)))
+    variance = np.einsum("ji,njk,ki->ni", axes, np.where(np.reshape(certain, (-1, 1, 1)), covariance, 0.0), axes)
+    filled[:, 11:13] = np.sqrt(np.maximum(variance, 0.0))
+    filled[:, 13] = certain
+    filled[:, 14] = max(now - objects.time, 0.0)
+    for index, row in enumerate(rows):
+        filled[index, _CLASS[objects.classes[row]]] = 1.0
+    return table

@@ -1,0 +1,162 @@
+"""Observations: spaces, and conversion of perceptions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.gym.libraries import spaces
+from eidrive_scenario.gym.object_table import MAX_AGE, MAX_SPEED, column_bounds, object_table
+from eidrive_scenario.gym.observation_settings import ObservationSettings, RouteSettings, TableSettings
+from eidrive_scenario.gym.occupancy_grid import grid_bounds, occupancy_grid
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.world.actor import Control
+
+EGO_COLUMNS = (
+    "speed", "acceleration", "yaw_rate", "requested_speed", "request_known", "throttle", "brake", "steering",
+)  # fmt: skip
+"""Entries of the part `ego`: SI units; the control is that of the last step."""
+_EGO_HIGH = np.array([MAX_SPEED, 20.0, math.pi, MAX_SPEED, 1.0, 1.0, 1.0, math.pi / 2.0])
+_EGO_LOW = np.array([-MAX_SPEED, -20.0, -math.pi, 0.0, 0.0, 0.0, 0.0, -math.pi / 2.0])
+ROUTE_COLUMNS = ("known", "x", "y")
+"""Columns of the part `route`: whether the route has this point, and its position in the frame of the vehicle [m]."""
+SENDER_COLUMNS = ("known", "age")
+"""Columns of the part `senders`: whether a message was received, and the age of the newest one [s]."""
+
+Part = Callable[[StationPerception], NDArray[Any]]
+
+
+class ObservationEncoder:
+    """Observations of one station: their space, and their conversion.
+
+    senders  names of the other stations, in the order of the part `senders`
+
+    All values are float32 and within the bounds of the space: larger ones are clipped.
+    """
+
+    def __init__(self, settings: ObservationSettings, senders: Sequence[str]) -> None:
+        self.settings = settings
+        self._senders = senders
+        self._newest: dict[str, float] = {}
+        self._route: Array = np.empty((0, 2))
+        self._control = Control()
+        self._parts: dict[str, tuple[Part, Array, NDArray[Any], NDArray[Any]]] = {}
+        parts: dict[str, spaces.Space[Any]] = {}
+        for name, (encode, low, high) in sorted(self._selected().items()):
+            scale = high if settings.normalized else np.ones_like(high)
+            low32, high32 = (low / scale).astype(np.float32), (high / scale).astype(np.float32)
+            self._parts[name] = encode, scale, low32, high32
+            parts[name] = spaces.Box(low32, high32, dtype=np.float32)
+        self._space = spaces.Dict(parts)
+        self.space: spaces.Space[Any] = spaces.flatten_space(self._space) if settings.flat else self._space
+
+    def _selected(self) -> Mapping[str, tuple[Part, Array, Array]]:
+        """Return conversion, lower and upper bounds in SI units of the selected parts."""
+        settings = self.settings
+        found: dict[str, tuple[Part, Array, Array]] = {}
+        if settings.ego:
+            found["ego"] = self._ego, _EGO_LOW, _EGO_HIGH
+        if settings.route is not None:
+            reach = settings.route.length + 10.0
+            high = np.tile([1.0, reach, reach], (settings.route.points, 1))
+            found["route"] = self._route_ahead, high * [0.0, -1.0, -1.0], high
+        for name, table in (("tracks", settings.tracks), ("own", settings.own)):
+            if table is not None:
+                low, high = (np.tile(bound, (table.count, 1)) for bound in column_bounds(table.range))
+                found[name] = self._table_part(name, table), low, high
+        if settings.senders:
+            high = np.tile([1.0, MAX_AGE], (len(self._senders), 1))
+            found["senders"] = self._ages, np.zeros_like(high), high
+        if settings.grid is not None:
+            found["grid"] = self._grid, *grid_bounds(settings.grid)
+        return found
+
+    @property
+    def needs_route(self) -> bool:
+        """Whether the observation contains the route."""
+        return self.settings.route is not None or self.settings.grid is not None
+
+    def reset(self) -> None:
+        """Begin an episode."""
+        self._newest = {}
+
+    def receive(self, perceived: StationPerception) -> None:
+        """Register the received messages of a tick."""
+        for received in perceived.inbox:
+            sender, time = received.message.sender, received.message.state.time
+            self._newest[sender] = max(time, self._newest.get(sender, -math.inf))
+
+    def encode(self, perceived: StationPerception, route: Array, control: Control | None) -> Any:
+        """Return the observation.
+
+        route    points (M, 2) of the route ahead in the world frame [m]; empty if there is none
+        control  control of the last step; None if there is none
+        """
+        self._route, self._control = _in_frame(route, perceived.ego), control or Control()
+        found: dict[str, NDArray[Any]] = {}
+        for name, (encode, scale, low, high) in self._parts.items():
+            values = (encode(perceived) / scale).astype(np.float32)
+            found[name] = np.clip(values, low, high, out=values)
+        return spaces.flatten(self._space, found) if self.settings.flat else found
+
+    def zeros(self) -> Any:
+        """Return the observation of a station that is not present."""
+        empty = {name: np.zeros(low.shape, np.float32) for name, (_, _, low, _) in self._parts.items()}
+        return spaces.flatten(self._space, empty) if self.settings.flat else empty
+
+    def _ego(self, perceived: StationPerception) -> Array:
+        ego, control = perceived.ego, self._control
+        requested = None if perceived.goal is None else perceived.goal.speed
+        request = (0.0, 0.0) if requested is None else (requested, 1.0)
+        driven = control.throttle, control.brake, control.steering
+        return np.array([ego.speed, ego.acceleration, ego.yaw_rate, *request, *driven])
+
+    def _route_ahead(self, perceived: StationPerception) -> Array:
+        assert self.settings.route is not None
+        return _points_ahead(self._route, self.settings.route)
+
+    def _table_part(self, name: str, table: TableSettings) -> Part:
+        def encode(perceived: StationPerception) -> Array:
+            objects = perceived.fused if name == "tracks" else perceived.detections
+            return object_table(objects, perceived.ego, perceived.time, count=table.count, reach=table.range)
+
+        return encode
+
+    def _ages(self, perceived: StationPerception) -> Array:
+        newest = [self._newest.get(sender) for sender in self._senders]
+        rows = [(0.0, 0.0) if time is None else (1.0, max(perceived.time - time, 0.0)) for time in newest]
+        return np.array(rows).reshape(-1, 2)
+
+    def _grid(self, perceived: StationPerception) -> Array:
+        assert self.settings.grid is not None
+        return occupancy_grid(perceived.fused, self._route, perceived.ego, self.settings.grid)
+
+
+def _in_frame(points: Array, ego: EgoState) -> Array:
+    """Return points (M, 2) of the world frame in the frame of the vehicle."""
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    local: Array = (points - ego.position[:2]) @ np.array([[cos, -sin], [sin, cos]])
+    return local
+
+
+def _points_ahead(route: Array, settings: RouteSettings) -> Array:
+    """Return rows (points, 3) with points at multiples of the spacing along the route from its point at the vehicle."""
+    rows = np.zeros((settings.points, 3))
+    if len(route) < 2:
+        return rows
+    step = np.diff(route, axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    along = np.concatenate([[0.0], np.cumsum(length)])
+    share = float(-(route[0] @ step[0]) / max(length[0] ** 2, 1e-12))
+    wanted = min(max(share, 0.0), 1.0) * length[0] + settings.spacing * np.arange(1, settings.points + 1)
+    known = wanted <= along[-1]
+    rows[:, 0] = known
+    rows[:, 1] = np.where(known, np.interp(wanted, along, route[:, 0]), 0.0)
+    rows[:, 2] = np.where(known, np.interp(wanted, along, route[:, 1]), 0.0)
+    return rows

@@ -1,0 +1,181 @@
+"""Environment of PettingZoo over a scenario: several stations are controlled at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, suggestion
+from eidrive_scenario.gym.action_settings import ActionSettings
+from eidrive_scenario.gym.environment import final_info
+from eidrive_scenario.gym.episode import Episode
+from eidrive_scenario.gym.libraries import INSTALL, gymnasium, spaces
+from eidrive_scenario.gym.observation_settings import ObservationSettings
+from eidrive_scenario.gym.rewards import RewardSettings
+from eidrive_scenario.gym.runs import MAX_SEED, OPTIONS, Runs
+from eidrive_scenario.gym.station_interface import InterfaceSettings, sum_terms
+from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
+from eidrive_scenario.simulation import RunSettings
+
+try:
+    from pettingzoo import ParallelEnv
+except ImportError as error:
+    raise SettingError(Diagnostic("PettingZoo is not installed", INSTALL)) from error
+
+Outcome = tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]
+"""Observations, rewards, terminated, truncated and information, each by agent."""
+
+
+class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
+    """Environment in which policies control several stations of a scenario. The agents are the stations.
+
+    stations  controlled stations; None: all that drive
+
+    The other arguments are those of `EidriveEnv`, and apply to each station. An agent exists while its station is in
+    the world. All agents end with the run: at the first contact of any of them unless `terminate_on_collision` is off.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "eidrive_scenario_v0",
+        "render_modes": [],
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        scenario: Scenario | Source | ConcreteRun,
+        *,
+        stations: Sequence[str] | None = None,
+        observation: ObservationSettings | Mapping[str, Any] | None = None,
+        action: str | ActionSettings | Mapping[str, Any] | tuple[Any, ...] | list[Any] | None = None,
+        reward: RewardSettings | Mapping[str, Any] | None = None,
+        settings: RunSettings | None = None,
+        max_steps: int | None = None,
+        ticks_per_step: int = 1,
+        terminate_on_collision: bool = True,
+    ) -> None:
+        self._runs = Runs(
+            scenario,
+            (stations,) if isinstance(stations, str) else stations,
+            InterfaceSettings.parse(observation, action, reward),
+            settings,
+            single=False,
+            max_steps=max_steps,
+            ticks_per_step=ticks_per_step,
+            terminate_on_collision=terminate_on_collision,
+        )
+        self._interfaces = self._runs.interfaces
+        self.possible_agents = list(self._interfaces)
+        self.agents: list[str] = []
+        self.render_mode = None
+        self._generator, _ = gymnasium.utils.seeding.np_random()
+        self._episode: Episode | None = None
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of the observations of an agent."""
+        return self._interfaces[agent].encoder.space
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """Return the space of the actions of an agent."""
+        return self._interfaces[agent].decoder.space
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Begin an episode; return the first observations, and seed, time [s] and parameters, by agent.
+
+        Unknown options are ignored, as PettingZoo demands. The run advances until a controlled station is in the
+        world. Raise SettingError if none ever is.
+        """
+        if seed is not None:
+            self._generator, _ = gymnasium.utils.seeding.np_random(seed)
+        self.close()
+        known = {key: value for key, value in (options or {}).items() if key in OPTIONS}
+        episode = self._episode = self._runs.start(int(self._generator.integers(MAX_SEED)), known)
+        while episode.result is None and not self._present(episode):
+            episode.advance(lambda perceived: {})
+        self.agents = self._present(episode)
+        if not self.agents:
+            raise SettingError(Diagnostic("no controlled station enters the world", "select other stations"))
+        for name in self.agents:
+            self._interfaces[name].begin(episode)
+        simulation = episode.simulation
+        info: dict[str, Any] = {"seed": simulation.seed, "time": episode.start.view.time}
+        info["parameters"] = dict(simulation.scenario.parameters)
+        return {name: self._interfaces[name].observe(episode) for name in self.agents}, {
+            name: dict(info) for name in self.agents
+        }
+
+    def step(self, actions: Mapping[str, Any]) -> Outcome:
+        """Apply the actions for one step; return its outcome by agent. The values are those of `EidriveEnv.step`.
+
+        Raise SettingError if an agent has no action or one that its space does not contain, SimulationError before
+        `reset` and after the end.
+        """
+        episode = self._episode
+        if episode is None or not self.agents:
+            raise SimulationError("the environment has no running episode; call reset")
+        self._check_agents(actions)
+        acting, decided = list(self.agents), dict[str, StationAction]()
+
+        def decide(perceived: Mapping[str, StationPerception]) -> Mapping[str, StationAction]:
+            for name in acting:
+                if name in perceived and (name not in decided or decided[name].share is not None):
+                    decided[name] = self._interfaces[name].decode(actions[name], perceived[name])
+            return {name: action for name, action in decided.items() if name in perceived}
+
+        terms: dict[str, list[dict[str, float]]] = {name: [] for name in acting}
+        for _ in range(self._runs.ticks_per_step):
+            live = [name for name in acting if name in episode.perceived]
+            routes = {name: self._interfaces[name].route(episode.perceived[name]) for name in live}
+            transition = episode.advance(decide)
+            for name in live:
+                terms[name].append(self._interfaces[name].reward_terms(transition, routes[name], episode))
+            if episode.result is not None:
+                break
+        return self._outcome(episode, acting, terms)
+
+    def _outcome(self, episode: Episode, acting: list[str], terms: Mapping[str, list[dict[str, float]]]) -> Outcome:
+        while episode.result is None and not self._present(episode):
+            episode.advance(lambda perceived: {})
+        result = episode.result
+        present = [] if result is not None else self._present(episode)
+        entering = [name for name in present if name not in acting]
+        for name in entering:
+            self._interfaces[name].begin(episode)
+        outcome: Outcome = {}, {}, {}, {}, {}
+        observations, rewards, ends, limits, infos = outcome
+        for name in [*acting, *entering]:
+            found = [*terms.get(name, ())]
+            info: dict[str, Any] = {"time": episode.start.view.time}
+            if result is not None:
+                found.append(self._interfaces[name].rewards.terms_of_end(result))
+                info |= final_info(result)
+            info["reward_terms"] = summed = sum_terms(found)
+            truncated = episode.is_truncated
+            terminated = not truncated and (result is not None or name not in present)
+            observations[name], rewards[name] = self._interfaces[name].observe(episode), sum(summed.values())
+            ends[name], limits[name], infos[name] = terminated, truncated, info
+        self.agents = present
+        return outcome
+
+    def _check_agents(self, actions: Mapping[str, Any]) -> None:
+        """Raise SettingError unless the actions are those of the agents."""
+        missing = next((name for name in self.agents if name not in actions), None)
+        if missing is not None:
+            raise SettingError(Diagnostic(f"agent {missing!r} has no action", "give an action of each agent"))
+        unknown = next((name for name in actions if name not in self.agents), None)
+        if unknown is not None:
+            raise SettingError(Diagnostic(f"{unknown!r} is not an agent", suggestion(str(unknown), self.agents)))
+
+    def _present(self, episode: Episode) -> list[str]:
+        return [name for name in self.possible_agents if name in episode.perceived]
+
+    def close(self) -> None:
+        """Free the world of the running episode."""
+        self.agents = []
+        if self._episode is not None:
+            self._episode.close()
+            self._episode = None

@@ -1,0 +1,120 @@
+"""Runs of an environment: its scenario, settings of the run, and the start of episodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.gym.episode import Episode
+from eidrive_scenario.gym.station_interface import InterfaceSettings, StationInterface
+from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
+from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
+
+MAX_SEED = 2**31
+"""Exclusive bound of the seeds that an environment draws for its runs."""
+OPTIONS = ("seed", "parameters")
+"""Options of `reset`."""
+
+
+class Runs:
+    """Source of the episodes of an environment, with the interfaces of its stations.
+
+    stations          controlled stations; None selects them by `default_stations`
+    max_steps         maximum number of steps of an episode; None for the time limit of the settings only
+    ticks_per_step    number of ticks for which an action applies
+
+    Raise InputError if the scenario or a setting is invalid, or if it has no such station.
+    """
+
+    def __init__(
+        self,
+        source: Scenario | Source | ConcreteRun,
+        stations: Sequence[str] | None,
+        interfaces: InterfaceSettings,
+        settings: RunSettings | None,
+        *,
+        single: bool,
+        max_steps: int | None,
+        ticks_per_step: int,
+        terminate_on_collision: bool,
+    ) -> None:
+        self._source = source if isinstance(source, Scenario | ConcreteRun) else load_scenario(source)
+        self.settings = _with_steps(settings or RunSettings(), max_steps, ticks_per_step)
+        self.ticks_per_step = ticks_per_step
+        with Simulation(self._source, settings=self.settings, load_weights=False) as simulation:
+            known, drivers = tuple(simulation.stack.controllable), tuple(simulation.stack.possible_drivers)
+            names = _stations(stations, known, drivers, single=single)
+            self.interfaces = {name: StationInterface(name, interfaces, simulation) for name in names}
+        self._planners = {name: one.planner for name, one in self.interfaces.items() if one.planner is not None}
+        self._colliding = [name for name in names if terminate_on_collision and name in drivers]
+        self._episode(DEFAULT_SEED, self.settings, load_weights=False).close()
+
+    def start(self, drawn_seed: int, options: Mapping[str, Any] | None) -> Episode:
+        """Return an episode at its first tick.
+
+        drawn_seed  seed of the run, unless the options contain one
+
+        Raise SettingError for unknown options.
+        """
+        given = options or {}
+        unknown = next((key for key in given if key not in OPTIONS), None)
+        if unknown is not None:
+            raise SettingError(Diagnostic(f"reset has the option {quoted(unknown)}", suggestion(str(unknown), OPTIONS)))
+        settings, parameters = self.settings, given.get("parameters", {})
+        if not isinstance(parameters, Mapping):
+            raise SettingError(Diagnostic(f"parameters is {quoted(parameters)}", "give a mapping of names to values"))
+        if parameters:
+            settings = replace(settings, parameters={**settings.parameters, **parameters})
+        episode = self._episode(given.get("seed", drawn_seed), settings)
+        try:
+            episode.begin()
+        except BaseException:
+            episode.close()
+            raise
+        return episode
+
+    def _episode(self, seed: int, settings: RunSettings, *, load_weights: bool = True) -> Episode:
+        return Episode(
+            self._source,
+            seed,
+            settings,
+            planners=self._planners,
+            colliding=self._colliding,
+            load_weights=load_weights,
+        )
+
+
+def _with_steps(settings: RunSettings, max_steps: int | None, ticks_per_step: int) -> RunSettings:
+    """Return settings whose time limit is at most that of the steps."""
+    for name, value in (("max_steps", max_steps), ("ticks_per_step", ticks_per_step)):
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
+            raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a positive integer"))
+    if max_steps is None:
+        return settings
+    return replace(settings, time_limit=min(settings.time_limit, max_steps * ticks_per_step * settings.dt))
+
+
+def _stations(
+    chosen: Sequence[str] | None, known: Sequence[str], drivers: Sequence[str], *, single: bool
+) -> tuple[str, ...]:
+    """Return the controlled stations. Raise SettingError if there is none, or if one does not exist."""
+    if not known:
+        message = "the scenario has no station"
+        raise SettingError(Diagnostic(message, "give an entity a driving stack: RunSettings(drive='Ego')"))
+    if chosen is not None:
+        unknown = next((name for name in chosen if name not in known), None)
+        if unknown is not None or not chosen:
+            message = f"the scenario has no station {quoted(unknown or '')}"
+            raise SettingError(Diagnostic(message, suggestion(str(unknown), known)))
+        return tuple(dict.fromkeys(chosen))
+    candidates = drivers or (known if single else ())
+    if not candidates:
+        raise SettingError(Diagnostic("the scenario has no station that drives", "name the stations"))
+    if single and len(candidates) > 1:
+        if "Ego" in candidates:
+            return ("Ego",)
+        message = f"the scenario has the stations {', '.join(candidates)}"
+        raise SettingError(Diagnostic(message, "select one by station=NAME"))
+    return tuple(candidates) if not single else (candidates[0],)

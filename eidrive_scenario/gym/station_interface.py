@@ -1,0 +1,152 @@
+"""Interface of a controlled station: its observations, actions and rewards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.station_action import StationAction
+from eidrive_scenario.driving.step import StationPerception
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.gym.action_settings import DRIVING, ActionSettings, MetaSpeed, TargetSpeed, parse_actions
+from eidrive_scenario.gym.actions import ActionDecoder
+from eidrive_scenario.gym.episode import Episode, Transition
+from eidrive_scenario.gym.observation_settings import ObservationSettings
+from eidrive_scenario.gym.observations import ObservationEncoder
+from eidrive_scenario.gym.rewards import Rewards, RewardSettings
+from eidrive_scenario.settings import S, parse_settings
+from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.world.actor import ActorSpec, Control
+from eidrive_scenario.world.specs import actor_spec
+
+NO_ROUTE: Array = np.empty((0, 2))
+"""Route of a station that does not drive."""
+
+
+@dataclass(frozen=True)
+class InterfaceSettings:
+    """Settings of the interfaces of an environment."""
+
+    observation: ObservationSettings
+    actions: tuple[ActionSettings, ...] | None
+    """None selects the default action of the station."""
+    reward: RewardSettings
+
+    @classmethod
+    def parse(cls, observation: Any, action: Any, reward: Any) -> InterfaceSettings:
+        """Return the settings from mappings or settings; None selects the defaults. Raise SettingError."""
+        return cls(
+            _parse(ObservationSettings, observation, "observation"),
+            None if action is None else parse_actions(action),
+            _parse(RewardSettings, reward, "reward"),
+        )
+
+    def actions_of(self, *, drives: bool) -> tuple[ActionSettings, ...]:
+        """Return the actions of a station: by default the target speed, or sending for one that does not drive."""
+        if self.actions is None:
+            return parse_actions("target_speed" if drives else "send")
+        return self.actions
+
+
+def _parse(model: type[S], given: Any, source: str) -> S:
+    if isinstance(given, model):
+        return given
+    if given is not None and not isinstance(given, Mapping):
+        raise SettingError(Diagnostic(f"{source} is {given!r}", f"give a mapping or {model.__name__}"))
+    return parse_settings(model, given or {}, source=source)
+
+
+class StationInterface:
+    """Observations, actions and rewards of one station, over all episodes of an environment.
+
+    simulation  any run of the scenario, for entities and settings
+    """
+
+    def __init__(self, name: str, settings: InterfaceSettings, simulation: Simulation) -> None:
+        self.name = name
+        drives = name in simulation.stack.possible_drivers
+        self.actions = settings.actions_of(drives=drives)
+        driving = [action.kind for action in self.actions if action.kind in DRIVING]
+        if driving and not drives:
+            message = f"action {driving[0]!r} drives, and the station {name!r} does not"
+            raise SettingError(Diagnostic(message, "give the action send or share"))
+        scenario = simulation.scenario
+        self.spec: ActorSpec = actor_spec(name, scenario.entities[name])
+        senders = [station for station in simulation.stack.controllable if station != name]
+        self.encoder = ObservationEncoder(settings.observation, senders)
+        self.decoder = ActionDecoder(self.actions, self.spec)
+        self.rewards = Rewards(settings.reward, name)
+        self._needs_route = drives and (self.encoder.needs_route or self.rewards.needs_route)
+        self._planner: RoutePlanner | None = None
+        self._route: tuple[float, Array] = -1.0, NO_ROUTE
+        self._control: Control | None = None
+
+    @property
+    def planner(self) -> str | None:
+        """Planner of the station that replaces the one of the scenario; None to keep it."""
+        chosen = [action.planner for action in self.actions if isinstance(action, TargetSpeed | MetaSpeed)]
+        return chosen[0] if chosen else None
+
+    def begin(self, episode: Episode) -> None:
+        """Begin an episode in which the station is present."""
+        self.encoder.reset()
+        perceived = episode.perceived[self.name]
+        self._control, self._planner, self._route = None, None, (-1.0, NO_ROUTE)
+        if self._needs_route:
+            simulation = episode.simulation
+            own: AgentSettings = simulation.stack.settings[self.name]  # type: ignore[attr-defined]
+            own = own.model_copy(update={"obey_signals": False})
+            dt, seed = simulation.settings.dt, simulation.seed
+            self._planner = RoutePlanner(own, self.spec, simulation.roads, dt=dt, seed=seed)
+        requested = None if perceived.goal is None else perceived.goal.speed
+        self.decoder.reset(perceived.ego.speed if requested is None else requested)
+        self.encoder.receive(perceived)
+
+    def decode(self, action: Any, perceived: StationPerception) -> StationAction:
+        """Return the decisions of an action. Raise SettingError if it is not in the space."""
+        return self.decoder.decode(action, perceived)
+
+    def observe(self, episode: Episode) -> Any:
+        """Return the observation; zeros if the station is not present."""
+        perceived = episode.perceived.get(self.name)
+        if perceived is None:
+            return self.encoder.zeros()
+        return self.encoder.encode(perceived, self.route(perceived), self._control)
+
+    def reward_terms(self, transition: Transition, route: Array, episode: Episode) -> dict[str, float]:
+        """Return the terms of the reward of one tick, and register its control and messages.
+
+        route  the one before the tick
+        """
+        step = transition.steps.get(self.name)
+        if step is not None:
+            self._control = step.control
+        perceived = episode.perceived.get(self.name)
+        if perceived is not None and transition.after is not transition.before:
+            self.encoder.receive(perceived)
+        return self.rewards.terms_of_tick(transition.before, transition.after, step, route)
+
+    def route(self, perceived: StationPerception) -> Array:
+        """Return the points (M, 2) of the route in the world frame [m]; the first segment is that at the vehicle."""
+        if self._planner is None:
+            return NO_ROUTE
+        if self._route[0] != perceived.time:
+            plan = self._planner.plan(perceived.ego, Detections(perceived.time), perceived.goal, perceived.time)
+            self._route = perceived.time, plan.points
+        return self._route[1]
+
+
+def sum_terms(terms: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return the sums of terms by name."""
+    total: dict[str, float] = {}
+    for one in terms:
+        for name, value in one.items():
+            total[name] = total.get(name, 0.0) + value
+    return total
