@@ -36,7 +36,7 @@ HARMLESS = {"compile", "builtins.id"}
 """Audit events of parsing an expression and of traversing its tree; the execution of code is a different event."""
 
 
-TEXTS = 100_000
+TEXTS = 40_000
 LOADED = 4_000
 SLOWEST = 0.5
 """Maximum processor time of one text [s]; a valid result takes less than 0.001 s, the slowest one 0.03 s."""
