@@ -8,10 +8,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.export.libraries import library
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.export.tables import TABLES, Columns
 from eidrive_scenario.files.atomic import atomic_output, create
+from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.recording.text.csv_writer import csv_text
 
 _GROUP = 50_000
@@ -36,7 +36,7 @@ def write_parquet(run: RecordedRun, path: Path, table: str) -> None:
 
     Raise SettingError if pyarrow is missing, or if the file cannot be written.
     """
-    arrow, parquet = library("pyarrow", "tables"), library("pyarrow.parquet", "tables")
+    arrow, parquet = optional_import("pyarrow", "tables"), optional_import("pyarrow.parquet", "tables")
     found = TABLES[table]
     schema = _schema(arrow, found.columns)
     rows = found.rows(run)

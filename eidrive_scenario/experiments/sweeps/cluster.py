@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import ExitStack
-from importlib import import_module
 from typing import Any, TypeVar
 
-from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
+from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.optional_imports import optional_import
 
 R = TypeVar("R")
 SLURM, KUBERNETES = "slurm", "kubernetes"
@@ -29,7 +29,7 @@ class DaskWorkers:
         self._client = client
         self._resources = resources
         self._executor = client.get_executor(pure=False)
-        self._killed = import_module("distributed").KilledWorker
+        self._killed = optional_import("distributed", "cluster").KilledWorker
 
     @classmethod
     def connect(cls, scheduler: str, count: int | None) -> DaskWorkers:
@@ -41,14 +41,14 @@ class DaskWorkers:
 
         Raise SettingError without Dask, and SimulationError if there is no worker within 120 s.
         """
-        distributed = _library("distributed", "cluster")
+        distributed = optional_import("distributed", "cluster")
         with ExitStack() as stack:
             try:
                 if scheduler == SLURM:
-                    cluster = stack.enter_context(_library("dask_jobqueue", "cluster").SLURMCluster())
+                    cluster = stack.enter_context(optional_import("dask_jobqueue", "cluster").SLURMCluster())
                     cluster.scale(jobs=count or 1)
                 elif scheduler == KUBERNETES:
-                    operator = _library("dask_kubernetes.operator", "kubernetes")
+                    operator = optional_import("dask_kubernetes.operator", "kubernetes")
                     cluster = stack.enter_context(operator.KubeCluster(name="eidrive-sweep", n_workers=count or 1))
                 else:
                     cluster = scheduler
@@ -73,12 +73,3 @@ class DaskWorkers:
     def close(self) -> None:
         self._executor.shutdown(wait=False)
         self._resources.close()
-
-
-def _library(name: str, extra: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError as error:
-        package = name.partition(".")[0]
-        hint = f"install it: pip install 'eidrive-scenario[{extra}]'"
-        raise SettingError(Diagnostic(f"{package} is not installed", hint)) from error

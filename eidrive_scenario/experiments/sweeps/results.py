@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import atomic_output
+from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.recording.text.csv_writer import neutralize_formula
 
 INTERVALS: Mapping[str, Callable[..., Proportion]] = {
@@ -97,7 +97,7 @@ def read_results(*stores: str | Path) -> Any:
 
     Raise SettingError if a file is not a store, or without pandas.
     """
-    pandas = _library("pandas")
+    pandas = optional_import("pandas", "tables")
     names, rows = as_table(stored_runs([Path(store) for store in stores]))
     return pandas.DataFrame(rows, columns=names)
 
@@ -120,7 +120,7 @@ def write_parquet(runs: Iterable[StoredRun], path: Path) -> None:
 
     Raise SettingError if it cannot be written, or without pyarrow.
     """
-    arrow, parquet = _library("pyarrow"), _library("pyarrow.parquet")
+    arrow, parquet = optional_import("pyarrow", "tables"), optional_import("pyarrow.parquet", "tables")
     names, rows = as_table(runs)
     columns = {name: _one_type([row.get(name) for row in rows]) for name in names}
     with atomic_output(path) as partial:
@@ -135,12 +135,3 @@ def _one_type(values: list[Any]) -> list[Any]:
     if kinds == {int, float}:
         return [None if value is None else float(value) for value in values]
     return [None if value is None else str(value) for value in values]
-
-
-def _library(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError as error:
-        package = name.partition(".")[0]
-        hint = "install it: pip install 'eidrive-scenario[tables]'"
-        raise SettingError(Diagnostic(f"{package} is not installed", hint)) from error

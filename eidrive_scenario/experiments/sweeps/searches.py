@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from eidrive_scenario.experiments.sweeps.axes import Axis, Point, Scalar
 from eidrive_scenario.experiments.sweeps.boundary import Boundary, BoundarySearch, is_found
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
+from eidrive_scenario.optional_imports import optional_import
 
 BATCH = 8
 """Number of runs that are proposed at a time."""
@@ -215,10 +215,6 @@ def _without_verdict(runs: Sequence[StoredRun]) -> SettingError:
 
 
 def _optuna() -> Any:
-    try:
-        optuna = import_module("optuna")
-    except ImportError as error:
-        hint = "install it: pip install 'eidrive-scenario[search]'"
-        raise SettingError(Diagnostic("optuna is not installed", hint)) from error
+    optuna = optional_import("optuna", "search")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     return optuna

@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 from eidrive_scenario.export.bodies import quaternion
-from eidrive_scenario.export.libraries import library
+from eidrive_scenario.optional_imports import optional_import
 
 WORLD = "map"
 """Name of the world frame, the root of all frames."""
@@ -32,7 +32,7 @@ class Foxglove:
 
 
 def _message(name: str) -> Any:
-    return getattr(library(f"foxglove_schemas_protobuf.{name}_pb2"), name)
+    return getattr(optional_import(f"foxglove_schemas_protobuf.{name}_pb2", "export"), name)
 
 
 def frame_of(actor: str, sensor: str | None = None) -> str:

@@ -8,9 +8,9 @@ from typing import Any, BinaryIO
 from eidrive_scenario.export.foxglove.metrics import ACTOR, STATION, json_schema
 from eidrive_scenario.export.foxglove.schemas import Foxglove
 from eidrive_scenario.export.foxglove.topics import Entry, Topics
-from eidrive_scenario.export.libraries import library
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
+from eidrive_scenario.optional_imports import optional_import
 
 _JSON = {"/metrics/actors/": ("eidrive.ActorMetrics", ACTOR), "/metrics/stations/": ("eidrive.StationMetrics", STATION)}
 """Name and fields of the schemas of JSON messages, by the start of the topic."""
@@ -24,7 +24,7 @@ def write_foxglove(run: RecordedRun, path: Path) -> None:
     Raise SettingError if a library is missing, or if the file cannot be written.
     """
     foxglove = Foxglove()
-    register = library("mcap_protobuf.schema").register_schema
+    register = optional_import("mcap_protobuf.schema", "export").register_schema
     with atomic_output(path) as partial, create(partial) as stream:
         _write(foxglove, run, stream, register)
 

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
-from eidrive_scenario.export.libraries import library
+from eidrive_scenario.optional_imports import optional_import
 
 
 class Osi:
     """Message classes and the version of ASAM OSI. Raise SettingError if osi-python is missing."""
 
     def __init__(self) -> None:
-        ground_truth = library("osi3.osi_groundtruth_pb2")
+        ground_truth = optional_import("osi3.osi_groundtruth_pb2", "export")
         self.ground_truth: Any = ground_truth.GroundTruth
-        self.sensor_data: Any = library("osi3.osi_sensordata_pb2").SensorData
-        self.moving_object: Any = library("osi3.osi_object_pb2").MovingObject
-        self.traffic_light: Any = library("osi3.osi_trafficlight_pb2").TrafficLight
-        self.lane: Any = library("osi3.osi_lane_pb2").Lane
-        self.lane_boundary: Any = library("osi3.osi_lane_pb2").LaneBoundary
-        self.environment: Any = library("osi3.osi_environment_pb2").EnvironmentalConditions
-        self.detected: Any = library("osi3.osi_detectedobject_pb2")
-        version = library("osi3.osi_version_pb2")
+        self.sensor_data: Any = optional_import("osi3.osi_sensordata_pb2", "export").SensorData
+        self.moving_object: Any = optional_import("osi3.osi_object_pb2", "export").MovingObject
+        self.traffic_light: Any = optional_import("osi3.osi_trafficlight_pb2", "export").TrafficLight
+        self.lane: Any = optional_import("osi3.osi_lane_pb2", "export").Lane
+        self.lane_boundary: Any = optional_import("osi3.osi_lane_pb2", "export").LaneBoundary
+        self.environment: Any = optional_import("osi3.osi_environment_pb2", "export").EnvironmentalConditions
+        self.detected: Any = optional_import("osi3.osi_detectedobject_pb2", "export")
+        version = optional_import("osi3.osi_version_pb2", "export")
         options = version.DESCRIPTOR.GetOptions()
         self._version = options.Extensions[version.current_interface_version]
 

@@ -9,13 +9,13 @@ from typing import Any, BinaryIO
 from urllib.parse import quote
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.export.libraries import library
 from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
 from eidrive_scenario.export.osi.identifiers import Identifiers
 from eidrive_scenario.export.osi.schemas import Osi, nanoseconds
 from eidrive_scenario.export.osi.sensor_data import SensorDataBuilder
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
+from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.recording.frame import Frame
 
 MULTI_CHANNEL, SINGLE_CHANNEL = ".mcap", ".osi"
@@ -61,8 +61,8 @@ def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
 def _write_multi_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
     from mcap.writer import CompressionType, Writer
 
-    register_schema = library("mcap_protobuf.schema").register_schema
-    protobuf = library("google.protobuf").__version__
+    register_schema = optional_import("mcap_protobuf.schema", "export").register_schema
+    protobuf = optional_import("google.protobuf", "export").__version__
     writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(profile="", library="eidrive-scenario")
     source = f"eidrive-scenario {run.recording.metadata.get('eidrive-scenario', 'unknown')}"

@@ -1,4 +1,4 @@
-"""Libraries of the formats, which are imported when a file is written."""
+"""Import of the libraries of optional dependencies when they are needed."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _PACKAGES = {
     "foxglove_schemas_protobuf": "foxglove-schemas-protobuf",
     "mcap_protobuf": "mcap-protobuf-support",
 }
-"""Package on PyPI by module."""
+"""Package on PyPI by module, if the names differ."""
 
 
-def library(module: str, extra: str = "export") -> Any:
+def optional_import(module: str, extra: str) -> Any:
     """Return a module. Raise SettingError with the command that installs it if it is missing.
 
     extra  optional dependencies of this project that contain it
