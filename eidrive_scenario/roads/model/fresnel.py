@@ -16,6 +16,8 @@ _SINE = [(-1) ** n * (math.pi / 2.0) ** (2 * n + 1) / (math.factorial(2 * n + 1)
     ::-1
 ]
 _COSINE = [(-1) ** n * (math.pi / 2.0) ** (2 * n) / (math.factorial(2 * n) * (4 * n + 1)) for n in range(_TERMS)][::-1]
+_BOTH = np.array([_SINE, _COSINE]).T[:, :, None]
+"""Coefficients of the sine and the cosine integral: (_TERMS, 2, 1)."""
 
 
 @overload
@@ -45,10 +47,16 @@ def _series(x: Array) -> tuple[Array, Array]: ...
 def _series(x: float | Array) -> tuple[float | Array, float | Array]:
     square = x * x
     fourth = square * square
-    sine, cosine = fourth * 0.0, fourth * 0.0
-    for of_sine, of_cosine in zip(_SINE, _COSINE, strict=True):
-        sine, cosine = sine * fourth + of_sine, cosine * fourth + of_cosine
-    return sine * square * x, cosine * x
+    if isinstance(x, float):
+        sine, cosine = 0.0, 0.0
+        for of_sine, of_cosine in zip(_SINE, _COSINE, strict=True):
+            sine, cosine = sine * fourth + of_sine, cosine * fourth + of_cosine
+        return sine * square * x, cosine * x
+    both = fourth * 0.0 + _BOTH[0]
+    for terms in _BOTH[1:]:
+        both *= fourth
+        both += terms
+    return both[0] * square * x, both[1] * x
 
 
 def _by_scipy(x: Any) -> tuple[Any, Any]:
