@@ -30,6 +30,9 @@ road users; their class prevents that they are detected as road users."""
 UNKNOWN = SizePrior((1.0, 1.0, 1.2), (0.6, 0.6, 0.6), 0.01)
 """Prior of a class that the table does not have."""
 
+CONFUSED: Mapping[str, tuple[str, ...]] = {"car": ("van",), "truck": ("van", "bus"), "bus": ("truck",)}
+"""Other classes of objects to which an image detector may give a class: such detectors distinguish few classes."""
+
 LARGEST = (14.0, 4.5, 4.8)
 """Maximum size of a road user [m]."""
 
@@ -37,3 +40,8 @@ LARGEST = (14.0, 4.5, 4.8)
 def prior_of(name: str) -> SizePrior:
     """Return the prior of a class, or UNKNOWN if the table has none."""
     return PRIORS.get(name, UNKNOWN)
+
+
+def possible_classes(name: str) -> tuple[str, ...]:
+    """Return the classes of objects to which an image detector may give the class `name`, which is the first one."""
+    return (name, *CONFUSED.get(name, ()))

@@ -7,29 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.map_context import LANE_DEVIATION, MapContext
 from eidrive_scenario.perception.geometry.projection import NEAREST, level_frame, straight_boxes
-from eidrive_scenario.perception.geometry.size_priors import prior_of
+from eidrive_scenario.perception.geometry.size_priors import possible_classes, prior_of
+from eidrive_scenario.perception.lifting.image_edges import (
+    EDGE_DEVIATION,
+    EDGE_SHARE,
+    edges_behind_others,
+    edges_in_image,
+    largest_sides,
+)
 from eidrive_scenario.sensing.readings import CameraReading
 
 HEADINGS = 12
 """Number of tested headings over half a turn."""
-EDGE_DEVIATION = 1.5
-"""Standard deviation between the edges of a box and of the object [px]; EDGE_SHARE of the box size is added."""
-EDGE_SHARE = 0.02
 SHAPE_DEVIATION = 0.08
 """Standard deviation of the edges of bodies of one size: bumpers, mirrors, roofs [m]."""
 CUT_DEVIATION = 0.35
 """Standard deviation of the lower edge of an object that the left or right border of the image cuts [m]. Its wheels may
 be outside the image, and its lowest visible part is a bumper or a sill, up to 0.7 m above the ground."""
-AT_BORDER = 2.0
-"""Distance from the border of the image within which an edge is that of the image, not of the object [px]; EDGE_SHARE
-of the box size is added."""
-HIDDEN_SHARE = 0.8
-"""Share of an edge in a nearer box above which the edge is that of the nearer object. Below it, the rest of the edge
-shows the end of this object."""
 ROUNDS = 10
 """Number of iterations of the fit."""
 FARTHEST = 300.0
@@ -41,6 +39,11 @@ LOOKS = 4
 NO_BODY = 4 * 7.0**2
 """Squared error above which no body of the class fills an image box: seven standard deviations at each edge. In 22,000
 boxes of the networks on vehicles and pedestrians in view, the largest was 156; a stripe of a crosswalk had 1,700."""
+OTHER_CLASS = 4.6
+"""Squared error that is added for another class than that of the image detector: one object in ten belongs to it."""
+DEGREES_OF_FREEDOM = 2.0
+"""Number of edges minus that of the coordinates of a position. A greater squared error means that the edges are less
+exact than assumed: the covariance is scaled by the ratio (Birge)."""
 LARGEST_VARIANCE = 2500.0
 """Maximum variance of a position along any axis [m²]: a standard deviation of 50 m."""
 
@@ -76,17 +79,19 @@ class ByGround(NamedTuple):
     covariance  (N, 2, 2) of their centers [m²]
     headings    (N, HEADINGS) tested headings of the length over half a turn [rad]
     costs       (N, HEADINGS) squared errors of the best fit with each, in standard deviations
+    of_named    (N,) minimum squared errors of the class that the detector gave
     """
 
     boxes: Array
     covariance: Array
     headings: Array
     costs: Array
+    of_named: Array
 
     @property
     def may_be_bodies(self) -> Bools:
-        """Whether (N,) a body of the class on the ground fills each image box."""
-        return np.asarray(self.costs.min(axis=1) <= NO_BODY)
+        """Whether (N,) a body of the detector's class on the ground fills each image box."""
+        return np.asarray(self.of_named <= NO_BODY)
 
 
 def lift_by_ground(
@@ -94,15 +99,20 @@ def lift_by_ground(
 ) -> ByGround:
     """Return boxes in the world whose projections fill image boxes (N, 4) [px].
 
-    Each box stands on the ground and has the usual size of its class. Its position is fitted so that the outline of its
-    projection has the edges of the image box: least squares (Levenberg and Marquardt) for several headings. The heading
-    with the minimum error is selected; the spread over the others adds to the covariance. An edge at the border of the
-    image is only a bound: the object continues there. The front points along the lane if there is a map, else away from
-    the camera. The height of roads is that of the map, else `ground` [m].
+    Each box stands on the ground and has the usual size of its class, or of one that detectors confuse with it. Its
+    position is fitted so that the outline of its projection has the edges of the image box: least squares (Levenberg
+    and Marquardt) for several headings. The class and heading with the minimum error are selected; the spread over the
+    others adds to the covariance. An edge at the border of the image is only a bound: the object continues there. The
+    front points along the lane if there is a map, else away from the camera. The height of roads is that of the map,
+    else `ground` [m].
     """
     if not len(boxes):
-        return ByGround(np.empty((0, 7)), np.empty((0, 2, 2)), np.empty((0, HEADINGS)), np.empty((0, HEADINGS)))
-    view = _View(np.asarray(boxes, dtype=float), classes, camera)
+        empty = np.empty((0, HEADINGS))
+        return ByGround(np.empty((0, 7)), np.empty((0, 2, 2)), empty, empty, np.empty(0))
+    possible = [possible_classes(name) for name in classes]
+    owner = np.repeat(np.arange(len(boxes)), [len(names) for names in possible])
+    is_other = np.array([place > 0 for names in possible for place in range(len(names))])
+    view = _View(np.asarray(boxes, dtype=float)[owner], [name for names in possible for name in names], camera)
     heights = surroundings.ground(view.positions_by_height(), ground)
     for _ in range(LOOKS):
         found = view.place(heights, surroundings)
@@ -110,7 +120,25 @@ def lift_by_ground(
         if np.all(np.abs(new_heights - heights) <= LEVEL):
             break
         heights = new_heights
-    return found
+    return _likeliest(found, owner, is_other)
+
+
+def _likeliest(found: ByGround, owner: Integers, is_other: Bools) -> ByGround:
+    """Return the class with the minimum error for each image box.
+
+    owner     (N,) index of the image box of each row, in ascending order
+    is_other  (N,) whether the class is another one than that of the detector
+    """
+    cost = found.of_named + np.where(is_other, OTHER_CLASS, 0.0)
+    order = np.lexsort((cost, owner))
+    best = order[np.flatnonzero(np.diff(owner[order], prepend=-1))]
+    weight = np.exp(-0.5 * (cost - cost[best][owner]))
+    weight /= np.bincount(owner, weight)[owner]
+    offset = found.boxes[:, :2] - found.boxes[best][owner, :2]
+    covariance = found.covariance[best].copy()
+    np.add.at(covariance, owner, weight[:, None, None] * offset[:, :, None] * offset[:, None, :])
+    of_named = found.of_named[~is_other]
+    return ByGround(found.boxes[best], covariance, found.headings[best], found.costs[best], of_named)
 
 
 class _View:
@@ -129,13 +157,13 @@ class _View:
         most = max(map(len, hulls))
         self._hulls = np.array([np.resize(hull, (most, 3)) for hull in hulls])
         focal = float(camera.intrinsics[0, 0])
-        self._blur = (EDGE_DEVIATION + EDGE_SHARE * _largest_sides(boxes)) / focal
+        self._blur = (EDGE_DEVIATION + EDGE_SHARE * largest_sides(boxes)) / focal
         self._cut = ~(self._known[:, 0] & self._known[:, 2])
         """Whether the left or right border of the image cuts the object."""
         self._borders = np.where(self._cut[:, None], self._edges[:, [0, 2]], (-np.inf, np.inf))
         self._borders[self._known[:, 0], 0] = -np.inf
         self._borders[self._known[:, 2], 1] = np.inf
-        self._known &= ~_behind_others(boxes)
+        self._known &= ~edges_behind_others(boxes)
         self._lowest = np.where(self._cut, CUT_DEVIATION, 0.0)
 
     def place(self, ground: Array, surroundings: MapContext) -> ByGround:
@@ -160,12 +188,14 @@ class _View:
         along = np.where(on_lane, base, np.arctan2(place[:, 1], place[:, 0]))
         heading = np.where(np.cos(heading - along) < -1e-9, heading + np.pi, heading)
         boxes = np.column_stack([place, ground + self._sizes[:, 2] / 2.0, self._sizes, wrap_angle(heading)])
-        covariance = self._covariance(information, heading) + heading_spread
+        scale = np.maximum(errors[rows, best] / DEGREES_OF_FREEDOM, 1.0)
+        covariance = self._covariance(information, heading, scale) + heading_spread
         return ByGround(
             self._frame.boxes_to_world(boxes),
             self._frame.covariance_to_world(covariance),
             headings + self._frame.yaw,
             costs,
+            costs[rows, best],
         )
 
     def positions_by_height(self) -> Array:
@@ -254,50 +284,16 @@ class _View:
         lowest = np.hypot(blur, self._lowest[:, None] / depth)
         return np.stack([sides, 1.0 / np.hypot(blur, upwards), sides, 1.0 / lowest], axis=-1)
 
-    def _covariance(self, information: Array, heading: Array) -> Array:
-        """Return covariances (N, 2, 2) of the centers: of the fit, and of the half length and width that are not
-        visible."""
+    def _covariance(self, information: Array, heading: Array, scale: Array) -> Array:
+        """Return covariances (N, 2, 2) of the centers: of the fit, scaled by `scale` (N,), and of the half length and
+        width that are not visible."""
         values, vectors = np.linalg.eigh(information)
         variances = np.minimum(1.0 / np.maximum(values, 1.0 / LARGEST_VARIANCE), LARGEST_VARIANCE)
         fit = np.einsum("nij,nj,nkj->nik", vectors, variances, vectors)
         cos, sin = np.cos(heading), np.sin(heading)
         axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
         sizes = (self._deviations[:, :2] / 2.0) ** 2
-        return np.asarray(fit + np.einsum("nij,nj,nkj->nik", axes, sizes, axes))
-
-
-def edges_in_image(boxes: Array, camera: CameraReading) -> Bools:
-    """Return whether (N, 4) the edges of image boxes (N, 4) are those of objects, not of the image."""
-    width, height = camera.size
-    inside = np.concatenate([boxes[:, :2], (width, height) - boxes[:, 2:]], axis=1)
-    return np.asarray(inside > (AT_BORDER + EDGE_SHARE * _largest_sides(boxes))[:, None])
-
-
-def _largest_sides(boxes: Array) -> Array:
-    """Return the longer side (N,) of image boxes (N, 4) [px]."""
-    return np.asarray(np.maximum(boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]))
-
-
-def _behind_others(boxes: Array) -> Bools:
-    """Return which edges (N, 4) of boxes (N, 4) are where another box hides the object.
-
-    The other box extends lower in the image, so it is nearer, and contains most of the length of the edge.
-    """
-    low, high = boxes[:, :2], boxes[:, 2:]
-    size = np.maximum(high - low, 1e-6)
-    nearer = high[None, :, 1] > high[:, None, 1] + EDGE_DEVIATION
-    shared = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
-    beside = shared > HIDDEN_SHARE * size[:, None]
-    margin = EDGE_DEVIATION + EDGE_SHARE * size
-    hidden = np.zeros((len(boxes), 4), dtype=bool)
-    for edge in range(4):
-        axis = edge % 2
-        place = boxes[:, edge][:, None]
-        within = (place > low[None, :, axis] - margin[:, None, axis]) & (
-            place < high[None, :, axis] + margin[:, None, axis]
-        )
-        hidden[:, edge] = (nearer & within & beside[:, :, 1 - axis]).any(axis=1)
-    return hidden
+        return np.asarray(scale[:, None, None] * fit + np.einsum("nij,nj,nkj->nik", axes, sizes, axes))
 
 
 def _diagonal(matrices: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,11 +16,12 @@ from eidrive_scenario.geometry import box_corners, overlap
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_points
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import pixels
-from eidrive_scenario.perception.geometry.size_priors import prior_of
+from eidrive_scenario.perception.geometry.size_priors import possible_classes, prior_of
 from eidrive_scenario.perception.lidar.box_fit import POOR_FIT, Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
-from eidrive_scenario.perception.lifting.ground import ByGround, edges_in_image, lift_by_ground
+from eidrive_scenario.perception.lifting.ground import ByGround, lift_by_ground
+from eidrive_scenario.perception.lifting.image_edges import edges_in_image
 from eidrive_scenario.perception.lifting.target import Target
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
@@ -42,12 +43,6 @@ arches [m]."""
 UNLIKELY = 60.0
 """Sum of squared size deviations above which points are not the object: 4.5 standard deviations in each of three sizes.
 A design choice: it is larger than that of the detector `lidar`, because the image shows that there is an object."""
-MAY_BE: Mapping[str, tuple[str, ...]] = {
-    "car": ("car", "van"),
-    "truck": ("truck", "van", "bus"),
-    "bus": ("bus", "truck"),
-}
-"""Classes whose sizes are tested for each class of an image detector: such detectors distinguish few classes."""
 
 
 def lift(
@@ -121,7 +116,7 @@ def _fit_points(
         deviation = math.sqrt(float(place @ spread @ place)) / expected**2
         target = Target(
             box.tolist(),
-            MAY_BE.get(name, (name,)),
+            possible_classes(name),
             expected,
             min(math.hypot(deviation, LEAST_DEVIATION), LARGEST_DEVIATION),
             max(prior_of(name).mean[:2]) / 4.0,

@@ -57,8 +57,8 @@ def test_lift_bodies_of_unusual_size_keeps_scores(name: str, size: float) -> Non
     assert found.scores.min() == 1.0
 
 
-def test_lift_with_points_keeps_score_of_body_in_the_air(street: Any) -> None:
-    """A box that no body on the ground fills is kept if the points show a body: a car beyond a step in the ground."""
+def test_lift_body_high_above_ground_has_score_zero(street: Any) -> None:
+    """A car whose wheels are 4 m above the assumed ground; on the right ground points and image agree."""
     car = street.thing("Car", 15, 0)
     sensors = {"front": CameraSettings(width=WIDTH, height=HEIGHT), "roof": LidarSettings()}
     readings = street.readings([street.thing("Ego", 0, 0), car], sensors)
@@ -66,3 +66,27 @@ def test_lift_with_points_keeps_score_of_body_in_the_air(street: Any) -> None:
     edges = np.array([outline(car.box, view)])
     assert lift(edges, ["car"], [0.7], view, time=0.0, ground=-4.0).scores.tolist() == [0.0]
     assert lift(edges, ["car"], [0.7], view, cloud, time=0.0).scores.tolist() == [0.7]
+
+
+@pytest.mark.parametrize("place", [(12.0, -3.0), (20.0, -3.0), (30.0, 4.0), (12.0, -3.0, 0.3)])
+def test_lift_van_that_detector_calls_car_is_placed_as_van(place: tuple[float, ...]) -> None:
+    """Networks have one class for both. As a car, the van would be nearer and across the lane."""
+    view, target = camera(), box("van", *place)
+    edges = np.array([outline(target, view, "van")])
+    found, same = (lift(edges, [name], [0.9], view, time=0.0) for name in ("car", "van"))
+    assert found.classes == ("car",)
+    np.testing.assert_allclose(found.boxes, same.boxes, atol=1e-6)
+    off = found.boxes[0, :2] - target[:2]
+    assert off @ np.linalg.solve(found.covariance[0], off) < 9.21
+
+
+def test_lift_box_that_body_fills_poorly_has_large_covariance() -> None:
+    """Half as wide and twice as high as a car: the edges are less exact than assumed, and so is the position."""
+    view = camera()
+    left, top, right, bottom = outline(box("car", 15.0, 0.0), view)
+    narrow = [left + (right - left) / 4.0, top - (bottom - top), right - (right - left) / 4.0, bottom]
+    usual, unusual = (
+        lift(np.array([edges]), ["car"], [0.9], view, time=0.0).covariance[0]
+        for edges in ([left, top, right, bottom], narrow)
+    )
+    assert (np.linalg.eigvalsh(unusual) > 3.0 * np.linalg.eigvalsh(usual)).all()

@@ -28,7 +28,7 @@ LANE = -1.75
 
 
 class KnownBox(NamedTuple):
-    """Object with the center of its box; `deviation` of its position [m] in x and y."""
+    """Object with the center of its box; `deviation` of its position in x and y, or `deviation_y` in y [m]."""
 
     x: float
     y: float = LANE
@@ -39,6 +39,12 @@ class KnownBox(NamedTuple):
     yaw: float = 0.0
     score: float = 1.0
     deviation: float = 0.1
+    deviation_y: float | None = None
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariance (2, 2) of the position [m²]."""
+        return np.diag([self.deviation, self.deviation if self.deviation_y is None else self.deviation_y]) ** 2
 
 
 def detections(time: float, *objects: KnownBox) -> Detections:
@@ -48,7 +54,7 @@ def detections(time: float, *objects: KnownBox) -> Detections:
         scores=np.array([o.score for o in objects]),
         classes=tuple(o.kind for o in objects),
         velocity=np.array([(o.vx, o.vy) for o in objects]).reshape(-1, 2),
-        covariance=np.array([np.eye(2) * o.deviation**2 for o in objects]).reshape(-1, 2, 2),
+        covariance=np.array([o.covariance for o in objects]).reshape(-1, 2, 2),
     )
 
 

@@ -145,8 +145,8 @@ class Decider:
     def _at_walking_pace(self, situation: Situation, profiles: list[LateralProfile]) -> Decision | None:
         """Return the decision to drive on at walking pace, with less clearance; None if that is not possible."""
         pace = self._walking_pace
-        scene = pace.scene(situation, self._scene(situation, pace.settings))
         slow = pace.situation(situation)
+        scene = pace.scene(slow, self._scene(slow, pace.settings))
         options = self._options(slow, scene, profiles, with_maneuvers=self._settings.lane_changes)
         best = options.best()
         if not pace.moves_safely(situation, options, best):

@@ -34,6 +34,11 @@ ALONG = math.cos(math.radians(40.0))
 """Cosine of the angle between axis and motion up to which an object moves along its axis."""
 LONGEST_HIDDEN = 10.0
 """Time for which an object is kept whose place is out of view [s], about that of passing it."""
+STAYING = 3.0
+"""Time constant of the mean place of an object [s]."""
+NEARBY = 1.0
+"""Maximum distance of an object from its mean place while it stays there [m]; one that sets off with 1 m/s² leaves it
+after 1.4 s."""
 CHANGING = 0.7
 """Time constant of the estimate of accelerations [s], which damps the noise of velocities."""
 
@@ -54,7 +59,7 @@ class KnownObject(msgspec.Struct):
     has_velocity: bool
     """Whether the velocity is measured or estimated; it is 0 otherwise."""
     error: float
-    """Standard deviation of the position [m]."""
+    """Standard deviation of the position in the direction in which it is greatest [m]."""
     existence: float
     seen: float
     """Time of the last observation [s]."""
@@ -66,6 +71,13 @@ class KnownObject(msgspec.Struct):
     """Time since which the object moves [s]; None while it stands."""
     hidden_since: float | None = None
     """Time since which the place of a lost object is out of view [s]."""
+    ellipse: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    """Covariance of the position in units of the squared error: half of the sum and of the difference of the variances
+    of x and y, and their covariance."""
+    first_seen: float = math.inf
+    """Time of the first observation [s]."""
+    mean_place: tuple[float, float] = (0.0, 0.0)
+    """Mean place over about the last seconds [m]."""
     acceleration: float = 0.0
     """Estimated rate of change of the speed [m/s²]."""
     mean_speed: float = 0.0
@@ -85,6 +97,11 @@ class KnownObject(msgspec.Struct):
     def seems_to_stand(self) -> bool:
         """Whether it stood and its speed is within the error; a road user on foot or on two wheels may set off."""
         return self.still_since is not None and self.speed < self.speed_error and self.kind not in VULNERABLE
+
+    def stays(self, now: float, duration: float) -> bool:
+        """Return whether it has been near one place for a time [s], whatever velocities were measured."""
+        x, y = self.mean_place
+        return now - self.first_seen >= duration and math.hypot(self.x - x, self.y - y) <= NEARBY
 
 
 class ObjectMemory:
@@ -173,7 +190,10 @@ class ObjectMemory:
 
 def _objects_of(detections: Detections, now: float, least: float) -> list[KnownObject]:
     existence = detections.confidence.tolist()
-    variance = detections.covariance[:, [0, 1], [0, 1]].max(axis=1, initial=0.0).tolist()
+    of_x, of_y, of_both = (detections.covariance[:, row, column] for row, column in ((0, 0), (1, 1), (0, 1)))
+    mean, half = 0.5 * (of_x + of_y), 0.5 * (of_x - of_y)
+    greatest = mean + np.hypot(half, of_both)
+    ellipses = np.column_stack([mean, half, of_both]) / np.where(greatest > 0.0, greatest, 1.0)[:, None]
     found = []
     for row, (box, (vx, vy)) in enumerate(zip(detections.boxes.tolist(), detections.velocity.tolist(), strict=True)):
         if existence[row] < least:
@@ -181,12 +201,17 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         x, y, _, length, width, _, yaw = box
         moving = not (math.isnan(vx) or math.isnan(vy))
         vx, vy = (vx, vy) if moving else (0.0, 0.0)
-        error = math.sqrt(variance[row]) if variance[row] >= 0.0 else USUAL_ERROR
+        variance, ellipse = greatest[row].item(), (1.0, 0.0, 0.0)
+        if variance > 0.0:
+            first, second, third = ellipses[row].tolist()
+            ellipse = first, second, third
+        error = math.sqrt(variance) if variance >= 0.0 else USUAL_ERROR
         kind = detections.classes[row]
         age = max(now - detections.time, 0.0)
         x, y, error = x + vx * age, y + vy * age, min(error + SPEED_ERROR * age, LARGEST_ERROR)
         known = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
-        known.mean_speed = known.speed
+        known.mean_speed, known.ellipse = known.speed, ellipse
+        known.first_seen, known.mean_place = now, (x, y)
         found.append(known)
     return found
 
@@ -247,4 +272,7 @@ def _take_over(known: KnownObject, fresh: KnownObject, step: float) -> None:
     known.row, known.kind, known.seen = fresh.row, fresh.kind, fresh.seen
     known.x, known.y, known.yaw = fresh.x, fresh.y, fresh.yaw
     known.length, known.width = fresh.length, fresh.width
-    known.error, known.existence = fresh.error, fresh.existence
+    known.error, known.ellipse, known.existence = fresh.error, fresh.ellipse, fresh.existence
+    x, y = known.mean_place
+    share = 1.0 - math.exp(-step / STAYING)
+    known.mean_place = x + share * (fresh.x - x), y + share * (fresh.y - y)

@@ -88,10 +88,11 @@ def surroundings(
     cos, sin = np.cos(turn), np.sin(turn)
     owners = [objects[index] for index in prediction.objects]
     half = np.array([(known.length / 2.0, known.width / 2.0) for known in owners]).reshape(-1, 2, 1)
-    error = settings.uncertainty * np.array([known.error for known in owners])[:, None]
-    half_length = np.abs(cos) * half[:, 0] + np.abs(sin) * half[:, 1] + np.minimum(error, LARGEST_ERROR_ALONG)
+    along, aside = position_errors(owners, heading - (prediction.yaw - prediction.yaw[:, :1]))
+    half_length = np.abs(cos) * half[:, 0] + np.abs(sin) * half[:, 1]
+    half_length += np.minimum(settings.uncertainty * along, LARGEST_ERROR_ALONG)
     half_width = np.abs(sin) * half[:, 0] + np.abs(cos) * half[:, 1]
-    widened = half_width + np.minimum(error, LARGEST_LATERAL_ERROR)
+    widened = half_width + np.minimum(settings.uncertainty * aside, LARGEST_LATERAL_ERROR)
     # A vehicle that follows its lane is within it, whatever the error of its position.
     half_width = np.maximum(half_width, np.minimum(widened, prediction.room[:, None]))
     margin = np.array(
@@ -114,6 +115,17 @@ def surroundings(
         behind,
         _yields(prediction, gives_way),
     )
+
+
+def position_errors(objects: list[KnownObject], direction: Array) -> tuple[Array, Array]:
+    """Return the standard deviations (N, K) of the positions of objects along directions (N, K) [rad] and across [m].
+
+    The error of an object that turns keeps its direction relative to the object.
+    """
+    error = np.array([known.error for known in objects])[:, None]
+    mean, half, of_both = np.array([known.ellipse for known in objects]).reshape(-1, 3, 1).transpose(1, 0, 2)
+    shift = half * np.cos(2.0 * direction) + of_both * np.sin(2.0 * direction)
+    return error * np.sqrt(np.maximum(mean + shift, 0.0)), error * np.sqrt(np.maximum(mean - shift, 0.0))
 
 
 def _may_be_passed(known: KnownObject) -> bool:

@@ -9,7 +9,9 @@ import numpy as np
 
 from eidrive_scenario.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.maneuvers import LEAST_CLEARANCE
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.options import Options
+from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
@@ -63,12 +65,41 @@ class WalkingPace:
         return self._drives
 
     def situation(self, situation: Situation) -> Situation:
-        """Return the situation with walking pace as the wanted speed."""
-        return msgspec.structs.replace(situation, wanted=min(situation.wanted, PACE))
+        """Return the situation with walking pace as the wanted speed, and with vehicles and obstacles that stay near
+        one place standing at their mean place."""
+        objects = [_at_mean_place(known, situation.now) for known in situation.objects]
+        wanted = min(situation.wanted, PACE)
+        return msgspec.structs.replace(
+            situation, wanted=wanted, objects=objects, prediction=_standing(situation.prediction, objects)
+        )
 
     def scene(self, situation: Situation, scene: Surroundings) -> Surroundings:
         """Return the scene with less margin beside vehicles and obstacles that stand."""
-        objects = [situation.objects[owner] for owner in scene.owner]
-        stands = np.array([known.still_since is not None and known.kind not in VULNERABLE for known in objects])
+        stands = np.array([_stands(situation.objects[owner]) for owner in scene.owner])
         margin = np.where(stands, np.minimum(scene.margin, LEAST_CLEARANCE), scene.margin)
         return msgspec.structs.replace(scene, margin=margin)
+
+
+def _stands(known: KnownObject) -> bool:
+    return known.still_since is not None and known.kind not in VULNERABLE
+
+
+def _at_mean_place(known: KnownObject, now: float) -> KnownObject:
+    """Return the object at rest at its mean place if it stays there, else unchanged: velocities of objects that the
+    border of an image cuts are noisy."""
+    if known.kind in VULNERABLE or not known.stays(now, WAIT):
+        return known
+    x, y = known.mean_place
+    still_since = known.first_seen if known.still_since is None else known.still_since
+    return msgspec.structs.replace(known, x=x, y=y, vx=0.0, vy=0.0, acceleration=0.0, still_since=still_since)
+
+
+def _standing(prediction: Prediction, objects: list[KnownObject]) -> Prediction:
+    """Return the prediction with the objects at rest at their places."""
+    owners = [objects[owner] for owner in prediction.objects]
+    stands = np.array([_stands(known) and known.speed == 0.0 for known in owners], dtype=bool)[:, None]
+    place = np.array([(known.x, known.y, known.yaw) for known in owners]).reshape(-1, 3, 1)
+    x, y, yaw = (
+        np.where(stands, place[:, axis], part) for axis, part in enumerate((prediction.x, prediction.y, prediction.yaw))
+    )
+    return msgspec.structs.replace(prediction, x=x, y=y, yaw=yaw, speed=np.where(stands, 0.0, prediction.speed))

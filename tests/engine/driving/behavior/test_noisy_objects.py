@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+import msgspec
 import numpy as np
 import pytest
 from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detections, two_lane_road
@@ -13,6 +14,7 @@ from signal_street import CAR
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.surroundings import position_errors
 from eidrive_scenario.roads import RoadNetwork
 
 TIMES = np.arange(0.0, 8.01, 0.25)
@@ -92,6 +94,78 @@ def test_vehicle_passes_a_narrow_place_at_walking_pace(roads: RoadNetwork) -> No
     assert any(reason.startswith("walking pace: ") for reason in run.reasons)
     waits = [speed for speed in run.speeds if speed < 0.3]
     assert len(waits) * 0.05 >= 5.0, "first it waits"
+
+
+@pytest.mark.parametrize(("along", "across", "is_passed_at_once"), [(0.6, 0.1, True), (0.1, 0.6, False)])
+def test_only_error_across_the_way_narrows_it(
+    roads: RoadNetwork, along: float, across: float, is_passed_at_once: bool
+) -> None:
+    """A camera measures the distance of a parked vehicle worse than its direction."""
+    boxes = [box._replace(deviation=along, deviation_y=across) for box in (PARKED, OPPOSITE)]
+    run = drive(roads, lambda now: boxes, 45.0)
+    assert run.front > 80.0
+    assert any(reason.startswith("walking pace: ") for reason in run.reasons) is not is_passed_at_once
+
+
+def test_error_of_a_turning_vehicle_turns_with_it() -> None:
+    """Its distance is uncertain by 2 m: first in x, after a turn to the left in y."""
+    known = ObjectMemory(BehaviorSettings()).update(
+        detections(0.0, KnownBox(0.0, 0.0, vx=5.0, deviation=2.0, deviation_y=0.5)), 0.0
+    )
+    turned = np.array([[0.0, math.pi / 2.0]])
+    along, across = position_errors(known, np.array([[0.0, math.pi / 2.0]]) - (turned - turned[:, :1]))
+    np.testing.assert_allclose(along, [[2.0, 2.0]])
+    np.testing.assert_allclose(across, [[0.5, 0.5]])
+
+
+@pytest.mark.parametrize("angle", np.linspace(0.0, math.pi, 9))
+def test_errors_along_and_across_are_those_of_the_rotated_covariance(angle: float) -> None:
+    """P = R diag(σ²) Rᵀ: the deviation in direction u is the root of uᵀ P u."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn = np.array([[cos, -sin], [sin, cos]])
+    covariance = turn @ np.diag([1.5**2, 0.4**2]) @ turn.T
+    found = msgspec.structs.replace(detections(0.0, KnownBox(0.0)), covariance=covariance[None])
+    (known,) = ObjectMemory(BehaviorSettings()).update(found, 0.0)
+    assert known.error == pytest.approx(1.5)
+    directions = np.linspace(0.0, 2.0 * math.pi, 13)[None]
+    along, across = position_errors([known], directions)
+    for direction, first, second in zip(directions[0], along[0], across[0], strict=True):
+        ahead, left = (
+            np.array([math.cos(direction), math.sin(direction)]),
+            np.array([-math.sin(direction), math.cos(direction)]),
+        )
+        assert first == pytest.approx(math.sqrt(ahead @ covariance @ ahead))
+        assert second == pytest.approx(math.sqrt(left @ covariance @ left))
+
+
+def test_parked_van_with_noisy_velocity_is_passed_at_walking_pace(roads: RoadNetwork) -> None:
+    """The border of the image cuts the van: its place varies by 0.7 m within a second, its velocity by 3 m/s."""
+
+    def seen(now: float) -> Sequence[KnownBox]:
+        if now < 3.0:
+            return [PARKED, OPPOSITE]
+        phase = 2.0 * math.pi * now
+        return [PARKED._replace(x=PARKED.x + 0.5 * math.sin(phase), vx=3.0 * math.cos(phase)), OPPOSITE]
+
+    run = drive(roads, seen, 60.0)
+    assert run.front > 80.0
+    assert any(reason.startswith("walking pace: ") for reason in run.reasons)
+
+
+def test_vehicle_that_sets_off_ends_walking_pace(roads: RoadNetwork) -> None:
+    """A van at the roadside pulls out with 1 m/s² while the vehicle approaches it, 4 m behind."""
+
+    def seen(now: float) -> Sequence[KnownBox]:
+        since = max(now - 14.0, 0.0)
+        box = PARKED._replace(x=PARKED.x + 0.5 * since**2, y=min(PARKED.y + 0.25 * since**2, LANE))
+        return [box._replace(vx=since, vy=0.5 * since if box.y < LANE else 0.0), OPPOSITE]
+
+    run = drive(roads, seen, 24.0)
+    for tick, (x, y, _) in enumerate(run.path):
+        van = seen(0.05 * tick)[0]
+        apart_along = abs(van.x - (x + FRONT / 2.0)) - van.size[0] / 2.0 - FRONT / 2.0
+        apart_across = abs(van.y - y) - van.size[1] / 2.0 - CAR.size[1] / 2.0
+        assert max(apart_along, apart_across) > 0.0, "no contact"
 
 
 def test_vehicle_stays_before_a_place_without_room(roads: RoadNetwork) -> None:
