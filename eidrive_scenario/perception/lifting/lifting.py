@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import box_corners, overlap
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_points
@@ -127,7 +127,11 @@ def _fit_points(
             scan.frame.covariance_to_local(spread),
             in_image[row],
         )
-        fit = _foreground(scan, camera, target, places, away)
+        others = np.zeros(len(places), dtype=bool)
+        for other in range(len(boxes)):
+            if other != row:
+                others |= _within(places, boxes[other])
+        fit = _foreground(scan, camera, target, places, away, others)
         found.append(None if fit is None else replace(fit, covariance=_total_covariance(fit, scan, target, camera)))
     return found
 
@@ -170,21 +174,30 @@ class _Candidate(NamedTuple):
     weight: float
 
 
-def _foreground(scan: Scan, camera: CameraReading, target: Target, places: Array, away: Array) -> Fit | None:
+def _foreground(
+    scan: Scan, camera: CameraReading, target: Target, places: Array, away: Array, others: Bools
+) -> Fit | None:
     """Return the box of the object among the points in and around an image box, or None.
 
+    Objects close to each other are one cluster: the points that are in no other image box are clustered, too.
+
     places   (N, 2) image positions of all points of the scan [px]; infinitely far aside for points behind the camera
-    away     (N,) distances from the camera [m]
+    away     (N,) distances from the camera [m];  others  (N,) whether points are in another image box
     """
     inside = _within(places, target.box)
-    rows = np.flatnonzero(_within(places, _widened(target)))
+    around = _within(places, _widened(target))
+    parts = [np.flatnonzero(around)]
+    if (inside & others).any():
+        parts.append(np.flatnonzero(around & ~others))
     best: tuple[float, Fit] | None = None
     tried: set[bytes] = set()
     for grazing in (True, False):
-        groups = [
-            rows[group].astype(np.int64) for group in clusters(scan.points[rows], scan.pattern.azimuth, grazing=grazing)
-        ]
-        candidates = _candidates([group for group in groups if group.tobytes() not in tried], inside, away, target)
+        groups = {
+            rows[group].tobytes(): rows[group].astype(np.int64)
+            for rows in parts
+            for group in clusters(scan.points[rows], scan.pattern.azimuth, grazing=grazing)
+        }
+        candidates = _candidates([groups[key] for key in groups if key not in tried], inside, away, target)
         for candidate in candidates[:MOST_TRIED]:
             fit = scan.fit(candidate.rows, target.classes, target.heading, target.heading_cost)
             if fit is None:
@@ -197,7 +210,7 @@ def _foreground(scan: Scan, camera: CameraReading, target: Target, places: Array
                 best = score, fit
         if best is not None and best[1].deviation <= POOR_FIT:
             break  # otherwise parts of a grazed surface may be separate clusters
-        tried.update(group.tobytes() for group in groups)
+        tried.update(groups)
     return None if best is None else best[1]
 
 

@@ -242,3 +242,21 @@ def test_lift_from_mast_with_lidar_is_accurate(street: Any) -> None:
     view = readings.cameras["mast"]
     found = lift(np.array([outline(car.box, view)]), ["car"], [1.0], view, readings.lidars["roof"], time=0.0)
     assert iou_bev(found.boxes, car.box[None])[0, 0] > 0.7
+
+
+def test_lift_from_mast_separates_cars_parked_bumper_to_bumper(street: Any) -> None:
+    """The gap of 0.5 m is smaller than the distance of points along the sides, so both are one cluster.
+
+    The image box of the nearer car extends over half of the other one, as boxes of networks do.
+    """
+    near, far = street.thing("Near", 10, -3.0), street.thing("Far", 15.1, -3.0)
+    mount = Mount(x=0.0, y=0.0, z=5.0, pitch=15.0)
+    sensors = {"mast": CameraSettings(width=WIDTH, height=HEIGHT, mount=mount), "roof": LidarSettings()}
+    readings = street.readings([near, far], sensors, mast=(0.0, 5.0, 0.2))
+    view = readings.cameras["mast"]
+    edges = np.array([outline(thing.box, view) for thing in (near, far)])
+    edges[0, 1] = 0.5 * (edges[0, 1] + edges[1, 1])
+    edges[0, 2] = max(edges[0, 2], 0.5 * (edges[1, 0] + edges[1, 2]))
+    found = lift(edges, ["car", "car"], [1.0, 1.0], view, readings.lidars["roof"], time=0.0)
+    for row, thing in enumerate((near, far)):
+        assert iou_bev(found.boxes, thing.box[None])[row, 0] > 0.6
