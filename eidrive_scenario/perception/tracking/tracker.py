@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.tracking.association import associate, position_noise
@@ -26,6 +26,8 @@ MOVING = 1.0
 """Minimum speed at which the front of an object is taken from its direction of motion [m/s]."""
 ACROSS = math.cos(math.pi / 4.0)
 """Cosine of the angle between two axes from which on one is across the other."""
+PART = 0.5
+"""Share of the length of a track below which a box shows a part of the object."""
 SMOOTHING = 0.2
 """Weight of a new box in the size, height and heading of an object with many detections."""
 
@@ -126,26 +128,19 @@ class Tracker(TrackingMethod):
     def _correct(self, rows: list[int], detections: Detections, columns: list[int], noise: Array) -> None:
         boxes = detections.boxes[columns]
         before = Estimates(self._tracks.state[rows], self._tracks.covariance[rows])
-        noise = noise[columns] + self._axis_noise(rows, boxes)
+        shape = self._shape[rows]
+        confirmed = np.array([self._histories[row].number is not None for row in rows], dtype=bool)
+        is_part = confirmed & (boxes[:, 3] < PART * shape[:, 1])
+        noise = noise[columns] + _axis_noise(shape, boxes, confirmed)
+        if is_part.any():
+            noise[is_part] += _part_noise(shape[is_part], boxes[is_part])
         state, covariance = self._model.update(before, boxes, noise)
         self._tracks.state[rows], self._tracks.covariance[rows] = state, covariance
         share = np.array([max(SMOOTHING, 1.0 / (self._histories[row].hits + 1.0)) for row in rows])
-        shape = self._shape[rows]
-        shape[:, :4] += share[:, None] * (boxes[:, 2:6] - shape[:, :4])
-        shape[:, 4] = self._headings(shape[:, 4], boxes[:, 6], state, share)
+        of_size = np.where(is_part, 0.0, share)
+        shape[:, :4] += of_size[:, None] * (boxes[:, 2:6] - shape[:, :4])
+        shape[:, 4] = self._headings(shape[:, 4], boxes[:, 6], state, of_size)
         self._shape[rows] = shape
-
-    def _axis_noise(self, rows: list[int], boxes: Array) -> Array:
-        """Return the covariance (N, 2, 2) of centers of boxes whose axis is across that of their confirmed track [m²].
-
-        The same visible corner belongs to a box along the track or across it; their centers differ by half the
-        difference of length and width in both directions.
-        """
-        confirmed = np.array([self._histories[row].number is not None for row in rows], dtype=bool)
-        shape = self._shape[rows]
-        across = confirmed & (np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS)
-        shift = np.where(across, (shape[:, 1] - shape[:, 2]) / 2.0, 0.0)
-        return np.asarray((shift**2)[:, None, None] * np.eye(2))
 
     def _headings(self, held: Array, measured: Array, state: Array, share: Array) -> Array:
         """Return headings (N,): the axis of the boxes, with the front in the direction of motion or else unchanged."""
@@ -226,3 +221,27 @@ class Tracker(TrackingMethod):
             tuple([history.number or 0 for history in histories]),
             existence,
         )
+
+
+def _axis_noise(shape: Array, boxes: Array, confirmed: Bools) -> Array:
+    """Return the covariance (N, 2, 2) of centers of boxes (N, 7) whose axis is across that of their confirmed track
+    [m²].
+
+    The same visible corner belongs to a box along the track or across it; their centers differ by half the difference
+    of length and width in both directions.
+    """
+    across = confirmed & (np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS)
+    shift = np.where(across, (shape[:, 1] - shape[:, 2]) / 2.0, 0.0)
+    return np.asarray((shift**2)[:, None, None] * np.eye(2))
+
+
+def _part_noise(shape: Array, boxes: Array) -> Array:
+    """Return the covariance (N, 2, 2) of centers of boxes (N, 7) around a visible part of their track [m²].
+
+    They differ from the center of the object by up to half the differences of the lengths and of the widths.
+    """
+    along = (shape[:, 1] - boxes[:, 3]) / 2.0
+    aside = np.maximum(shape[:, 2] - boxes[:, 4], 0.0) / 2.0
+    cos, sin = np.cos(shape[:, 4]), np.sin(shape[:, 4])
+    axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
+    return np.asarray(np.einsum("nij,nj,nkj->nik", axes, np.stack([along, aside], -1) ** 2, axes))

@@ -198,6 +198,27 @@ def test_box_across_a_track_hardly_moves_it() -> None:
     assert found.boxes[0, 6] == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 3.0, -2.5])
+def test_box_around_a_part_of_a_track_hardly_moves_it(yaw: float) -> None:
+    """The border of the image cuts a car, of which the network takes the visible end for a pedestrian."""
+    ahead, left = np.array([math.cos(yaw), math.sin(yaw)]), np.array([-math.sin(yaw), math.cos(yaw)])
+    track, alike = tracker(), tracker()
+    for tick in range(30):
+        for one in (track, alike):
+            one.update(cars(tick * DT, (*(2.0 * tick * DT * ahead), yaw)))
+    place = 6.25 * ahead + 0.25 * left
+    whole = alike.update(cars(3.0, (*place, yaw)))
+    part = cars(3.0, (*place, yaw))
+    boxes = part.boxes.copy()
+    boxes[:, 3:6] = 0.55, 0.55, 1.72
+    found = track.update(replace(part, boxes=boxes, classes=("pedestrian",)))
+    moved = np.abs((whole.boxes[0, :2] - 6.0 * ahead) @ np.column_stack([ahead, left]))
+    after = np.abs((found.boxes[0, :2] - 6.0 * ahead) @ np.column_stack([ahead, left]))
+    assert after[0] < 0.1 * moved[0]
+    assert after[1] < 0.2 * moved[1]
+    np.testing.assert_allclose(found.boxes[0, 3:5], whole.boxes[0, 3:5])
+
+
 def test_ctrv_has_smaller_error_than_cv_in_curve() -> None:
     """The same circle, measured at 2 Hz, where constant velocity cuts the curve."""
     means = {}
