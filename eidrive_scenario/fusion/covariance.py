@@ -1,4 +1,4 @@
-"""Covariance intersection: fusion of two estimates whose errors have an unknown correlation."""
+"""Fusion of two estimates whose errors have an unknown correlation: by covariance intersection."""
 
 from __future__ import annotations
 
@@ -62,6 +62,42 @@ def intersect(a: Array, b: Array) -> tuple[Array, Array]:
     both[0] = b[0] + share * (yy * gx - xy * gy)
     both[1] = b[1] + share * (xx * gy - xy * gx)
     return both, w
+
+
+def fuse(a: Array, b: Array, gate: float) -> Array:
+    """Return the fused estimates (5, ...): their intersection, or the weighted mean of both if they disagree.
+
+    gate  squared Mahalanobis distance of the means above which they disagree
+
+    At least one covariance is then too small, and intersection would extrapolate: two long ellipses meet beside both
+    means. Either may be wrong, so the result has mean and covariance of a Gaussian mixture of both with the weights of
+    the intersection: w a + (1 - w) b, and w A⁻¹ + (1 - w) B⁻¹ + w (1 - w) d dᵀ for the covariances A⁻¹ and B⁻¹.
+    """
+    fused, w = intersect(a, b)
+    apart = _squared_distance(a, b) > gate
+    if apart.any():
+        first, second, share = a[:, apart], b[:, apart], w[apart]
+        offset = means(first) - means(second)
+        spread = offset[..., :, None] * offset[..., None, :]
+        of_first, of_second = share[..., None, None], 1.0 - share[..., None, None]
+        fused[:, apart] = estimates(
+            means(second) + share[..., None] * offset,
+            of_first * covariances(first) + of_second * covariances(second) + of_first * of_second * spread,
+        )
+    return fused
+
+
+def _squared_distance(a: Array, b: Array) -> Array:
+    """Return the squared Mahalanobis distances (...) of estimates, for the sum of both covariances.
+
+    With the inverse covariances A and B it is dᵀ A (A + B)⁻¹ B d.
+    """
+    dx, dy = a[0] - b[0], a[1] - b[1]
+    xx, xy, yy = a[2:] + b[2:]
+    ux, uy = b[2] * dx + b[3] * dy, b[3] * dx + b[4] * dy
+    vx, vy = a[2] * dx + a[3] * dy, a[3] * dx + a[4] * dy
+    squared: Array = (vx * (yy * ux - xy * uy) + vy * (xx * uy - xy * ux)) / (xx * yy - xy * xy)
+    return squared
 
 
 def weight(trace_a: Array, det_a: Array, trace_b: Array, det_b: Array, mixed: Array) -> Array:

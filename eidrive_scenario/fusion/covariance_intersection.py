@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, Detections
-from eidrive_scenario.fusion.covariance import covariances, estimates, intersect, means
+from eidrive_scenario.fusion.covariance import covariances, estimates, fuse, means
 from eidrive_scenario.fusion.grouping import group_tracks
 from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
@@ -75,16 +75,19 @@ class CovarianceIntersectionFusion(FusionMethod):
         predict_tracks(present, np.full(len(rows), now))
         present["station"] = station[rows]
         objects = group_tracks(present, self._gate)
-        return _fuse_objects(present, objects, now, self.settings.existence)
+        return _fuse_objects(present, objects, now, self.settings.existence, self._gate.chi_square)
 
 
-def _fuse_objects(tracks: Table, objects: list[list[int]], now: float, least: float) -> Detections:
-    """Return one box per object with an existence probability of at least `least`."""
+def _fuse_objects(tracks: Table, objects: list[list[int]], now: float, least: float, gate: float) -> Detections:
+    """Return one box per object with an existence probability of at least `least`.
+
+    gate  squared Mahalanobis distance above which estimates disagree
+    """
     rows = np.array([row for members in objects for row in members], dtype=np.intp)
     starts = np.cumsum([0, *(len(members) for members in objects[:-1])])
     members = tracks[rows]
     existence = 1.0 - np.multiply.reduceat(1.0 - members["existence"], starts)
-    mean, covariance = _intersect_states(tracks, objects)
+    mean, covariance = _fuse_states(tracks, objects, gate)
     known = np.logical_or.reduceat(members["moving"], starts)
     velocity = np.where(known[:, None], mean[:, 1], np.nan)
     weights = np.maximum(members["score"], 1e-6)
@@ -108,11 +111,11 @@ def _fuse_objects(tracks: Table, objects: list[list[int]], now: float, least: fl
     return fused if len(likely) == len(fused) else fused.subset(likely.tolist())
 
 
-def _intersect_states(tracks: Table, objects: list[list[int]]) -> tuple[Array, Array]:
+def _fuse_states(tracks: Table, objects: list[list[int]], gate: float) -> tuple[Array, Array]:
     """Return positions and velocities (G, 2, 2) of the objects, and covariances of their positions (G, 2, 2).
 
-    Position and velocity are intersected separately, because their units differ. Members are fused in pairs, then the
-    results in pairs, and so on: any order is consistent.
+    Position and velocity are fused separately, because their units differ. Members are fused in pairs, then the results
+    in pairs, and so on: any order is consistent.
     """
     covariance = np.empty((len(tracks), 2, 2, 2))
     covariance[:, 0] = tracks["covariance"][:, :2, :2] + tracks["pose"]
@@ -121,7 +124,7 @@ def _intersect_states(tracks: Table, objects: list[list[int]]) -> tuple[Array, A
     groups, count = objects, len(tracks)
     while pairs := [pair for members in groups for pair in zip(members[::2], members[1::2], strict=False)]:
         first, second = zip(*pairs, strict=True)
-        fresh, _ = intersect(known.take(first, axis=1), known.take(second, axis=1))
+        fresh = fuse(known.take(first, axis=1), known.take(second, axis=1), gate)
         known = np.concatenate([known, fresh], axis=1)
         places = iter(range(count, count + len(pairs)))
         groups = [[*islice(places, len(members) // 2), *members[len(members) // 2 * 2 :]] for members in groups]

@@ -114,3 +114,32 @@ def test_intersect_is_consistent_for_any_correlation_unlike_independent_fusion(
     assert found == pytest.approx(expected, rel=0.1)
     assert overconfident == pytest.approx(naive, rel=0.1)
     assert found < 1.0, "the error does not exceed the covariance"
+
+
+def test_fuse_of_disagreeing_ellipses_is_between_both_means() -> None:
+    """Two cameras see a van from both ends, each takes its end for the center: the long axes meet beside the van."""
+    a, cov_a = np.array([48.9, -2.9]), np.array([[0.051, 0.057], [0.057, 0.208]])
+    b, cov_b = np.array([51.1, -2.6]), np.array([[0.199, -0.177], [-0.177, 0.267]])
+    crossing, _, weight = intersect(a, cov_a, b, cov_b)
+    assert crossing[1] > -2.2
+    first, second = (ci.estimates(mean[None], spread[None]) for mean, spread in ((a, cov_a), (b, cov_b)))
+    fused = ci.fuse(first, second, gate=9.21)
+    np.testing.assert_allclose(ci.means(fused)[0], weight * a + (1.0 - weight) * b)
+    off = b - a
+    mixture = weight * cov_a + (1.0 - weight) * cov_b + weight * (1.0 - weight) * np.outer(off, off)
+    np.testing.assert_allclose(ci.covariances(fused)[0], mixture)
+
+
+def test_fuse_disagreement_is_the_mahalanobis_distance() -> None:
+    """dᵀ (P + Q)⁻¹ d, of random estimates: on either side of the gate the result is that of the closed forms."""
+    pairs = random_covariances(300, 7)
+    rng = generator(1, "means")
+    a, b = rng.normal(size=(300, 2)) * 3.0, rng.normal(size=(300, 2)) * 3.0
+    off = a - b
+    squared = np.einsum("ni,nij,nj->n", off, np.linalg.inv(pairs[:, 0] + pairs[:, 1]), off)
+    first, second = ci.estimates(a, pairs[:, 0]), ci.estimates(b, pairs[:, 1])
+    met, weight = ci.intersect(first, second)
+    between = weight[:, None] * a + (1.0 - weight[:, None]) * b
+    expected = np.where((squared > 9.21)[:, None], between, ci.means(met))
+    assert 50 < np.count_nonzero(squared > 9.21) < 250
+    np.testing.assert_allclose(ci.means(ci.fuse(first, second, gate=9.21)), expected, atol=1e-6)
