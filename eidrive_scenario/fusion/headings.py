@@ -15,6 +15,9 @@ SIGNIFICANT = 2.0
 """Minimum turn rate in standard deviations; smaller rates are assumed to be 0."""
 FORGETTING = 0.8
 """Factor of the accumulated votes for the front at each report."""
+AGREEMENT = 0.5
+"""Minimum length of the mean of the unit vectors of doubled angles. Two axes of equal weight are then less than 60°
+apart; the mean of contradicting axes would be a box across all of them."""
 
 
 def initiate_heading(yaw: Array) -> tuple[Array, Array]:
@@ -65,17 +68,21 @@ def update_heading(heading: Array, covariance: Array, facing: Array, yaw: Array)
 def fuse_headings(yaw: Array, weights: Array, starts: NDArray[np.intp], velocity: Array) -> Array:
     """Return one heading in (-pi, pi] for each group (G,) of consecutive headings (K,) that begins at `starts` (G,).
 
-    The axis is the weighted circular mean of doubled angles, which is independent of the front of each report. The
-    front is that of the larger weight; for equal weights, that of the direction of `velocity` (G, 2), NaN if unknown.
+    The axis is the weighted circular mean of doubled angles, which is independent of the front of each report; of axes
+    that contradict each other, it is that of the largest weight. The front is that of the larger weight; for equal
+    weights, that of the direction of `velocity` (G, 2), NaN if unknown.
     """
     counts = np.diff(starts, append=len(yaw))
     if len(counts) == len(yaw):
         return yaw
     x = np.add.reduceat(weights * np.cos(2.0 * yaw), starts)
     y = np.add.reduceat(weights * np.sin(2.0 * yaw), starts)
-    axis = 0.5 * np.arctan2(y, x)
-    votes = np.add.reduceat(weights * np.sign(np.cos(yaw - np.repeat(axis, counts))), starts)
     total = np.add.reduceat(weights, starts)
+    axis = 0.5 * np.arctan2(y, x)
+    for group in np.flatnonzero(np.hypot(x, y) < AGREEMENT * total).tolist():
+        members = slice(starts[group], starts[group] + counts[group])
+        axis[group] = yaw[members][np.argmax(weights[members])]
+    votes = np.add.reduceat(weights * np.sign(np.cos(yaw - np.repeat(axis, counts))), starts)
     ahead = velocity[:, 0] * np.cos(axis) + velocity[:, 1] * np.sin(axis)
     split = (np.abs(votes) < 1e-9 * total) & np.isfinite(ahead)
     front = np.where(split, ahead, votes)

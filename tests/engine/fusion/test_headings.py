@@ -64,6 +64,13 @@ def test_fuse_headings_is_a_circular_mean() -> None:
     assert fuse(1.234) == 1.234
 
 
+def test_fuse_headings_of_contradicting_axes_is_that_of_the_largest_weight() -> None:
+    assert fuse(0.0, -1.5, weights=[0.9, 0.8]) == pytest.approx(0.0)
+    assert fuse(0.0, -1.5, weights=[0.8, 0.9]) == pytest.approx(-1.5)
+    assert fuse(math.pi, 1.5, weights=[0.9, 0.8]) == pytest.approx(math.pi)
+    assert fuse(0.0, math.radians(50)) == pytest.approx(math.radians(25)), "these agree"
+
+
 def test_fuse_headings_front_is_that_of_the_larger_weight() -> None:
     assert fuse(0.2, 0.2 - math.pi, 0.2) == pytest.approx(0.2)
     assert fuse(0.2 - math.pi, 0.2, 0.2 - math.pi) == pytest.approx(0.2 - math.pi)

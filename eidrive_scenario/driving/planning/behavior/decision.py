@@ -138,15 +138,19 @@ class Decider:
             situation.line,
             situation.window,
             settings,
-            (situation.s + self._center, situation.d, self._half_length, self._half_width),
+            self._ego(situation),
             situation.gives_way,
         )
+
+    def _ego(self, situation: Situation) -> tuple[float, float, float, float]:
+        return situation.s + self._center, situation.d, self._half_length, self._half_width
 
     def _at_walking_pace(self, situation: Situation, profiles: list[LateralProfile]) -> Decision | None:
         """Return the decision to drive on at walking pace, with less clearance; None if that is not possible."""
         pace = self._walking_pace
         slow = pace.situation(situation)
-        scene = pace.scene(slow, self._scene(slow, pace.settings))
+        seen, exact = (self._scene(slow, settings) for settings in (pace.settings, pace.exact))
+        scene = pace.scene(slow.objects, seen, exact, self._ego(slow))
         options = self._options(slow, scene, profiles, with_maneuvers=self._settings.lane_changes)
         best = options.best()
         if not pace.moves_safely(situation, options, best):

@@ -39,6 +39,7 @@ class WalkingPace:
 
     def __init__(self, settings: BehaviorSettings, times: int) -> None:
         self.settings = settings.model_copy(update={"uncertainty": LESS_UNCERTAIN * settings.uncertainty})
+        self.exact = settings.model_copy(update={"uncertainty": 0.0})
         self._soon = times // 4
         self._stands_since = math.inf
         self._is_active = False
@@ -73,11 +74,28 @@ class WalkingPace:
             situation, wanted=wanted, objects=objects, prediction=_standing(situation.prediction, objects)
         )
 
-    def scene(self, situation: Situation, scene: Surroundings) -> Surroundings:
-        """Return the scene with less margin beside vehicles and obstacles that stand."""
-        stands = np.array([_stands(situation.objects[owner]) for owner in scene.owner])
+    def scene(
+        self,
+        objects: list[KnownObject],
+        scene: Surroundings,
+        exact: Surroundings,
+        ego: tuple[float, float, float, float],
+    ) -> Surroundings:
+        """Return the scene with less margin beside vehicles and obstacles that stand.
+
+        The vehicle may pass those beside it at its present distance. Their errors cannot reach it, since it touches
+        nothing.
+
+        exact  the same hypotheses without errors of position
+        ego    distance along the line of the center of the ego, its offset, half length and half width [m]
+        """
+        stands = np.array([_stands(objects[owner]) for owner in scene.owner], dtype=bool)
         margin = np.where(stands, np.minimum(scene.margin, LEAST_CLEARANCE), scene.margin)
-        return msgspec.structs.replace(scene, margin=margin)
+        center, offset, length, width = ego
+        gap, half_width = np.abs(scene.d[:, 0] - offset) - width, exact.half_width[:, 0]
+        beside = stands & (gap > half_width) & (np.abs(scene.s[:, 0] - center) < scene.half_length[:, 0] + length)
+        limit = np.where(beside, np.maximum(gap - LEAST_CLEARANCE, half_width), np.inf)
+        return msgspec.structs.replace(scene, margin=margin, half_width=np.minimum(scene.half_width, limit[:, None]))
 
 
 def _stands(known: KnownObject) -> bool:

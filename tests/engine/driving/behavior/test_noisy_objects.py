@@ -14,7 +14,8 @@ from signal_street import CAR
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.surroundings import position_errors
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, position_errors
+from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
 from eidrive_scenario.roads import RoadNetwork
 
 TIMES = np.arange(0.0, 8.01, 0.25)
@@ -150,6 +151,35 @@ def test_parked_van_with_noisy_velocity_is_passed_at_walking_pace(roads: RoadNet
     run = drive(roads, seen, 60.0)
     assert run.front > 80.0
     assert any(reason.startswith("walking pace: ") for reason in run.reasons)
+
+
+@pytest.mark.parametrize(
+    ("offset", "s", "error", "speed", "half_width"),
+    [
+        (2.6, 51.0, 0.3, 0.0, 1.35),  # Within the present gap of 1.68 m, with a margin of 0.25 m.
+        (2.6, 51.0, 0.6, 0.0, 1.43),  # Limited to the gap less the margin.
+        (2.1, 51.0, 0.6, 0.0, 1.05),  # Never less than the body, with a gap of 1.18 m.
+        (1.9, 51.0, 0.6, 0.0, 1.65),  # The body would touch the vehicle: its place is wrong.
+        (2.6, 56.0, 0.6, 0.0, 1.65),  # Ahead of the vehicle, not beside it.
+        (2.6, 51.0, 0.6, 1.0, 1.65),  # It moves.
+    ],
+)
+def test_errors_of_a_standing_vehicle_end_beside_the_ego(
+    offset: float, s: float, error: float, speed: float, half_width: float
+) -> None:
+    """The ego, 4.9 m × 1.84 m, is at s = 50 m; the van is 5 m × 2.1 m, and its errors add to half of its width."""
+    known = ObjectMemory(BehaviorSettings()).update(detections(0.0, KnownBox(s, -offset, vx=speed)), 0.0)
+
+    def scene(more: float) -> Surroundings:
+        at = np.ones((1, 2))
+        return Surroundings(
+            *(s * at, -offset * at, 2.5 * at, (1.05 + more) * at, speed * at, np.array([0.5]), (0,)),
+            *(np.ones(1, dtype=bool), np.zeros(1), np.zeros((1, 2), dtype=bool)),
+            *(np.zeros(1, dtype=bool), np.zeros(1, dtype=bool)),
+        )
+
+    found = WalkingPace(BehaviorSettings(), 9).scene(known, scene(error), scene(0.0), (50.0, 0.0, 2.45, 0.92))
+    np.testing.assert_allclose(found.half_width, half_width)
 
 
 def test_vehicle_that_sets_off_ends_walking_pace(roads: RoadNetwork) -> None:
