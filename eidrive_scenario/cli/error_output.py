@@ -33,13 +33,14 @@ class Guarded(TyperGroup):
             typer.echo("interrupted", err=True)
             print_notes(error)
             raise typer.Exit(_INTERRUPTED) from error
-        except BrokenPipeError as error:
-            # The reader, for example `head`, closed the pipe. Without this, the flush at exit reports the error again.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise typer.Exit(_BROKEN_PIPE) from error
         except (Exception, SystemExit) as error:
             if _from_typer(error):
                 raise
+            # The reader, for example `head`, closed the pipe; rich replaces the error by the exit of a failed run.
+            if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
+                # Without this, the flush at exit reports the error again.
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                raise typer.Exit(_BROKEN_PIPE) from error
             (show_traceback if ctx.params.get("traceback") else print_error)(error)
             raise typer.Exit(ABORTED) from error
 

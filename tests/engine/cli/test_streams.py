@@ -69,3 +69,13 @@ def test_closed_standard_output_is_not_an_error(passing_by: Path, arguments: lis
     closed = f"'{sys.executable}' -m eidrive_scenario {given} >&-"
     result = subprocess.run(["/bin/sh", "-c", closed], capture_output=True, check=False)
     assert (result.returncode, result.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("arguments", [["run", "--help"], ["list", "criteria"]])
+def test_reader_that_closes_the_pipe_is_not_an_error(arguments: list[str]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    result = eidrive(*arguments, stdout=writer)
+    os.close(writer)
+    assert result.returncode == 141, "128 + SIGPIPE"
+    assert result.stderr == b""

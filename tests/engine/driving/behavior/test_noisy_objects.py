@@ -167,7 +167,7 @@ def test_parked_van_with_noisy_velocity_is_passed_at_walking_pace(roads: RoadNet
 def test_errors_of_a_standing_vehicle_end_beside_the_ego(
     offset: float, s: float, error: float, speed: float, half_width: float
 ) -> None:
-    """The ego, 4.9 m × 1.84 m, is at s = 50 m; the van is 5 m × 2.1 m, and its errors add to half of its width."""
+    """The ego, 4.9 m long and 1.84 m wide, is at s = 50 m; errors add to half of the width of the van, 2.1 m."""
     known = ObjectMemory(BehaviorSettings()).update(detections(0.0, KnownBox(s, -offset, vx=speed)), 0.0)
 
     def scene(more: float) -> Surroundings:
