@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,9 +17,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from eidrive_scenario.experiments.sweeps.results import PointSummary
+    from eidrive_scenario.experiments.sweeps.sweep import SweepProgress
 
 USUAL_LIMIT = 1800.0
 """Default maximum wall time of a run [s]."""
+REASONS = 3
+"""Number of printed reasons of runs without a verdict."""
 
 
 def sweep(
@@ -135,10 +139,20 @@ def sweep(
                 progress = run_sweep(jobs, opened, crew, wall_limit=wall_limit, retry=retry, shown=display.show)
         finally:
             crew.close()
-    counts = ", ".join(f"{count} {status}" for status, count in sorted(progress.counts.items()))
-    kept = f", {progress.kept} already in the store" if progress.kept else ""
-    typer.echo(f"{progress.done} runs in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}")
+    _print_summary(progress, store)
     raise typer.Exit(PASSED if progress.is_complete else ABORTED)
+
+
+def _print_summary(progress: SweepProgress, store: Path) -> None:
+    """Print the number of runs by status, and the most frequent reasons of runs without a verdict."""
+    counts = ", ".join(f"{count} {status}" for status, count in sorted(progress.counts.items()))
+    stored = ", ".join(f"{count} {status}" for status, count in sorted(progress.stored.items()))
+    kept = f", {progress.kept} already in the store ({stored})" if stored else ""
+    typer.echo(f"{progress.done} runs in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}")
+    for (status, message), count in progress.errors.most_common(REASONS):
+        typer.echo(f"{count} {status}: {message}", err=True)
+    if not progress.is_complete:
+        typer.echo(f"all runs without a verdict: eidrive results {shlex.quote(str(store))} --failures", err=True)
 
 
 def results(

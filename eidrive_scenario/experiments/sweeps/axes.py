@@ -91,10 +91,11 @@ def parse_axes(texts: list[str]) -> tuple[Axis, ...]:
 def _identity(name: str) -> str:
     """Return one name for a parameter with and without prefix, unless a setting has this name."""
     bare = name.removeprefix(PARAMETER)
-    return name if _is_setting(bare) else bare
+    return name if is_setting(bare) else bare
 
 
-def _is_setting(name: str) -> bool:
+def is_setting(name: str) -> bool:
+    """Return whether the name of an axis is that of a setting of the run, not of a parameter."""
     return name in SETTINGS or name.startswith(f"{CHANNEL}.")
 
 

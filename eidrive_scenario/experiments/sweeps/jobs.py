@@ -8,11 +8,20 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import ConstraintError, Diagnostic, SettingError
-from eidrive_scenario.experiments.sweeps.axes import CHANNEL, Point, Scalar, settings_at
+from eidrive_scenario.errors import ConstraintError, Diagnostic, SettingError, suggestion
+from eidrive_scenario.experiments.sweeps.axes import (
+    CHANNEL,
+    PARAMETER,
+    SETTINGS,
+    Point,
+    Scalar,
+    is_setting,
+    settings_at,
+)
 from eidrive_scenario.openscenario import ConcreteRun, load_distribution
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json, package_versions, sha256_of
 from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.v2x.profile import load_profile
 
 MOST_RUNS = 10_000_000
 """Maximum number of runs of a sweep."""
@@ -125,9 +134,21 @@ def plan_of(
     profile = first.channel_profile
     digest = sha256_of(canonical_json({"files": first.files, "versions": dict(first.versions)}).encode())
     plan = SweepPlan(scenario, tuple(points), chosen, min(total, runs or total), settings, digest, profile)
+    _check_names(points, first.parameters)
     for point in points:  # a point that cannot be run is an error before the runs, not among them
-        settings_at(_without_run(point), settings, profile)
+        at = settings_at(_without_run(point), settings, profile)
+        if isinstance(at.channel, Mapping):
+            load_profile(at.channel, origin="--vary: channel")
     return plan
+
+
+def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:
+    """Raise SettingError if an axis is neither a setting nor a declared parameter."""
+    for name in dict.fromkeys(name for point in points for name in _without_run(point)):
+        parameter = name.removeprefix(PARAMETER)
+        if not is_setting(name) and parameter not in declared:
+            text = f"--vary: unknown parameter or setting {parameter!r}"
+            raise SettingError(Diagnostic(text, suggestion(parameter, [*declared, *sorted(SETTINGS)])))
 
 
 def versions() -> Mapping[str, str]:

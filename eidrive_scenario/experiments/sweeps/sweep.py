@@ -14,6 +14,8 @@ from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import EXCLUDED, FAILED, PASSED, REPEATABLE, ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.workers import Workers
 
+JUDGED = frozenset({PASSED, FAILED, EXCLUDED})
+"""Outcomes with a verdict, and those of runs that constraints exclude."""
 TRIES = 2
 """Number of tries of a job whose worker process ends."""
 
@@ -27,14 +29,21 @@ class SweepProgress:
     """Progress of a sweep.
 
     total   number of runs
-    kept    number of runs that the store already had
+    stored  number of runs that the store already had, by status
     counts  number of runs of this call by status
+    errors  number of runs of this call without a verdict, by status and first line of the message
     """
 
     total: int
-    kept: int = 0
+    stored: Counter[str] = field(default_factory=Counter)
     counts: Counter[str] = field(default_factory=Counter)
+    errors: Counter[tuple[str, str]] = field(default_factory=Counter)
     start: float = field(default_factory=time.perf_counter)
+
+    @property
+    def kept(self) -> int:
+        """Number of runs that the store already had."""
+        return self.stored.total()
 
     @property
     def done(self) -> int:
@@ -43,8 +52,8 @@ class SweepProgress:
 
     @property
     def is_complete(self) -> bool:
-        """Whether all runs of this call have a verdict, or are excluded by constraints."""
-        return self.left == 0 and not set(self.counts) - {PASSED, FAILED, EXCLUDED}
+        """Whether all runs have a verdict, or are excluded by constraints."""
+        return self.left == 0 and not (self.counts.keys() | self.stored.keys()) - JUDGED
 
     @property
     def left(self) -> int:
@@ -97,7 +106,7 @@ def run_sweep(
             if status is None or (retry and status in REPEATABLE):
                 yield job
             else:
-                progress.kept += 1
+                progress.stored[status] += 1
 
     waiting = left()
     shown(progress, None)
@@ -121,4 +130,6 @@ def run_sweep(
                 run = crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}")
             store.add(run)
             progress.counts[run.status] += 1
+            if run.status not in JUDGED:
+                progress.errors[run.status, run.error.partition("\n")[0]] += 1
             shown(progress, run)

@@ -121,6 +121,11 @@ def test_results_combine_stores(eidrive: Eidrive, store: Path, tmp_path: Path) -
         (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1,2"), "not an interval"),
         (("sweep", "{scenario}", "--store", "s.db", "--falsify"), "without --vary"),
         (("sweep", "{scenario}", "--store", "s.db", "--vary", "channel.delay.seconds=0,1"), "no channel"),
+        (("sweep", "{scenario}", "--store", "s.db", "--vary", "Sped=1,2"), "did you mean 'Speed'"),
+        (
+            ("sweep", "{scenario}", "--store", "s.db", "--channel", "ideal", "--vary", "channel.delay.secs=1"),
+            "did you mean 'seconds'",
+        ),
         (("sweep", "no_such_scenario", "--store", "s.db"), "no_such_scenario"),
         (("sweep", "{scenario}", "--store", "{folder}"), "not a regular file"),
     ],
@@ -145,7 +150,20 @@ def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_
     first = eidrive(*arguments)
     assert first.exit_code == 0
     assert "1 failed, 1 passed" in first.stdout
-    assert "2 already in the store" in eidrive(*arguments).stdout
+    assert "2 already in the store (1 failed, 1 passed)" in eidrive(*arguments).stdout
+
+
+def test_sweep_command_prints_why_runs_have_no_verdict(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    store = tmp_path / "s.db"
+    arguments = ("sweep", scenario, "--vary", "Speed=10,fast", "--store", store, "--workers", "1")
+    first = eidrive(*arguments)
+    assert first.exit_code == 3
+    assert "1 invalid: " in first.stderr
+    assert "parameter 'Speed' is 'fast', which is not a number" in first.stderr
+    assert f"eidrive results {store} --failures" in first.stderr
+    again = eidrive(*arguments)
+    assert again.exit_code == 3, "the store still has a run without a verdict"
+    assert "2 already in the store (1 invalid, 1 passed)" in again.stdout
 
 
 def test_find_boundary_command_prints_value(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
