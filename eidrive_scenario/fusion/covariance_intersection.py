@@ -95,7 +95,8 @@ def _fuse_objects(tracks: Table, objects: list[list[int]], now: float, least: fl
     body = np.add.reduceat(shares[:, None] * members["body"], starts, axis=0)
     boxes = np.empty((len(objects), 7))
     boxes[:, :2], boxes[:, 2:6] = mean[:, 0], body
-    boxes[:, 6] = fuse_headings(members["heading"][:, 0], weights, starts, velocity)
+    errors = np.trace(members["covariance"][:, :2, :2] + members["pose"], axis1=1, axis2=2)
+    boxes[:, 6] = fuse_headings(members["heading"][:, 0], weights, errors, starts, velocity)
     votes = members["votes"] / np.maximum(members["votes"].sum(axis=1, keepdims=True), 1e-12)
     words = np.argmax(np.add.reduceat(weights[:, None] * votes, starts, axis=0), axis=1)
     fused = Detections(

@@ -65,12 +65,14 @@ def update_heading(heading: Array, covariance: Array, facing: Array, yaw: Array)
     return corrected, after, np.abs(votes)
 
 
-def fuse_headings(yaw: Array, weights: Array, starts: NDArray[np.intp], velocity: Array) -> Array:
+def fuse_headings(yaw: Array, weights: Array, errors: Array, starts: NDArray[np.intp], velocity: Array) -> Array:
     """Return one heading in (-pi, pi] for each group (G,) of consecutive headings (K,) that begins at `starts` (G,).
 
     The axis is the weighted circular mean of doubled angles, which is independent of the front of each report; of axes
-    that contradict each other, it is that of the largest weight. The front is that of the larger weight; for equal
-    weights, that of the direction of `velocity` (G, 2), NaN if unknown.
+    that contradict each other, it is that of the smallest position error. The front is that of the larger weight; for
+    equal weights, that of the direction of `velocity` (G, 2), NaN if unknown.
+
+    weights, errors  (K,) weight and trace of the covariance of the position [m²] of each report, NaN if unknown
     """
     counts = np.diff(starts, append=len(yaw))
     if len(counts) == len(yaw):
@@ -81,7 +83,8 @@ def fuse_headings(yaw: Array, weights: Array, starts: NDArray[np.intp], velocity
     axis = 0.5 * np.arctan2(y, x)
     for group in np.flatnonzero(np.hypot(x, y) < AGREEMENT * total).tolist():
         members = slice(starts[group], starts[group] + counts[group])
-        axis[group] = yaw[members][np.argmax(weights[members])]
+        error = np.nan_to_num(errors[members], nan=np.inf)
+        axis[group] = yaw[members][np.lexsort((-weights[members], error))[0]]
     votes = np.add.reduceat(weights * np.sign(np.cos(yaw - np.repeat(axis, counts))), starts)
     ahead = velocity[:, 0] * np.cos(axis) + velocity[:, 1] * np.sin(axis)
     split = (np.abs(votes) < 1e-9 * total) & np.isfinite(ahead)

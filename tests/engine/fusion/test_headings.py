@@ -27,9 +27,15 @@ def follow(yaws: list[float], step: float = 0.05) -> tuple[np.ndarray, np.ndarra
     return heading, covariance, facing
 
 
-def fuse(*yaws: float, weights: list[float] | None = None, velocity: np.ndarray = NO_VELOCITY) -> float:
+def fuse(
+    *yaws: float,
+    weights: list[float] | None = None,
+    errors: list[float] | None = None,
+    velocity: np.ndarray = NO_VELOCITY,
+) -> float:
     counts = np.array(weights or [1.0] * len(yaws))
-    return float(fuse_headings(np.array(yaws), counts, np.array([0]), velocity)[0])
+    traces = np.array(errors or [math.nan] * len(yaws))
+    return float(fuse_headings(np.array(yaws), counts, traces, np.array([0]), velocity)[0])
 
 
 def test_significant_turn_rate_is_estimated_in_turns_and_zero_otherwise() -> None:
@@ -64,11 +70,12 @@ def test_fuse_headings_is_a_circular_mean() -> None:
     assert fuse(1.234) == 1.234
 
 
-def test_fuse_headings_of_contradicting_axes_is_that_of_the_largest_weight() -> None:
-    assert fuse(0.0, -1.5, weights=[0.9, 0.8]) == pytest.approx(0.0)
-    assert fuse(0.0, -1.5, weights=[0.8, 0.9]) == pytest.approx(-1.5)
-    assert fuse(math.pi, 1.5, weights=[0.9, 0.8]) == pytest.approx(math.pi)
-    assert fuse(0.0, math.radians(50)) == pytest.approx(math.radians(25)), "these agree"
+def test_fuse_headings_of_contradicting_axes_is_that_of_the_smallest_error() -> None:
+    assert fuse(0.0, -1.5, weights=[0.9, 1.0], errors=[0.1, 1.5]) == pytest.approx(0.0)
+    assert fuse(0.0, -1.5, weights=[1.0, 0.9], errors=[1.5, 0.1]) == pytest.approx(-1.5)
+    assert fuse(0.0, -1.5, weights=[1.0, 0.9], errors=[math.nan, 0.1]) == pytest.approx(-1.5)
+    assert fuse(math.pi, 1.5, weights=[0.9, 0.8]) == pytest.approx(math.pi), "without errors, the largest weight"
+    assert fuse(0.0, math.radians(50), errors=[0.1, 1.5]) == pytest.approx(math.radians(25)), "these agree"
 
 
 def test_fuse_headings_front_is_that_of_the_larger_weight() -> None:
@@ -84,5 +91,5 @@ def test_fuse_headings_with_equal_weights_uses_the_velocity() -> None:
 
 
 def test_fuse_headings_processes_groups_separately() -> None:
-    yaw = fuse_headings(np.array([0.1, 0.3, 2.0]), np.ones(3), np.array([0, 2]), np.full((2, 2), np.nan))
+    yaw = fuse_headings(np.array([0.1, 0.3, 2.0]), np.ones(3), np.ones(3), np.array([0, 2]), np.full((2, 2), np.nan))
     np.testing.assert_allclose(yaw, [0.2, 2.0])
