@@ -52,7 +52,7 @@ def stored_runs(paths: Sequence[Path]) -> Iterator[StoredRun]:
 def summaries(
     runs: Iterable[StoredRun], *, by: Sequence[str] | None = None, interval: str = "anytime", confidence: float = 0.95
 ) -> list[PointSummary]:
-    """Return the runs by combination of values, in the order of the sweep.
+    """Return the runs by combination of values: numbers in ascending order, texts in the order of the runs.
 
     by  names of the axes that distinguish combinations; None: all
 
@@ -64,19 +64,34 @@ def summaries(
     names: dict[str, None] = {}
     for run in runs:
         names.update(dict.fromkeys(run.point))
-        chosen = run.point if by is None else {name: run.point[name] for name in by if name in run.point}
-        counts = groups.setdefault(tuple(chosen.items()), dict.fromkeys(STATUSES, 0))
+        chosen = [(name, run.point[name]) for name in (names if by is None else by) if name in run.point]
+        counts = groups.setdefault(tuple(chosen), dict.fromkeys(STATUSES, 0))
         counts[run.status] += 1
     unknown = [name for name in by or () if name not in names]
     if unknown:
         hint = f"expected {', '.join(names)}" if names else "the runs vary by their seeds only"
         raise SettingError(Diagnostic(f"--by: no axis {unknown[0]!r}", hint))
     found = []
-    for point, counts in groups.items():
+    key = _ranks(map(dict, groups))
+    for point, counts in sorted(groups.items(), key=lambda group: key(dict(group[0]))):
         trials = counts[PASSED] + counts[FAILED]
         rate = INTERVALS[interval](counts[PASSED], trials, confidence) if trials else None
         found.append(PointSummary(dict(point), {name: count for name, count in counts.items() if count}, rate))
     return found
+
+
+def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:
+    """Return the sort key of points: along each axis numbers in ascending order, then texts in order of appearance."""
+    places: dict[str, dict[Any, int]] = {}
+    for point in points:
+        for name, value in point.items():
+            places.setdefault(name, {}).setdefault(value, len(places[name]))
+
+    def key(point: Mapping[str, Any]) -> list[tuple[int, float]]:
+        found = [(held, point.get(name)) for name, held in places.items()]
+        return [(0, value) if isinstance(value, int | float) else (1, held.get(value, -1)) for held, value in found]
+
+    return key
 
 
 def columns_of(run: StoredRun) -> dict[str, Any]:

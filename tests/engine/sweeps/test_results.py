@@ -56,6 +56,21 @@ def test_summaries_group_by_all_or_some_axes() -> None:
     assert summaries(RUNS, by=[])[0].rate == anytime_interval(2, 3)
 
 
+def test_summaries_are_sorted_by_value_whatever_the_order_of_the_runs() -> None:
+    runs = [
+        run(0, "passed", Speed=10, detector="ssd"),
+        run(1, "passed", detector="oracle", Speed=10),
+        run(2, "passed", Speed=9.5, detector="oracle"),
+        run(3, "failed", detector="ssd", Speed=10),
+    ]
+    found = [(row.point["Speed"], row.point["detector"], row.counts) for row in summaries(runs)]
+    assert found == [
+        (9.5, "oracle", {"passed": 1}),
+        (10, "ssd", {"passed": 1, "failed": 1}),
+        (10, "oracle", {"passed": 1}),
+    ]
+
+
 @pytest.mark.parametrize(("options", "expected"), [({"by": ["Sped"]}, "Sped"), ({"interval": "normal"}, "normal")])
 def test_summaries_with_unknown_names_raise(options: dict[str, object], expected: str) -> None:
     with pytest.raises(SettingError, match=expected):
