@@ -144,8 +144,9 @@ def _setup(episodes: int) -> tuple[str, ...]:
         "in which the ego touches nothing. Positions, speeds, areas and the rule of the ego are those of EI-Drive.",
         "Free parameters, one value per scenario and equal in its three cells: the start of the hidden car (the "
         "nearest in steps of half a meter from which the cars collide without cooperation in seeds 1 to 20), and "
-        "the start of a bus at the head of the traffic with its variation between seeds, chosen such that it hides "
-        "the car from the sending vehicle in about half of the runs (5, 6) or in most runs (7, 8). EI-Drive draws "
+        "the start of a bus at the head of the traffic with its variation between seeds: one from which it hides the "
+        "car from the sending vehicle in about half of the runs (5, 6), or that, in steps of half a meter, from which "
+        "it does so in the most of seeds 1 to 20 (7, 8). EI-Drive draws "
         "30 cars at random, and neither their motion nor their models are recorded. Acceleration is 3.5 m/s². No "
         "value differs between the cells of a scenario.",
         "The paper does not state the number of its episodes; its rates fit three batches of 10 to 20 each. It does "
