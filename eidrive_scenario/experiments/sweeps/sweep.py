@@ -16,6 +16,8 @@ from eidrive_scenario.experiments.sweeps.workers import Workers
 
 JUDGED = frozenset({PASSED, FAILED, EXCLUDED})
 """Outcomes with a verdict, and those of runs that constraints exclude."""
+MOST_REASONS = 100
+"""Maximum number of different messages that are counted."""
 TRIES = 2
 """Number of tries of a job whose worker process ends."""
 
@@ -31,7 +33,7 @@ class SweepProgress:
     total   number of runs
     stored  number of runs that the store already had, by status
     counts  number of runs of this call by status
-    errors  number of runs of this call without a verdict, by status and first line of the message
+    errors  number of runs of this call without a verdict, by status and first line of the message, the first hundred
     """
 
     total: int
@@ -130,6 +132,7 @@ def run_sweep(
                 run = crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}")
             store.add(run)
             progress.counts[run.status] += 1
-            if run.status not in JUDGED:
-                progress.errors[run.status, run.error.partition("\n")[0]] += 1
+            reason = run.status, run.error.partition("\n")[0]
+            if run.status not in JUDGED and (reason in progress.errors or len(progress.errors) < MOST_REASONS):
+                progress.errors[reason] += 1
             shown(progress, run)
