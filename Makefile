@@ -29,8 +29,9 @@ lint: install   ## check style, types and import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-docs: install   ## update the coverage table of docs/openscenario.md
+docs: install   ## update the coverage table of docs/openscenario.md, and build the site: build/site/index.html
 	$(BIN)/python tests/coverage_table.py
+	$(BIN)/sphinx-build -W --keep-going --quiet docs build/site
 
 reproduce: install  ## repeat the experiments of the paper, and compare trends with expected ones: reports/paper, reports/trends
 	OPENBLAS_NUM_THREADS=1 $(BIN)/eidrive reproduce all --out reports/paper
