@@ -20,7 +20,7 @@ pytest_plugins = ["pytester"]
 pytestmark = pytest.mark.timeout(900)
 """Two workers load the engine several times, and one run lasts for the wall limit."""
 
-LIMIT = 40
+LIMIT = 25
 """Wall limit of each run [s]; a valid run needs much less."""
 BROKEN = ("endless", "fails", "invalid", "killed")
 SCHEMA = os.environ.get("EIDRIVE_JUNIT_SCHEMA")
