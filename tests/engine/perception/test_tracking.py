@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from pydantic import ValidationError
 from scipy.stats import chi2
 
 from eidrive_scenario.detections import Detections
@@ -305,21 +304,3 @@ def test_update_with_older_detections_raises() -> None:
     track.update(cars(1.0, (0, 0)))
     with pytest.raises(ValueError, match=r"out of sequence \(got 0\.5 s; expected at least 1\.0 s\)"):
         track.update(cars(0.5, (0, 0)))
-
-
-@pytest.mark.parametrize(
-    ("settings", "expected"),
-    [
-        ({"kind": "ukf"}, "'none', 'cv' or 'ctrv'"),
-        ({"confirm": [3, 2]}, r"n exceeds m \(got \[3, 2\]"),
-        ({"confirm": [0, 2]}, "greater than 0"),
-        ({"gate": 1.0}, "less than 1"),
-        ({"coast": -1}, "greater than or equal to 0"),
-        ({"detection_probability": 1.0}, "less than 1"),
-        ({"birth_density": 0.0}, "greater than 0"),
-        ({"delete_existence": 0.6}, r"delete_existence exceeds confirm_existence \(got 0.6 and 0.5\)"),
-    ],
-)
-def test_invalid_tracker_settings_are_errors(settings: dict[str, Any], expected: str) -> None:
-    with pytest.raises(ValidationError, match=expected):
-        TrackerSettings.model_validate(settings)
