@@ -17,14 +17,12 @@ import eidrive_scenario
 project = "eidrive-scenario"
 release = version = eidrive_scenario.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
-exclude_patterns = ["_build"]
 highlight_language = "text"
 html_theme = "furo"
 html_title = f"{project} {release}"
 html_show_copyright = False
 html_show_sphinx = False
 
-myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
 
 autodoc_member_order = "bysource"
@@ -32,7 +30,6 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "imported-members": True}
 python_use_unqualified_type_names = True
 add_module_names = False
-
 
 # An object of several modules of the interface is described once, in the first of these.
 _MODULES = ("common", "perception", "fusion", "v2x", "driving", "criteria", "actions", "run")

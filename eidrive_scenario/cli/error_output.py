@@ -37,7 +37,7 @@ class Guarded(TyperGroup):
             if _from_typer(error):
                 raise
             # The reader, for example `head`, closed the pipe; rich replaces the error by the exit of a failed run.
-            if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
+            if isinstance(error.__context__ if isinstance(error, SystemExit) else error, BrokenPipeError):
                 # Without this, the flush at exit reports the error again.
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
                 raise typer.Exit(_BROKEN_PIPE) from error

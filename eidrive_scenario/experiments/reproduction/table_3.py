@@ -146,7 +146,7 @@ def _setup(episodes: int) -> tuple[str, ...]:
         "nearest in steps of half a meter from which the cars collide without cooperation in seeds 1 to 20), and "
         "the start of a bus at the head of the traffic with its variation between seeds: one from which it hides the "
         "car from the sending vehicle in about half of the runs (5, 6), or that, in steps of half a meter, from which "
-        "it does so in the most of seeds 1 to 20 (7, 8). EI-Drive draws "
+        "messages of that vehicle alone avoid the collision in the fewest of seeds 1 to 20 (7, 8). EI-Drive draws "
         "30 cars at random, and neither their motion nor their models are recorded. Acceleration is 3.5 m/s². No "
         "value differs between the cells of a scenario.",
         "The paper does not state the number of its episodes; its rates fit three batches of 10 to 20 each. It does "
