@@ -135,7 +135,7 @@ def view(
     """
     from eidrive_scenario.recording.recording import open_recording
     from eidrive_scenario.recording.run_files import RESULT, is_partial, recording_in, result_of
-    from eidrive_scenario.reporting.replay import make_replay
+    from eidrive_scenario.reporting.replay.page import make_replay
 
     path = recording_in(recording)
     page = out or path.with_suffix(".html")

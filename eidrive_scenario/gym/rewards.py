@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -11,7 +10,7 @@ from pydantic import Field
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
-from eidrive_scenario.evaluation.swept_boxes import time_to_contact
+from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.world.view import WorldView
@@ -97,32 +96,3 @@ class Rewards:
         terms["passed"] = weights.passed * result.passed
         terms["failed"] = weights.failed * (not result.passed)
         return terms
-
-
-def min_time_to_collision(view: WorldView, name: str, limit: float) -> float:
-    """Return the smallest time until the box of an actor touches that of another [s]; infinite above the limit [s].
-
-    Velocities and headings are constant: the definition of the criterion `time_to_collision`.
-    """
-    own = view.row(name)
-    boxes, states = view.plain_boxes, view.states
-    box, state = boxes[own], states[own]
-    smallest = math.inf
-    for row, (other, moving) in enumerate(zip(boxes, states, strict=True)):
-        velocity = (
-            moving.velocity_x - state.velocity_x,
-            moving.velocity_y - state.velocity_y,
-            moving.velocity_z - state.velocity_z,
-        )
-        if row == own:
-            continue
-        # Circles around both boxes touch before the boxes.
-        gap = math.hypot(other[0] - box[0], other[1] - box[1]) - _radius(box) - _radius(other)
-        if gap <= math.hypot(velocity[0], velocity[1]) * limit:
-            smallest = min(smallest, time_to_contact(box, other, velocity))
-    return smallest if smallest <= limit else math.inf
-
-
-def _radius(box: Sequence[float]) -> float:
-    """Return the radius of the circle around a box [m]."""
-    return math.hypot(box[3], box[4]) / 2.0

@@ -13,14 +13,12 @@ from html import escape
 from pathlib import Path
 
 import cv2
-import numpy as np
 import typer
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.atomic import create
-from eidrive_scenario.geometry import footprint
 from eidrive_scenario.library import LibraryScenario, describe_scenarios
-from eidrive_scenario.reporting.drawing.road_drawing import road_drawing
+from eidrive_scenario.reporting.drawing.road_drawing import house_outline, road_drawing
 from eidrive_scenario.reporting.drawing.run_picture import EGO, OTHER, SENDER, WALKER, Image, RunPaths, run_picture
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.simulation import Simulation
@@ -54,9 +52,7 @@ def picture(name: str, *, seed: int = 1) -> Image:
     }
     if roads is None:
         return run_picture(run, RoadDrawing(), (), {**colors, EGO_NAME: EGO})
-    houses = [
-        footprint(np.array([*house.center, *house.size, house.yaw])) for house in buildings(roads, without=entities)
-    ]
+    houses = [house_outline(house) for house in buildings(roads, without=entities)]
     return run_picture(run, road_drawing(roads.roads.values()), houses, {**colors, EGO_NAME: EGO})
 
 

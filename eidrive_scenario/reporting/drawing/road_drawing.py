@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.geometry import footprint
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lateral_axis
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
-from eidrive_scenario.roads.reading.document import parse_road_map
+from eidrive_scenario.world.road_objects import Building, buildings
 
 SPACING = 1.0
 """Distance between computed points of lane edges [m], before the simplification of straight parts."""
@@ -58,13 +61,20 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
 
 
 def recorded_roads(recording: Recording) -> RoadDrawing:
-    """Return the roads in the attachments of a recording; an empty drawing without a road file."""
+    """Return the roads in the attachments of a recording, with houses; an empty drawing without a road file."""
     text = recording.attachments.get(ROAD_FILE)
     if text is None:
         return RoadDrawing()
     if len(text) > _LARGEST_ROAD_FILE:
         raise _too_large(f"{recording.path}/{ROAD_FILE}")
-    return road_drawing(parse_road_map(text, f"{recording.path}/{ROAD_FILE}").roads.values())
+    network = RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}")
+    houses = tuple((house_outline(house), house.size[2]) for house in buildings(network))
+    return replace(road_drawing(network.roads.values()), houses=houses)
+
+
+def house_outline(house: Building) -> Array:
+    """Return the outline (4, 2) of a building [m]."""
+    return footprint(np.array([*house.center, *house.size, house.yaw]))
 
 
 def simplify_line(points: Array, tolerance: float = TOLERANCE) -> Array:

@@ -56,10 +56,12 @@ class Window:
 
 @dataclass(frozen=True)
 class RoadDrawing:
-    """Roads from above: lanes (type, polygon (M, 2)) and road marks (type, color, polyline (M, 2)) [m]."""
+    """Roads from above: lanes (type, polygon (M, 2)), road marks (type, color, polyline (M, 2)), and the houses beside
+    them (outline (M, 2), height) [m]."""
 
     lanes: tuple[tuple[str, Array], ...] = ()
     markings: tuple[tuple[str, str, Array], ...] = ()
+    houses: tuple[tuple[Array, float], ...] = ()
 
 
 def roads_symbol(roads: RoadDrawing, identifier: str) -> str:

@@ -10,10 +10,10 @@ import pytest
 from lone_car import lone_car
 
 from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.gym import EidriveEnv, GridSettings, RewardSettings
 from eidrive_scenario.gym.object_table import COLUMNS, object_table
 from eidrive_scenario.gym.occupancy_grid import occupancy_grid
-from eidrive_scenario.gym.rewards import min_time_to_collision
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
 

@@ -1,0 +1,62 @@
+"""Smallest gap and time to collision between one actor and all others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from eidrive_scenario.evaluation.swept_boxes import time_to_contact
+from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.world.view import WorldView
+
+
+def nearest_body(view: WorldView, name: str) -> tuple[float, str]:
+    """Return the distance between the boxes of an actor and of the nearest other one [m], and its name.
+
+    Infinite and an empty name if the actor is alone.
+    """
+    own, boxes = view.row(name), view.boxes
+    centers = np.hypot(boxes[:, 0] - boxes[own, 0], boxes[:, 1] - boxes[own, 1])
+    least = centers - np.hypot(boxes[:, 3], boxes[:, 4]) / 2.0
+    least[own] = math.inf
+    box, best, nearest = boxes[own], math.inf, ""
+    # The circles around boxes give a lower bound of their distance.
+    reach = _radius(box)
+    for row in np.argsort(least, kind="stable").tolist():
+        if row == own or least[row] - reach >= best:
+            break
+        gap = box_distance(box, boxes[row])
+        if gap < best:
+            best, nearest = gap, view.names[row]
+    return best, nearest
+
+
+def min_time_to_collision(view: WorldView, name: str, limit: float) -> float:
+    """Return the smallest time until the box of an actor touches that of another [s]; infinite above the limit [s].
+
+    Velocities and headings are constant: the definition of the criterion `time_to_collision`.
+    """
+    own = view.row(name)
+    boxes, states = view.plain_boxes, view.states
+    box, state = boxes[own], states[own]
+    smallest = math.inf
+    for row, (other, moving) in enumerate(zip(boxes, states, strict=True)):
+        velocity = (
+            moving.velocity_x - state.velocity_x,
+            moving.velocity_y - state.velocity_y,
+            moving.velocity_z - state.velocity_z,
+        )
+        if row == own:
+            continue
+        # Circles around both boxes touch before the boxes.
+        gap = math.hypot(other[0] - box[0], other[1] - box[1]) - _radius(box) - _radius(other)
+        if gap <= math.hypot(velocity[0], velocity[1]) * limit:
+            smallest = min(smallest, time_to_contact(box, other, velocity))
+    return smallest if smallest <= limit else math.inf
+
+
+def _radius(box: Sequence[float]) -> float:
+    """Return the radius of the circle around a box [m]."""
+    return math.hypot(box[3], box[4]) / 2.0

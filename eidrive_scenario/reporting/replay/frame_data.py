@@ -1,0 +1,238 @@
+"""Frames of a recording as the plain lists that the script of a replay draws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.recording.damage import DamageReport
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.replay.messages import MessageList
+from eidrive_scenario.reporting.replay.series import SeriesBuilder
+from eidrive_scenario.reporting.replay.timeline import Timeline
+from eidrive_scenario.reporting.run_report.settings_text import shorten
+from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
+
+_LARGEST_PAGE = 64 * 2**20
+"""Approximate maximum size of the frames in a page [bytes]."""
+_ABSENT = len("null, ")
+"""Size of the entry of a station for a frame before its first one [bytes]."""
+PATH_POINTS = 12
+"""Maximum number of points of a planned path in the page."""
+COVERED = math.sqrt(-2.0 * math.log(0.05))
+"""Semi-axes of the ellipse that contains 95 % of a normal distribution in the plane, in standard deviations."""
+
+Data = dict[str, Any]
+
+
+def describe_error(error: Exception) -> str:
+    """Return an error in one line; for an input error its first diagnostic."""
+    diagnostics = getattr(error, "diagnostics", None)
+    return shorten(str(diagnostics[0]) if diagnostics else f"{type(error).__name__}: {error}", 300)
+
+
+class _Budget:
+    """Limit of the size of a page."""
+
+    def __init__(self, report: DamageReport | None) -> None:
+        self._left = _LARGEST_PAGE
+        self._report = report
+
+    def take(self, size: int, time: float) -> bool:
+        """Reserve a number of bytes. Return False if the limit is exceeded."""
+        self._left -= size
+        if self._left < 0 and self._report is not None:
+            self._report.add("the recording is too large for one page", f"shown up to {time:.2f} s")
+        return self._left >= 0
+
+
+def replay_data(
+    frames: Iterable[Frame],
+    report: DamageReport | None = None,
+    settings: Mapping[str, AgentSettings] | None = None,
+) -> Data:
+    """Return the frames as plain lists, with lengths in cm and angles in mrad resolution.
+
+    times      of the frames [s], and their ticks
+    actors     category and size [length, width, height] by name
+    poses      [x, y, yaw of the box center, speed] by frame and name
+    stations   by name, for each frame: own boxes, boxes `received` by sender, `fused` boxes with the semi-axes and
+               the direction of their 95 % ellipse, links [sender, delivered], and the plan: its reason, path, whether
+               it demands braking, and the rows of the fused objects that are the reason. None: absent.
+               A box is [x, y, l, w, yaw, h], with the probability of existence as seventh entry if it is estimated,
+               None otherwise if more entries follow
+    messages   see `MessageList`; timeline  see `Timeline`; series, contact, decisive  see `SeriesBuilder`
+    changes    [time, path, after, why] of the storyboard transitions
+
+    With a `report`, a frame that cannot be drawn is skipped and reported. `settings` of stations, by name, define the
+    lifetime of reports.
+    """
+    data: Data = {"times": [], "ticks": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
+    builders: dict[str, SnapshotBuilder] = {}
+    series, messages, timeline = SeriesBuilder(), MessageList(), Timeline()
+    budget = _Budget(report)
+    for frame in frames:
+        try:
+            part = _frame_data(frame, builders, settings or {})
+            series.observe(frame)
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            if report is None:
+                raise
+            report.add("frames cannot be drawn", f"tick {frame.view.tick}: {describe_error(error)}")
+            continue
+        added = len(part["stations"].keys() - data["stations"].keys())
+        if not budget.take(_size(part) + _ABSENT * added * len(data["times"]), frame.view.time):
+            break
+        _append(data, part)
+        series.keep()
+        messages.observe(frame.links)
+        timeline.observe(frame.changes)
+    if messages.omitted and report is not None:
+        report.add("the page does not show all messages", f"the first {len(messages.rows)} are shown")
+    return {
+        **data,
+        "messages": messages.rows,
+        "timeline": timeline.rows(),
+        "series": series.columns(),
+        "contact": series.contact,
+        "decisive": series.decisive,
+    }
+
+
+def packed(data: Data) -> Data:
+    """Return the data without repetitions, as the page contains it: poses by actor, and 0 for an unchanged entry.
+
+    A station has one column for each of its parts.
+    """
+    poses = {name: _column([pose.get(name) for pose in data["poses"]]) for name in data["actors"]}
+    stations = {}
+    for name, steps in data["stations"].items():
+        parts = dict.fromkeys(key for step in steps if step is not None for key in step)
+        stations[name] = {key: _column([None if step is None else step[key] for step in steps]) for key in parts}
+    return {**data, "poses": poses, "stations": stations}
+
+
+def _column(entries: list[Any]) -> list[Any]:
+    """Return the entries with 0 in place of each that equals its predecessor."""
+    return [
+        0 if index and entry is not None and entry == entries[index - 1] else entry
+        for index, entry in enumerate(entries)
+    ]
+
+
+def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Mapping[str, AgentSettings]) -> Data:
+    """Return the data of one frame, and update the snapshot builders of the stations."""
+    view = frame.view
+    boxes, speeds = view.boxes.tolist(), view.speed.tolist()
+    bodies = list(zip(view.names, view.categories, boxes, speeds, strict=True))
+    shown = [body for body in bodies if math.isfinite(sum(body[2]) + body[3])]
+    poses = {
+        name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2)] for name, _, box, speed in shown
+    }
+    for name in frame.steps:
+        if name not in builders:
+            builders[name] = SnapshotBuilder(name, settings.get(name, DEFAULT_SETTINGS))
+    snapshots = {name: builder.observe(frame) for name, builder in builders.items()}
+    return {
+        "time": round(view.time, 4),
+        "tick": view.tick,
+        "actors": {
+            name: {"category": category, "size": [round(size, 2) for size in box[3:6]]}
+            for name, category, box, _ in shown
+        },
+        "pose": poses,
+        "stations": {name: _station(snapshots[name]) if name in frame.steps else None for name in builders},
+        "changes": [
+            [round(change.time, 4), change.path, change.after.value.removesuffix("State"), change.why]
+            for change in frame.changes
+            if change.transition is not None and math.isfinite(change.time)
+        ],
+    }
+
+
+def _append(data: Data, part: Mapping[str, Any]) -> None:
+    before = len(data["times"])
+    data["times"].append(part["time"])
+    data["ticks"].append(part["tick"])
+    data["poses"].append(part["pose"])
+    data["changes"].extend(part["changes"])
+    for name, actor in part["actors"].items():
+        data["actors"].setdefault(name, actor)
+    for name, station in part["stations"].items():
+        data["stations"].setdefault(name, [None] * before).append(station)
+
+
+def _size(part: Mapping[str, Any]) -> int:
+    """Return the approximate size of the data of one frame in the page [bytes]."""
+    poses = sum(40 + len(name) for name in part["pose"])
+    changes = sum(len(path) + len(why) for _, path, _, why in part["changes"])
+    return 40 + poses + changes + sum(map(_station_size, part["stations"].values()))
+
+
+def _station_size(station: Mapping[str, Any] | None) -> int:
+    if station is None:
+        return 60
+    received = sum(len(sender) + 45 * len(boxes) for sender, boxes in station["received"].items())
+    links = sum(40 + len(sender) for sender, _ in station["links"])
+    path = 18 * len(station["path"])
+    return 160 + 45 * len(station["own"]) + 65 * len(station["fused"]) + received + links + path + len(station["plan"])
+
+
+def _station(snapshot: StationSnapshot) -> Data:
+    plan = snapshot.step.plan if snapshot.step else None
+    received: dict[str, list[list[float | None]]] = {}
+    for report in snapshot.received:
+        received.setdefault(report.message.sender, []).extend(_boxes(report.message.detections))
+    return {
+        "own": _boxes(snapshot.own),
+        "received": received,
+        "fused": _boxes(snapshot.fused, ellipses=True),
+        "links": [[event.sender, event.outcome == "delivered"] for event in snapshot.links],
+        "plan": plan.reason if plan else "",
+        "path": _path(plan),
+        "braking": plan is not None and plan.braking is not None,
+        "cause": [row for row in plan.objects if row < len(snapshot.fused)] if plan else [],
+    }
+
+
+def _path(plan: Plan | None) -> list[list[float]]:
+    """Return at most PATH_POINTS points of the planned path."""
+    if plan is None or not len(plan.points) or not np.isfinite(plan.points).all():
+        return []
+    chosen = np.unique(np.linspace(0, len(plan.points) - 1, min(len(plan.points), PATH_POINTS)).round().astype(int))
+    points: list[list[float]] = plan.points[chosen, :2].round(2).tolist()
+    return points
+
+
+def _boxes(detections: Detections, *, ellipses: bool = False) -> list[list[float | None]]:
+    existence = detections.existence.tolist() or [None] * len(detections)
+    found: list[list[float | None]] = []
+    for row, ((x, y, _, length, width, height, yaw), exists) in enumerate(
+        zip(detections.boxes.tolist(), existence, strict=True)
+    ):
+        if not math.isfinite(x + y + yaw + length + width + height):
+            continue
+        share = None if exists is None or not math.isfinite(exists) else round(exists, 2)
+        box = [round(x, 2), round(y, 2), round(length, 2), round(width, 2), round(yaw, 3), round(height, 2)]
+        ellipse = _ellipse(detections.covariance[row]) if ellipses else []
+        found.append([*box, *([share] if share is not None or ellipse else []), *ellipse])
+    return found
+
+
+def _ellipse(covariance: Array) -> list[float]:
+    """Return the semi-axes [m] and the direction [rad] of the ellipse that contains 95 %; empty if it is unknown."""
+    if not np.isfinite(covariance).all():
+        return []
+    (xx, xy), (_, yy) = covariance.tolist()
+    middle, spread = (xx + yy) / 2.0, math.hypot((xx - yy) / 2.0, xy)
+    if middle - spread < 0.0:
+        return []
+    long, short = COVERED * math.sqrt(middle + spread), COVERED * math.sqrt(middle - spread)
+    return [round(long, 2), round(short, 2), round(math.atan2(2.0 * xy, xx - yy) / 2.0, 3)]

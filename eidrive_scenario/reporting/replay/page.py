@@ -1,0 +1,183 @@
+"""Page of a recorded run: views of the street with the information of a selectable station, and charts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.recording.damage import DamageReport
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import Recording
+from eidrive_scenario.recording.trace_hash import TraceHash
+from eidrive_scenario.reporting.drawing.road_drawing import recorded_roads
+from eidrive_scenario.reporting.drawing.run_picture import HOUSE
+from eidrive_scenario.reporting.drawing.top_view import (
+    AREA,
+    GROUND,
+    LANE,
+    LANES,
+    LINK,
+    LOST,
+    OWN,
+    PAINT,
+    RECEIVED,
+    WHITE,
+    RoadDrawing,
+    is_broken,
+)
+from eidrive_scenario.reporting.page import write_page
+from eidrive_scenario.reporting.replay.camera_files import camera_files
+from eidrive_scenario.reporting.replay.frame_data import describe_error, packed, replay_data
+from eidrive_scenario.reporting.replay.series import closest_approach
+from eidrive_scenario.reporting.run_report.reported_run import parse_run
+from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
+from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
+from eidrive_scenario.simulation.recorded_outcome import CONTEXT
+
+FUSED = "#7c3aed"
+"""Color of fused objects."""
+COLORS = {
+    "own": OWN,
+    "received": RECEIVED,
+    "link": LINK,
+    "lost": LOST,
+    "area": AREA,
+    "fused": FUSED,
+    "house": HOUSE,
+    "ground": GROUND,
+}
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Written page, and one line for each kind of damage of its recording."""
+
+    page: Path
+    damage: tuple[str, ...]
+
+
+def make_replay(
+    recording: Recording,
+    out: Path,
+    result: Mapping[str, Any] | None = None,
+    *,
+    result_file: str | Path = "",
+    complete: bool = True,
+) -> Replay:
+    """Write the replay of a recording to the file `out`, with the verdicts of an optional `result`.
+
+    result_file  file of the result for error messages
+    complete     whether the run has ended; the page states that an unfinished run is incomplete
+
+    The readable part of a damaged recording is shown, and the page lists the damage. Raise InputError if no frame can
+    be read, or the result is invalid.
+    """
+    report = DamageReport()
+    for line in recording.damage:
+        report.add(line)
+    trace = TraceHash()
+    settings = _settings(recording, report)
+    frames, roads = _drawable(recording, report, trace), _recorded_roads(recording, report)
+    data = replay_data(frames, report, _station_settings(settings))
+    if not data["times"]:
+        reason = "; ".join(report.lines()) or "record the run again"
+        raise InputError(Diagnostic("the recording contains no readable frame", reason, str(recording.path)))
+    if result is not None and result.get("trace_hash") != trace.hexdigest():
+        report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
+    verdicts = None if result is None else parse_run(result, result_file)
+    if verdicts is not None and data["contact"] is None:
+        data["decisive"] = closest_approach(verdicts.metrics) or data["decisive"]
+    name = shorten(recording.scenario or recording.path.stem, 200)
+    page = write_page(
+        out,
+        "replay/page.html.jinja",
+        title=f"{name}, seed {recording.seed}",
+        result=verdicts,
+        facts=_facts(recording, settings),
+        settings=json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
+        command=recording.metadata.get("command", ""),
+        damage=report.lines(),
+        complete=complete,
+        data={
+            **packed(data),
+            "roads": _roads(roads),
+            "colors": COLORS,
+            "images": camera_files(recording.path.parent, out.parent),
+        },
+    )
+    return Replay(page, report.lines())
+
+
+def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> Iterator[Frame]:
+    """Yield the frames, and add each frame to the trace hash."""
+    for frame in recording.frames(lambda reason: report.add("frames cannot be decoded", shorten(reason, 200))):
+        try:
+            trace.observe(frame)
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+            report.add("frames are inconsistent", f"tick {frame.view.tick}: {describe_error(error)}")
+        yield frame
+
+
+def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
+    try:
+        return recorded_roads(recording)
+    except (InputError, ArithmeticError, LookupError, TypeError, ValueError, MemoryError, RecursionError) as error:
+        report.add("roads are not drawn", describe_error(error))
+        return RoadDrawing()
+
+
+def _settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
+    """Return the resolved settings of the metadata."""
+    settings = _object(recording.metadata.get("settings", "{}"))
+    if settings is None:
+        report.add("the settings of the run cannot be decoded")
+    return settings or {}
+
+
+def _station_settings(settings: Mapping[str, Any]) -> dict[str, AgentSettings]:
+    """Return the settings of stations with a report timeout other than the default."""
+    found: dict[str, AgentSettings] = {}
+    stations = settings.get("stations")
+    for name, station in stations.items() if isinstance(stations, Mapping) else ():
+        timeout = station.get("report_timeout") if isinstance(station, Mapping) else None
+        if timeout not in (None, DEFAULT_SETTINGS.report_timeout):
+            with suppress(ValidationError):  # in a damaged recording
+                found[name] = AgentSettings(report_timeout=timeout)
+    return found
+
+
+def _object(text: str) -> dict[str, Any] | None:
+    """Parse a JSON object of the metadata. Return None for other texts."""
+    try:
+        found = load_json(text.encode(), max_depth=30)
+    except ValueError:
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
+    """Return the facts about the run that the page lists."""
+    if settings:
+        return run_facts(settings)
+    hidden = ("format", "parameters", "settings", "command", CONTEXT)
+    facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
+    return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
+
+
+def _roads(roads: RoadDrawing) -> dict[str, Any]:
+    return {
+        "lanes": [[LANES.get(kind, LANE), polygon.round(2).tolist()] for kind, polygon in roads.lanes],
+        "lines": [
+            [is_broken(kind), PAINT.get(color, WHITE), line.round(2).tolist()] for kind, color, line in roads.markings
+        ],
+        "houses": [[round(height, 2), outline.round(2).tolist()] for outline, height in roads.houses],
+    }

@@ -1,0 +1,138 @@
+"""Quantities of the stations over time, and the decisive instant of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision, nearest_body
+from eidrive_scenario.recording.frame import Frame
+
+TTC_LIMIT = 10.0
+"""Maximum time to collision in the charts [s]."""
+FAR = 100.0
+"""Maximum gap in the charts [m]."""
+
+Values = dict[str, Any]
+
+
+class SeriesBuilder:
+    """Observer of the frames of a run.
+
+    columns   by station and frame: speed [m/s], gap to the nearest body [m], smallest time to collision [s], and the
+              age of information by sender [s]: the time since the newest received message was generated. None:
+              absent, farther than FAR, above TTC_LIMIT, nothing received yet
+    contact   the first contact of a driven vehicle: time [s] and description; None without a contact
+    decisive  that contact, else the smallest gap of a driven vehicle. Without driven vehicles all actors are
+              considered; None if no two actors were present at the same time
+    """
+
+    def __init__(self) -> None:
+        self._frames = 0
+        self._columns: dict[str, dict[str, Any]] = {}
+        self._generated: dict[tuple[str, str], float] = {}
+        self._pending: dict[str, Values] = {}
+        self._driven = False
+        self._contact: tuple[float, str] | None = None
+        self._least = (math.inf, 0.0, "")
+
+    def observe(self, frame: Frame) -> None:
+        """Measure one frame; `keep` adds it to the columns."""
+        view, now = frame.view, frame.view.time
+        self._pending = {}
+        driven = [name for name, step in frame.steps.items() if step.control is not None and name in view]
+        self._note_contact(frame, driven)
+        for name, step in frame.steps.items():
+            for received in step.inbox:
+                key = name, received.message.sender
+                if key[0] != key[1]:
+                    self._generated[key] = max(self._generated.get(key, -math.inf), received.message.generated)
+            ages = {
+                sender: _rounded(now - generated, 3)
+                for (receiver, sender), generated in self._generated.items()
+                if receiver == name
+            }
+            self._pending[name] = {"age": ages}
+            if name in driven:
+                gap, other = nearest_body(view, name)
+                self._note_gap(gap, now, f"{name} and {other}")
+                self._pending[name] |= {
+                    "speed": _rounded(float(view.speed[view.row(name)]), 2),
+                    "gap": _rounded(gap, 2) if gap <= FAR else None,
+                    "ttc": _rounded(min_time_to_collision(view, name, TTC_LIMIT), 2),
+                }
+
+    def keep(self) -> None:
+        """Add the values of the last frame."""
+        for name, values in self._pending.items():
+            columns = self._columns.setdefault(name, {"speed": [], "gap": [], "ttc": [], "age": {}})
+            for key in ("speed", "gap", "ttc"):
+                _pad(columns[key], self._frames).append(values.get(key))
+            for sender, age in values["age"].items():
+                _pad(columns["age"].setdefault(sender, []), self._frames).append(age)
+        self._frames += 1
+
+    def columns(self) -> dict[str, Values]:
+        """Return the columns by station, without those that have no value."""
+        found: dict[str, Values] = {}
+        for name, columns in self._columns.items():
+            lists = {key: _pad(columns[key], self._frames) for key in ("speed", "gap", "ttc")}
+            found[name] = {key: values for key, values in lists.items() if any(value is not None for value in values)}
+            if columns["age"]:
+                found[name]["age"] = {sender: _pad(ages, self._frames) for sender, ages in columns["age"].items()}
+        return found
+
+    @property
+    def contact(self) -> Values | None:
+        """First contact."""
+        return None if self._contact is None else {"time": round(self._contact[0], 4), "text": self._contact[1]}
+
+    @property
+    def decisive(self) -> Values | None:
+        """Decisive instant."""
+        gap, time, pair = self._least
+        if self.contact is not None or not math.isfinite(gap):
+            return self.contact
+        return {"time": round(time, 4), "text": f"smallest gap of {pair}: {gap:.2f} m"}
+
+    def _note_contact(self, frame: Frame, driven: list[str]) -> None:
+        self._driven |= bool(driven)
+        for contact in frame.view.contacts if self._contact is None else ():
+            if not self._driven or contact.first in driven or contact.second in driven:
+                self._contact = frame.view.time, f"contact of {contact.first} and {contact.second}"
+                return
+        if not self._driven and len(frame.view.names) > 1:
+            for name, speed in zip(frame.view.names, frame.view.speed.tolist(), strict=True):
+                if abs(speed) > 0.1:
+                    gap, other = nearest_body(frame.view, name)
+                    self._note_gap(gap, frame.view.time, f"{name} and {other}")
+
+    def _note_gap(self, gap: float, time: float, pair: str) -> None:
+        if gap < self._least[0]:
+            self._least = gap, time, pair
+
+
+def closest_approach(metrics: Mapping[str, float | None]) -> Values | None:
+    """Return the instant of the smallest distance between centers that a criterion `min_distance` measured, or None."""
+    found = []
+    for name, time in metrics.items():
+        if name.startswith("min_distance.") and name.endswith(".time") and time is not None and math.isfinite(time):
+            pair = name.removeprefix("min_distance.").removesuffix(".time")
+            distance = metrics.get(f"min_distance.{pair}.center")
+            if distance is not None and math.isfinite(distance):
+                found.append((distance, time, pair.replace(".", " and ")))
+    if not found:
+        return None
+    distance, time, pair = min(found)
+    return {"time": round(time, 4), "text": f"closest approach of {pair}: {distance:.2f} m between centers"}
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(value, digits) if math.isfinite(value) else None
+
+
+def _pad(values: list[Any], count: int) -> list[Any]:
+    """Extend a list in place to `count` entries by None, and return it."""
+    values.extend([None] * (count - len(values)))
+    return values

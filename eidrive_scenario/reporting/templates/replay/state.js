@@ -1,0 +1,90 @@
+"use strict";
+const data = JSON.parse(document.getElementById("data").textContent);
+const element = (id) => document.getElementById(id);
+const C = data.colors, INK = "#334155", SELF = "#0f172a";
+const SENDERS = ["#ea580c", "#c026d3", "#0e7490", "#4d7c0f", "#be123c", "#92400e"];
+/* Time after its outcome for which a message is drawn [s]. */
+const SHOWN = 0.15;
+const last = data.times.length - 1, duration = data.times[last] - data.times[0];
+
+/* Replace each 0 of a column by its predecessor. */
+function unpack(column) {
+  for (let i = 1; i < column.length; i += 1) if (column[i] === 0) column[i] = column[i - 1];
+  return column;
+}
+Object.values(data.poses).forEach(unpack);
+Object.values(data.stations).forEach((parts) => Object.values(parts).forEach(unpack));
+const names = Object.keys(data.actors), stations = Object.keys(data.stations);
+
+/* What is shown: time [s], index of the frame, station ("" for none), view, and layers by name. */
+const shown = { time: data.times[0], index: 0, station: stations[0] || "", view: "top", layers: {}, hidden: new Set() };
+
+function make(tag, text, parent, properties = {}) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.textContent = text;
+  if (parent) parent.appendChild(made);
+  return made;
+}
+
+/* Return the index of the last frame that is not after the time. */
+function indexAt(time) {
+  let low = 0, high = last;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (data.times[middle] <= time + 1e-6) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+/* Return x, y, yaw and speed of an actor at the shown time, between two frames by linear interpolation. */
+function poseOf(name) {
+  const { time, index } = shown, poses = data.poses[name], from = poses[index], to = poses[index + 1];
+  if (!from || !to || time <= data.times[index]) return from;
+  if (Math.hypot(to[0] - from[0], to[1] - from[1]) > 8) return from;
+  const part = Math.min(1, (time - data.times[index]) / (data.times[index + 1] - data.times[index]));
+  const turn = Math.atan2(Math.sin(to[2] - from[2]), Math.cos(to[2] - from[2]));
+  return [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1]), from[2] + part * turn,
+          from[3] + part * (to[3] - from[3])];
+}
+
+/* Return a part of the information of the shown station at the shown frame. */
+function part(key) {
+  const parts = data.stations[shown.station];
+  return parts && parts[key] ? parts[key][shown.index] : null;
+}
+
+const isPresent = () => part("own") !== null;
+const senderColor = (name) => SENDERS[(stations.indexOf(name) + SENDERS.length - 1) % SENDERS.length];
+
+/* Yield the perceived boxes that are shown: box, color, line width in m. */
+function* perceivedBoxes() {
+  if (!isPresent()) return;
+  const { layers, hidden } = shown;
+  for (const [sender, boxes] of Object.entries(part("received")))
+    if (!hidden.has(sender)) for (const box of boxes) yield { box, color: senderColor(sender), line: 0.45, kind: "received" };
+  if (layers.own) for (const box of part("own")) yield { box, color: C.own, line: 0.25, kind: "own" };
+  const causes = new Set(part("cause"));
+  if (layers.fused) for (const [row, box] of part("fused").entries())
+    yield { box, color: C.fused, line: causes.has(row) ? 0.5 : 0.25, kind: "fused", cause: causes.has(row) };
+}
+
+/* Return the messages to draw, to the shown station or without one to all: sender, receiver, state, and the share of
+   the way that a message in flight has covered. */
+const bySent = data.messages.slice().sort((a, b) => a[0] - b[0]);
+const longest = bySent.reduce((most, [sent, , , arrives]) => Math.max(most, (arrives === null ? sent : arrives) - sent), 0) + SHOWN;
+function messagesNow() {
+  const { time, station } = shown, found = new Map();
+  let low = 0, high = bySent.length;
+  while (low < high) { const middle = (low + high) >> 1; if (bySent[middle][0] < time - longest) low = middle + 1; else high = middle; }
+  for (let i = low; i < bySent.length && bySent[i][0] <= time + 1e-6; i += 1) {
+    const [sent, sender, receiver, arrives, reason] = bySent[i];
+    if (station && receiver !== station && sender !== station) continue;
+    const end = arrives === null ? sent : arrives;
+    if (time > end + SHOWN) continue;
+    const flying = arrives !== null && time < arrives - 1e-6;
+    const state = arrives === null ? "lost" : flying ? "flying" : "delivered";
+    found.set(sender + "\n" + receiver + (flying ? sent : ""),
+              { sender, receiver, state, reason, share: flying ? (time - sent) / (arrives - sent) : 1 });
+  }
+  return [...found.values()];
+}

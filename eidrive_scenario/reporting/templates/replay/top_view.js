@@ -1,0 +1,197 @@
+/* View from above. Lengths in m; the canvas transform maps the world to pixels. */
+const canvas = element("street"), pen = canvas.getContext("2d"), NEAR = 30;
+const topView = { scale: 10, x: 0, y: 0, follow: false };
+
+function bounds(points) {
+  const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
+  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+}
+const lanes = data.roads.lanes.map(([color, points]) => ({ color, points, area: bounds(points) }));
+const lines = data.roads.lines.map(([broken, color, points]) => ({ broken, color, points, area: bounds(points) }));
+const houses = data.roads.houses.map(([height, points]) => ({ height, points, area: bounds(points) }));
+
+function fit() {
+  let left = Infinity, right = -Infinity, bottom = Infinity, top = -Infinity;
+  const around = shown.station ? data.poses[shown.station] : null;
+  for (const poses of Object.values(data.poses)) for (const [i, pose] of poses.entries()) {
+    const center = around && around[i];
+    if (!pose || (center && Math.hypot(pose[0] - center[0], pose[1] - center[1]) > NEAR)) continue;
+    left = Math.min(left, pose[0]); right = Math.max(right, pose[0]); bottom = Math.min(bottom, pose[1]); top = Math.max(top, pose[1]);
+  }
+  const area = canvas.getBoundingClientRect();
+  topView.x = (left + right) / 2; topView.y = (bottom + top) / 2;
+  topView.scale = Math.min(area.width / (right - left + 16), area.height / (top - bottom + 16));
+  if (topView.follow) topView.scale = Math.max(topView.scale, Math.min(area.width, area.height) / 70);
+}
+
+function trace(points) {
+  pen.beginPath();
+  points.forEach(([x, y], i) => i ? pen.lineTo(x, y) : pen.moveTo(x, y));
+}
+
+function drawBox([x, y, length, width, yaw], fill, stroke, line, opacity) {
+  pen.save();
+  pen.translate(x, y);
+  pen.rotate(yaw);
+  pen.globalAlpha = opacity;
+  pen.fillStyle = fill;
+  pen.fillRect(-length / 2, -width / 2, length, width);
+  pen.globalAlpha = 1;
+  pen.lineWidth = line;
+  pen.strokeStyle = stroke;
+  pen.strokeRect(-length / 2, -width / 2, length, width);
+  pen.restore();
+}
+
+/* Draw a perceived box with its ellipse; opacity and line width decrease with the probability of existence. */
+function drawPerceived({ box, color, line, kind }) {
+  const existence = typeof box[6] === "number" ? box[6] : 1, fused = kind === "fused";
+  if (fused) pen.setLineDash([0.6, 0.35]);
+  drawBox(box, color, color, line * (0.3 + 0.7 * existence), (fused ? 0.1 : 0.25) * existence);
+  pen.setLineDash([]);
+  if (fused && box.length > 8) {
+    pen.beginPath();
+    pen.ellipse(box[0], box[1], Math.max(box[7], 0.05), Math.max(box[8], 0.05), box[9], 0, 2 * Math.PI);
+    pen.lineWidth = 0.12; pen.strokeStyle = color; pen.stroke();
+  }
+  if (existence < 0.995) {
+    pen.save();
+    pen.translate(box[0], box[1]); pen.scale(1, -1);
+    pen.font = "1.4px sans-serif"; pen.textAlign = "center"; pen.textBaseline = "middle"; pen.fillStyle = color;
+    pen.fillText(`${Math.round(100 * existence)} %`, 0, 0);
+    pen.restore();
+  }
+}
+
+function drawRoads([left, bottom, right, top]) {
+  const inside = ({ area }) => area[0] <= right && area[2] >= left && area[1] <= top && area[3] >= bottom;
+  pen.lineWidth = 0.05;
+  for (const lane of lanes) if (inside(lane)) {
+    trace(lane.points); pen.closePath(); pen.fillStyle = pen.strokeStyle = lane.color; pen.fill(); pen.stroke();
+  }
+  pen.lineWidth = 0.18;
+  for (const line of lines) if (inside(line)) {
+    pen.setLineDash(line.broken ? [3, 3] : []); pen.strokeStyle = line.color; trace(line.points); pen.stroke();
+  }
+  pen.setLineDash([]);
+  for (const house of houses) if (inside(house)) {
+    trace(house.points); pen.closePath(); pen.fillStyle = C.house; pen.fill();
+  }
+}
+
+function drawPath() {
+  const path = shown.layers.plan && isPresent() ? part("path") : [];
+  if (path.length < 2) return;
+  pen.lineWidth = 0.5; pen.lineJoin = "round"; pen.strokeStyle = part("braking") ? C.lost : C.link; pen.globalAlpha = 0.75;
+  trace(path); pen.stroke();
+  pen.globalAlpha = 1;
+}
+
+function drawMessages() {
+  for (const { sender, receiver, state, share } of shown.layers.messages ? messagesNow() : []) {
+    const from = poseOf(sender), to = poseOf(receiver);
+    if (!from || !to) continue;
+    pen.setLineDash(state === "lost" ? [0.9, 0.9] : []);
+    pen.strokeStyle = state === "lost" ? C.lost : C.link;
+    pen.lineWidth = state === "flying" ? 0.1 : 0.2;
+    trace([from, to]); pen.stroke();
+    if (state === "flying") {
+      pen.beginPath(); pen.arc(from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]), 0.55, 0, 2 * Math.PI);
+      pen.fillStyle = C.link; pen.fill();
+    }
+  }
+  pen.setLineDash([]);
+}
+
+function drawActors(poses) {
+  for (const [name, [x, y, yaw]] of poses) {
+    const [length, width] = data.actors[name].size, filled = name === shown.station;
+    if (Math.max(length, width) < 1) {
+      pen.beginPath(); pen.arc(x, y, 0.6, 0, 2 * Math.PI); pen.fillStyle = filled ? SELF : "#fff"; pen.fill();
+      pen.lineWidth = 0.22; pen.strokeStyle = INK; pen.stroke();
+      continue;
+    }
+    drawBox([x, y, length, width, yaw], filled ? SELF : "#fff", INK, 0.14, filled ? 1 : 0.35);
+    const bar = 0.28 * length, dx = Math.cos(yaw), dy = Math.sin(yaw);
+    trace([[x + bar * dx - dy * width / 2, y + bar * dy + dx * width / 2], [x + bar * dx + dy * width / 2, y + bar * dy - dx * width / 2]]);
+    pen.strokeStyle = filled ? "#fff" : INK; pen.lineWidth = 0.2; pen.stroke();
+  }
+}
+
+function outline(name, [x, y, yaw], at) {
+  const [length, width] = data.actors[name].size, cos = Math.abs(Math.cos(yaw)), sin = Math.abs(Math.sin(yaw));
+  const across = (cos * length + sin * width) / 2, up = (sin * length + cos * width) / 2;
+  return [...at(x - across, y + up), ...at(x + across, y - up)];
+}
+
+/* Return the label position (right, left, above or below) with the smallest overlap with other labels. */
+function place(width, [left, top, right, bottom], others) {
+  const middle = (left + right) / 2 - width / 2 - 7;
+  const spots = [[right, (top + bottom) / 2], [left - width - 14, (top + bottom) / 2], [middle, top - 11], [middle, bottom + 11]];
+  const covered = ([x, y]) => others.reduce((sum, [, l, t, r, b]) =>
+    sum + Math.max(0, Math.min(x + 7 + width, r) - Math.max(x + 7, l)) * Math.max(0, Math.min(y + 8, b) - Math.max(y - 8, t)), 0);
+  return spots.reduce((best, spot) => covered(spot) < covered(best) ? spot : best);
+}
+
+function writeLabel(text, left, middle) {
+  pen.lineWidth = 3.5; pen.lineJoin = "round"; pen.strokeStyle = "#fff"; pen.strokeText(text, left, middle);
+  pen.fillStyle = SELF; pen.fillText(text, left, middle);
+}
+
+const labelOf = (name, speed) => Math.abs(speed) > 0.05 ? name + "  " + (3.6 * speed).toFixed(0) + " km/h" : name;
+
+function drawLabels(poses, at, area) {
+  pen.font = "600 12.5px system-ui, sans-serif";
+  pen.textBaseline = "middle";
+  const boxes = poses.map(([name, pose]) => [name, ...outline(name, pose, at)])
+    .filter(([, l, t, r, b]) => r > 0 && l < area.width && b > 0 && t < area.height);
+  const taken = boxes.slice();
+  for (const [name, ...box] of boxes) {
+    const text = labelOf(name, poseOf(name)[3]), width = pen.measureText(text).width;
+    const [left, middle] = place(width, box, taken.filter(([other]) => other !== name));
+    taken.push(["", left + 7, middle - 8, left + 7 + width, middle + 8]);
+    writeLabel(text, left + 7, middle);
+  }
+}
+
+/* Set the size of the canvas in device pixels and return its area in CSS pixels. */
+function prepare() {
+  const area = canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
+  const width = Math.round(area.width * ratio), height = Math.round(area.height * ratio);
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.globalAlpha = 1;
+  return { width: area.width, height: area.height, ratio };
+}
+
+function drawTop() {
+  const area = prepare(), { ratio } = area;
+  const center = topView.follow && shown.station ? poseOf(shown.station) : null;
+  if (center) { topView.x = center[0]; topView.y = center[1]; }
+  const { scale, x: cx, y: cy } = topView;
+  const at = (x, y) => [area.width / 2 + (x - cx) * scale, area.height / 2 - (y - cy) * scale];
+  const poses = names.map((name) => [name, poseOf(name)]).filter(([, pose]) => pose);
+  pen.fillStyle = C.ground;
+  pen.fillRect(0, 0, area.width, area.height);
+  pen.setTransform(scale * ratio, 0, 0, -scale * ratio, (area.width / 2 - cx * scale) * ratio, (area.height / 2 + cy * scale) * ratio);
+  const across = area.width / 2 / scale, up = area.height / 2 / scale;
+  drawRoads([cx - across, cy - up, cx + across, cy + up]);
+  drawPath();
+  drawMessages();
+  for (const entry of perceivedBoxes()) drawPerceived(entry);
+  if (shown.layers.truth) drawActors(poses); else drawActors(poses.filter(([name]) => name === shown.station));
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  if (shown.layers.labels) drawLabels(shown.layers.truth ? poses : poses.filter(([name]) => name === shown.station), at, area);
+  drawScaleBar(area);
+}
+
+/* Draw a bar of a round length at the lower left. */
+function drawScaleBar(area) {
+  const rough = 110 / topView.scale, power = 10 ** Math.floor(Math.log10(rough));
+  const length = [5, 2, 1].map((k) => k * power).find((value) => value <= rough) || power;
+  const width = length * topView.scale, y = area.height - 16;
+  pen.lineWidth = 2; pen.strokeStyle = INK;
+  trace([[16, y - 5], [16, y], [16 + width, y], [16 + width, y - 5]]); pen.stroke();
+  pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "bottom";
+  pen.fillStyle = INK; pen.fillText(`${length} m`, 20, y - 3);
+}

@@ -1,0 +1,205 @@
+"""Parts of the data of a replay: ellipses, series, messages, timeline, camera images, repetitions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from eidrive_scenario.evaluation.nearest_actor import nearest_body
+from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.replay.camera_files import camera_files
+from eidrive_scenario.reporting.replay.frame_data import packed, replay_data
+from eidrive_scenario.reporting.replay.messages import MessageList
+from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
+from eidrive_scenario.reporting.replay.timeline import Timeline
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.world.view import Contact
+
+Play = Callable[..., list[Frame]]
+QUANTILE = 5.991464547107979
+"""95 % quantile of the chi-squared distribution with two degrees of freedom."""
+
+
+def change(time: float, before: ElementState, after: ElementState, why: str = "", path: str = "S/Go") -> StateChange:
+    started = after is ElementState.RUNNING
+    transition = ElementTransition.START if started else ElementTransition.END
+    return StateChange(time, path.split("/")[-1], path, "event", before, transition, after, why)
+
+
+def observe(frames: list[Frame]) -> SeriesBuilder:
+    series = SeriesBuilder()
+    for frame in frames:
+        series.observe(frame)
+        series.keep()
+    return series
+
+
+def test_fused_objects_have_ellipse_of_95_percent(street: Play) -> None:
+    """The variances along and across a direction of 30° are 4 and 1 m²."""
+    frame = street(1)[40]
+    step = frame.steps["Ego"]
+    turn = math.radians(30.0)
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    covariance = rotation @ np.diag([4.0, 1.0]) @ rotation.T
+    fused = replace(step.detections, covariance=np.repeat(covariance[None], len(step.detections), axis=0))
+    data = replay_data([Frame(frame.view, {"Ego": replace(step, fused=fused)})])
+    long, short, direction = data["stations"]["Ego"][0]["fused"][0][7:]
+    assert long == pytest.approx(2.0 * math.sqrt(QUANTILE), abs=0.005)
+    assert short == pytest.approx(math.sqrt(QUANTILE), abs=0.005)
+    assert direction == pytest.approx(turn, abs=0.001)
+
+
+def test_fused_objects_without_covariance_have_no_ellipse(street: Play) -> None:
+    frame = street(1)[40]
+    step = frame.steps["Ego"]
+    data = replay_data([Frame(frame.view, {"Ego": replace(step, fused=step.detections)})])
+    assert [len(box) for box in data["stations"]["Ego"][0]["fused"]] == [6]
+
+
+def test_packed_columns_contain_all_entries(street: Play) -> None:
+    data = replay_data(street(6))
+    page = packed(data)
+    for name, column in page["poses"].items():
+        shown = None
+        for index, entry in enumerate(column):
+            shown = shown if entry == 0 else entry
+            assert shown == data["poses"][index].get(name)
+    for name, parts in page["stations"].items():
+        for key, column in parts.items():
+            shown = None
+            for index, entry in enumerate(column):
+                shown = shown if entry == 0 and entry is not False else entry
+                assert shown == data["stations"][name][index][key], (name, key, index)
+    assert page["poses"]["Truck"][1:] == [0] * 99
+
+
+def test_nearest_body_equals_smallest_of_all_distances(street: Play) -> None:
+    for frame in street(1)[::7]:
+        view = frame.view
+        for row, name in enumerate(view.names):
+            every = {
+                other: box_distance(view.boxes[row], view.boxes[number])
+                for number, other in enumerate(view.names)
+                if number != row
+            }
+            gap, nearest = nearest_body(view, name)
+            assert gap == min(every.values())
+            assert every[nearest] == gap
+
+
+def test_series_contain_speed_gap_and_age_of_information(street: Play) -> None:
+    """Messages take 4 ticks of 0.05 s: the first is received in tick 4, and the age is 0.2 s from then on."""
+    frames = street(4)
+    columns = observe(frames).columns()["Ego"]
+    assert columns["speed"][0] == 8.0
+    view = frames[0].view
+    gap = min(box_distance(view.boxes[0], view.boxes[row]) for row in (1, 2, 3))
+    assert columns["gap"][0] == pytest.approx(gap, abs=0.005)
+    assert columns["age"]["RSU"][:4] == [None] * 4
+    assert columns["age"]["RSU"][4:] == pytest.approx([0.2] * 96)
+
+
+def test_age_of_information_grows_while_messages_are_lost(street: Play) -> None:
+    """The delay is 1 tick. The messages of ticks 30 to 39 are lost, so that of tick 29 is the newest in tick 40."""
+    ages = observe(street(1, frozenset(range(30, 40)))).columns()["Ego"]["age"]["RSU"]
+    assert ages[30] == pytest.approx(0.05)
+    assert ages[40] == pytest.approx(0.55)
+    assert ages[41] == pytest.approx(0.05)
+
+
+def test_station_that_does_not_drive_has_no_speed(street: Play) -> None:
+    columns = observe(street(1)).columns()
+    assert "speed" not in columns.get("RSU", {})
+
+
+def test_decisive_instant_is_smallest_gap_of_driven_vehicle(street: Play) -> None:
+    frames = street(1)
+    gaps = [nearest_body(frame.view, "Ego")[0] for frame in frames]
+    decisive = observe(frames).decisive
+    assert decisive is not None
+    assert decisive["time"] == pytest.approx(frames[int(np.argmin(gaps))].view.time)
+    assert f"{min(gaps):.2f} m" in decisive["text"]
+
+
+def test_decisive_instant_is_first_contact(street: Play) -> None:
+    frames = street(1)
+    touch = Contact("Ego", "Truck", (0.0, 0.0, 0.0), 5.0)
+    for tick in (30, 60):
+        frames[tick] = replace(frames[tick], view=replace(frames[tick].view, contacts=(touch,)))
+    series = observe(frames)
+    assert series.contact == {"time": 1.5, "text": "contact of Ego and Truck"}
+    assert series.decisive == series.contact
+
+
+def test_contact_of_others_is_not_decisive_for_driven_vehicle(street: Play) -> None:
+    frames = street(1)
+    touch = Contact("Incoming", "Truck", (0.0, 0.0, 0.0), 5.0)
+    frames[30] = replace(frames[30], view=replace(frames[30].view, contacts=(touch,)))
+    assert observe(frames).contact is None
+
+
+def test_closest_approach_is_read_from_metrics() -> None:
+    metrics = {
+        "min_distance.Ego.Car.center": 4.5,
+        "min_distance.Ego.Car.time": 3.0,
+        "min_distance.Ego.Bus.center": 2.5,
+        "min_distance.Ego.Bus.time": 7.0,
+        "min_distance.Ego.Lost.center": None,
+        "min_distance.Ego.Lost.time": 1.0,
+    }
+    found = closest_approach(metrics)
+    assert found == {"time": 7.0, "text": "closest approach of Ego and Bus: 2.50 m between centers"}
+    assert closest_approach({"collision.count": 1.0}) is None
+
+
+def test_messages_have_arrival_or_reason_of_loss() -> None:
+    messages = MessageList()
+    messages.observe([
+        LinkEvent("RSU", "Ego", 1, 0.1, "delivered", 0.4, "", 200),
+        LinkEvent("RSU", "Ego", 2, 0.2, "lost", None, "shadowing", 200),
+        LinkEvent("Ego", "Ego", 1, 0.2, "delivered", 0.3, "", 200),
+    ])  # fmt: skip
+    assert messages.rows == [[0.1, "RSU", "Ego", 0.4, ""], [0.2, "RSU", "Ego", None, "shadowing"]]
+
+
+def test_number_of_messages_in_page_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("eidrive_scenario.reporting.replay.messages.MOST", 3)
+    messages = MessageList()
+    for number in range(5):
+        messages.observe([LinkEvent("RSU", "Ego", number, 0.1 * number, "delivered", 1.0, "", 200)])
+    assert len(messages.rows) == 3
+    assert messages.omitted == 2
+
+
+def test_timeline_has_interval_per_execution_with_reasons() -> None:
+    timeline = Timeline()
+    timeline.observe([change(1.0, ElementState.STANDBY, ElementState.RUNNING, "time > 1 s")])
+    timeline.observe([change(2.0, ElementState.RUNNING, ElementState.STANDBY)])
+    timeline.observe([change(3.0, ElementState.STANDBY, ElementState.RUNNING, "again")])
+    timeline.observe([change(4.0, ElementState.STANDBY, ElementState.RUNNING, "first", path="S/Late")])
+    assert timeline.rows() == [
+        ["S/Go", "event", [[1.0, 2.0, "time > 1 s", ""], [3.0, None, "again", ""]]],
+        ["S/Late", "event", [[4.0, None, "first", ""]]],
+    ]
+
+
+def test_camera_files_lists_ticks_with_relative_address(tmp_path: Path) -> None:
+    run = tmp_path / "runs" / "a"
+    folder = run / "images" / "Ego car%2F1"
+    folder.mkdir(parents=True)
+    for name in ("front left-000012.jpg", "front left-000004.jpg", "front left.json", "notes.txt"):
+        (folder / name).write_bytes(b"")
+    found = camera_files(run, tmp_path / "pages")
+    assert found == {
+        "Ego car/1": {
+            "front left": {"address": "../runs/a/images/Ego%20car%252F1/front%20left-", "ticks": [4, 12]},
+        }
+    }
+    assert camera_files(tmp_path / "pages", tmp_path) == {}
