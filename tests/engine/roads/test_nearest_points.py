@@ -36,3 +36,16 @@ def test_nearest_points_at_same_distance_start_with_lowest_index() -> None:
 def test_nearest_points_of_no_point_are_empty() -> None:
     points = NearestPoints(np.zeros((3, 2)))
     assert [len(part) for part in (*points.nearest(np.empty((0, 2))), *points.several(np.empty((0, 2)), 2))] == [0] * 4
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_nearest_points_with_pivots_equal_comparison_with_all(dimensions: int) -> None:
+    generator = np.random.default_rng(dimensions)
+    way = np.cumsum(generator.uniform(-1.0, 1.0, (FEW, dimensions)), axis=0)
+    points = np.concatenate([way, np.round(way), np.round(way)])[::3]
+    near = points[generator.integers(0, len(points), 100)] + generator.normal(0.0, 2.0, (100, dimensions))
+    to = np.concatenate([near, np.round(near) + 0.5, points[:50], 1e4 * near])
+    square = ((to[:, None] - points) ** 2).sum(axis=2)
+    distance, index = NearestPoints(points).nearest(to)
+    np.testing.assert_array_equal(index, square.argmin(axis=1))
+    np.testing.assert_array_equal(distance, np.sqrt(square.min(axis=1)))
