@@ -44,12 +44,16 @@ class RoadTables:
         self.section_start = np.array([section.s for section in sections])
         self.section_length = np.array([section.length for section in sections])
         self.first_section = np.searchsorted(self.section_road, np.arange(len(self.roads)))
-        self._section_keys = self.curves.base[self.section_road] + self.section_start
+        self._section_borders = (self.curves.base[self.section_road] + self.section_start)[1:]
+        """Starts of all sections but the first one, on the common axis of all roads."""
         ordered = [_inside_out(section) for section in sections]
         counts = np.array([len(lanes) for lanes in ordered])
         self.left_count = np.array([sum(1 for lane in lanes if lane.id > 0) for lanes in ordered])
         self.right_count = counts - self.left_count - 1
         self.first_lane = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+        self._sides = self._index_sides()
+        """First and last lane on the right and on the left of each section: rows 2·section and 2·section + 1. On a
+        side without lanes the last one is -1, the first one is on the other side if there is any."""
         lanes = [lane for group in ordered for lane in group]
         self.lanes = lanes
         self._lifted = np.array([bool(lane.heights) for lane in lanes])
@@ -61,6 +65,13 @@ class RoadTables:
         self.outer = PolynomialTable([lane.outer for lane in lanes], spans)
         self.width = PolynomialTable([lane.width for lane in lanes], spans)
 
+    def _index_sides(self) -> Integers:
+        inner, left, right = self.first_lane, self.left_count, self.right_count
+        counts = np.column_stack([right, left]).ravel()
+        first = np.column_stack([inner + 1 + left, inner + 1]).ravel()
+        any_lane = (inner + np.where(left + right > 0, 1, 0)).repeat(2)
+        return np.column_stack([np.where(counts > 0, first, any_lane), np.where(counts > 0, first + counts - 1, -1)])
+
     @cached_property
     def widest_lane(self) -> float:
         """Maximum width of any lane at its start, middle and end [m]."""
@@ -71,9 +82,9 @@ class RoadTables:
 
     def section_of(self, road: Integers, s: Array) -> Integers:
         """Return the running number of the lane section at s (N,) of roads (N,)."""
-        keys = self.curves.base[road] + s
-        found: Integers = self._section_keys.searchsorted(keys, side="right") - 1
-        first: Integers = self.first_section[road]
+        keys = self.curves.base.take(road) + s
+        found: Integers = self._section_borders.searchsorted(keys, side="right")
+        first: Integers = self.first_section.take(road)
         return np.maximum(found, first)
 
     def lane_row(self, road: Integers, s: Array, lane: Integers) -> Integers:
@@ -206,23 +217,21 @@ class RoadTables:
     def lane_beside(self, road: Integers, s: Array, t: Array) -> tuple[Integers, Array]:
         """Return running numbers of lanes at road coordinates and distances from the road edge, 0 on the road."""
         section = self.section_of(road, s)
-        ds = s - self.section_start[section]
+        ds = s - self.section_start.take(section)
         offset = t - self.lane_offset.value(road, s)
-        left, right = self.left_count[section], self.right_count[section]
-        to_left = offset > 0.0
-        count = np.where(to_left, left, right)
-        first = self.first_lane[section] + np.where(to_left, 1, 1 + left)
+        row, last = self._sides.take(2 * section + (offset > 0.0), axis=0).T
         reach = np.abs(offset)
-        row = np.where(count > 0, first, self.first_lane[section] + np.where(left + right > 0, 1, 0))
-        outside = np.where(count > 0, 0.0, reach)
-        open_ = (count > 0).nonzero()[0]
+        has_lanes = last >= 0
+        outside = np.where(has_lanes, 0.0, reach)
+        open_ = has_lanes.nonzero()[0]
         while open_.size:
             lane = row[open_]
             over = reach[open_] - self.outer.value(lane, ds[open_])
-            last = lane + 1 >= first[open_] + count[open_]
-            ends = open_[last]
-            outside[ends] = np.maximum(over[last], 0.0)
-            open_ = open_[(over >= 0.0) & ~last]
+            beyond = (over >= 0.0).nonzero()[0]
+            open_, lane, over = open_[beyond], lane[beyond], over[beyond]
+            ends = lane >= last[open_]
+            outside[open_[ends]] = over[ends]
+            open_ = open_[~ends]
             row[open_] += 1
         return row, outside
 

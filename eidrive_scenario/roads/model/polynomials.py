@@ -8,7 +8,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.arrays import Array, Bools, Integers
 
 Piece = tuple[float, float, float, float, float]
 """Start s of a piece and its coefficients a, b, c, d; ds counts from that start."""
@@ -117,47 +117,61 @@ class PolynomialTable:
         owner = np.repeat(np.arange(len(functions)), counts)
         reached = pieces[:, 0] <= limit
         pieces, owner = pieces[reached], owner[reached]
-        self._starts = pieces[:, 0]
-        self._keys = self.base[owner] + np.maximum(pieces[:, 0], 0.0)
-        self._a, self._b, self._c, self._d = (np.ascontiguousarray(column) for column in pieces[:, 1:].T)
+        new = _begins_function_or_value(pieces, owner)
+        pieces, owner = pieces[new], owner[new]
+        self._borders = (self.base[owner] + np.maximum(pieces[:, 0], 0.0))[1:]
+        """Starts of all pieces but the first one, on the common axis."""
+        self._pieces = pieces
+        """Start and coefficients a, b, c, d of each piece."""
+        self._a = np.ascontiguousarray(pieces[:, 1])
         self._constant = bool(np.all(pieces[:, 2:] == 0.0))
         self._single = len(pieces) == len(functions)
 
     def _piece(self, function: Integers, s: Array) -> Integers:
         if self._single:
             return function
-        found: Integers = self._keys.searchsorted(self.base[function] + s, side="right") - 1
+        found: Integers = self._borders.searchsorted(self.base.take(function) + s, side="right")
         return found
 
     def value(self, function: Integers, s: Array) -> Array:
         """Return the values of functions `function` (N,) at s (N,)."""
         piece = self._piece(function, s)
         if self._constant:
-            return self._a[piece]
-        ds = s - self._starts[piece]
-        return np.asarray(self._a[piece] + ds * (self._b[piece] + ds * (self._c[piece] + ds * self._d[piece])))
+            return self._a.take(piece)
+        start, a, b, c, d = self._pieces.take(piece, axis=0).T
+        ds = s - start
+        return np.asarray(a + ds * (b + ds * (c + ds * d)))
 
     def value_and_slope(self, function: Integers, s: Array) -> tuple[Array, Array]:
         """Return the values and derivatives of functions at s."""
         piece = self._piece(function, s)
         if self._constant:
-            return self._a[piece], np.zeros(piece.shape)
-        ds = s - self._starts[piece]
-        b, c, d = self._b[piece], self._c[piece], self._d[piece]
-        return self._a[piece] + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
+            return self._a.take(piece), np.zeros(piece.shape)
+        start, a, b, c, d = self._pieces.take(piece, axis=0).T
+        ds = s - start
+        return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
 
     def to_second_order(self, function: Integers, s: Array) -> tuple[Array, Array, Array]:
         """Return the values and first two derivatives of functions at s."""
         piece = self._piece(function, s)
-        ds = s - self._starts[piece]
-        b, c, d = self._b[piece], self._c[piece], self._d[piece]
-        value, slope = self._a[piece] + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
+        start, a, b, c, d = self._pieces.take(piece, axis=0).T
+        ds = s - start
+        value, slope = a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
         return value, slope, 2.0 * c + 6.0 * ds * d
 
     @property
     def is_zero(self) -> bool:
         """True if all functions are 0 everywhere."""
         return self._constant and not self._a.any()
+
+
+def _begins_function_or_value(pieces: Array, owner: Integers) -> Bools:
+    """Return whether each piece is the first of its function or differs from its predecessor, unlike a constant."""
+    new = np.ones(len(pieces), dtype=bool)
+    constant, bits = (pieces[:, 2:] == 0.0).all(axis=1), np.ascontiguousarray(pieces[:, 1]).view(np.int64)
+    same = (bits[1:] == bits[:-1]) & constant[1:] & constant[:-1] & (owner[1:] == owner[:-1])
+    new[1:] = ~same
+    return new
 
 
 def spread(spans: Sequence[float]) -> Array:
