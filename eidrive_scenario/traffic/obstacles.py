@@ -76,12 +76,11 @@ def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Oc
     x = (boxes[:, 0, None] + cos * corners[..., 0] - sin * corners[..., 1]).ravel()
     y = (boxes[:, 1, None] + sin * corners[..., 0] + cos * corners[..., 1]).ravel()
     z = view.position[rows, 2].repeat(len(OUTLINE))
-    velocity = view.velocity[rows, :2].repeat(len(OUTLINE), axis=0)
     row, s, point = lanes.roads.overlapped_lanes(x, y, z)
     progress = lanes.progress(row, s)
-    heading = lanes.tables.curves.at(lanes.road[row], s)[2]
-    along = velocity[point, 0] * np.cos(heading) + velocity[point, 1] * np.sin(heading)
-    speed = np.maximum(along * lanes.direction[row], 0.0)
-    moving = np.hypot(*velocity[point].T) > STANDING
+    heading = lanes.tables.curves.heading(lanes.road[row], s)
+    vx, vy = view.velocity[rows, :2].T.take(point // len(OUTLINE), axis=1)
+    speed = np.maximum((vx * np.cos(heading) + vy * np.sin(heading)) * lanes.direction[row], 0.0)
+    moving = np.hypot(vx, vy) > STANDING
     found = Occupants(row, progress, progress, progress, speed, np.full(len(row), FOREIGN))
     return found, set(row[moving].tolist())

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.roads.geometry.overlaps import Overlaps
 from eidrive_scenario.roads.geometry.tables import RoadTables
@@ -36,6 +36,8 @@ class Locator:
         self._row, self._s = _samples(tables)
         poses = tables.lane_poses(self._row, self._s, np.zeros_like(self._s))
         self._road = tables.section_road[tables.lane_section[self._row]]
+        self._frames = np.column_stack(self._frame(self._road, self._s))
+        """Reference lines at the samples, with the columns of `_frame`."""
         self.sample_points: Array = np.column_stack([poses.x, poses.y])
         self._from_samples = tables.widest_lane + NARROW + SPACING
         """Maximum distance of a point on a road from the nearest of its samples [m]."""
@@ -65,7 +67,7 @@ class Locator:
         """
         solid = z is not None and self._solid is not None
         samples = self._solid if solid and self._solid is not None else self._flat
-        points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
+        points = np.array([x, y, z] if solid and z is not None else [x, y]).T
         # A point that is far from all samples is outside the reach of every road.
         hopeless = np.inf if solid else reach + self._from_samples
         distance, nearest = samples.nearest(points, within=hopeless)
@@ -73,8 +75,8 @@ class Locator:
 
     def _located(self, samples: NearestPoints, points: Array, nearest: Integers, reach: float) -> LaneLocations:
         """Return locations of points (N, 2), or (N, 3) with heights, by the nearest samples of `samples`."""
-        road, s, t, row, outside = self._best_roads(samples, points, nearest, np.inf)
-        heading = self._tables.curves.at(road, s)[2]
+        road, s, t, row, outside, _ = self._best_roads(samples, points, nearest, np.inf)
+        heading = self._tables.curves.heading(road, s)
         far = outside > reach
         center, _ = self._tables.lane_t(row, s)
         return LaneLocations(
@@ -90,14 +92,14 @@ class Locator:
 
     def _best_roads(
         self, samples: NearestPoints, points: Array, nearest: Integers, reach: float
-    ) -> tuple[Integers, Array, Array, Integers, Array]:
-        """Return roads, s, t, lane rows and distances from the road of points, by the nearest samples of `samples`.
+    ) -> tuple[Integers, Array, Array, Integers, Array, Bools]:
+        """Return roads, s, t, lane rows, distances from the road, and whether a further refinement has no effect.
 
         The result may be another road than the nearest one for a point farther than `reach` from all roads.
         """
         x, y, z = points[:, 0], points[:, 1], points[:, 2] if points.shape[1] > 2 else None
-        road, s = self._road[nearest], self._s[nearest]
-        s, t, beyond = self._refine(road, s, x, y)
+        road = self._road[nearest]
+        s, t, beyond, settled = self._refine(road, self._s[nearest], x, y, self._frames_at(nearest))
         row, outside = self._tables.lane_beside(road, s, t)
         outside = np.hypot(outside, beyond)
         uncertain = (outside > 0.0).nonzero()[0]
@@ -107,26 +109,35 @@ class Locator:
             limit = limit if z is None else np.full(len(uncertain), np.inf)
             best = self._compare(samples, points[uncertain], x[uncertain], y[uncertain], height, limit)
             road[uncertain], s[uncertain], t[uncertain], row[uncertain], outside[uncertain] = best
-        return road, s, t, row, outside
+            settled[uncertain] = False
+        return road, s, t, row, outside, settled
 
     def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
         """Return all lanes that overlap points (N,): lane rows, s on their roads, and indices of the points."""
         samples, places, distance, nearest = self._nearest_samples(x, y, z, reach=0.0)
         near = (distance < np.inf).nonzero()[0]
-        road, s, _, _, outside = self._best_roads(samples, places[near], nearest[near], reach=0.0)
+        road, s, _, row, outside, settled = self._best_roads(samples, places[near], nearest[near], reach=0.0)
         inside = (outside <= 0.0).nonzero()[0]
-        on, road, s = near[inside], road[inside], s[inside]
-        pair, other, guess = self._overlaps.beneath(road, x[on], y[on])
-        roads = np.concatenate([road, other])
-        guesses, points = np.concatenate([s, guess]), np.concatenate([on, on[pair]])
-        refined, t, beyond = self._refine(roads, guesses, x[points], y[points])
-        row, outside = self._tables.lane_beside(roads, refined, t)
-        hit = ((beyond <= 0.0) & (outside <= 0.0)).nonzero()[0]
-        return row[hit], refined[hit], points[hit]
+        on, road, s, row = near[inside], road[inside], s[inside], row[inside]
+        pair, sample = self._overlaps.beneath(road, x[on], y[on])
+        again = (~settled[inside]).nonzero()[0]
+        if not again.size and not pair.size:
+            return row, s, on
+        frame = np.concatenate([self._frame(road[again], s[again]), self._frames_at(sample)], axis=1)
+        points = np.concatenate([on, on[pair]])
+        road, s = np.concatenate([road, self._road[sample]]), np.concatenate([s, self._s[sample]])
+        row, hit = np.concatenate([row, pair]), np.ones(len(points), dtype=bool)
+        # The lane rows of pairs are placeholders: all pairs are open.
+        open_ = np.concatenate([again, np.arange(len(on), len(points))])
+        at = points[open_]
+        s[open_], t, beyond, _ = self._refine(road[open_], s[open_], x[at], y[at], frame)
+        row[open_], outside = self._tables.lane_beside(road[open_], s[open_], t)
+        hit[open_] = (beyond <= 0.0) & (outside <= 0.0)
+        return row[hit], s[hit], points[hit]
 
     @cached_property
     def _overlaps(self) -> Overlaps:
-        return Overlaps(self._tables, self.sample_points, self._road, self._s, self._from_samples)
+        return Overlaps(self._tables, self.sample_points, self._road, self._from_samples)
 
     def _compare(
         self, samples: NearestPoints, points: Array, x: Array, y: Array, z: Array | None, limit: Array
@@ -138,13 +149,13 @@ class Locator:
         k = min(CANDIDATES, len(self._s))
         distance, nearest = samples.several(points, k)
         road = self._road[nearest]
-        first = np.ones_like(road, dtype=bool)
-        for k_th in range(1, k):
-            first[:, k_th] = ~np.any(road[:, :k_th] == road[:, k_th : k_th + 1], axis=1)
+        earlier = np.tri(k, k=-1, dtype=bool)
+        first = ~((road[:, :, None] == road[:, None, :]) & earlier).any(axis=2)
         first[:, 1:] &= distance[:, 1:] <= limit[:, None]
         point, column = np.nonzero(first)
-        road, s = road[point, column], self._s[nearest[point, column]]
-        s, t, beyond = self._refine(road, s, x[point], y[point])
+        sample = nearest[point, column]
+        road = self._road[sample]
+        s, t, beyond, _ = self._refine(road, self._s[sample], x[point], y[point], self._frames_at(sample))
         row, outside = self._tables.lane_beside(road, s, t)
         outside = np.hypot(outside, beyond)
         score = outside
@@ -154,16 +165,30 @@ class Locator:
         best = order[np.searchsorted(point[order], np.arange(len(points)))]
         return road[best], s[best], t[best], row[best], outside[best]
 
-    def _refine(self, road: Integers, s: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """Return s, t and the distance beyond an end of the road by Newton's method from an initial s."""
-        tables, length = self._tables, self._tables.length[road]
+    def _frame(self, road: Integers, s: Array) -> tuple[Array, ...]:
+        """Return x, y, cosine and sine of the heading, curvature and path length per meter of s of reference lines."""
+        x, y, h, curvature, speed = self._tables.curves.at(road, s)
+        return x, y, np.cos(h), np.sin(h), curvature, speed
+
+    def _frames_at(self, sample: Integers) -> Array:
+        """Return `_frame` (6, N) at samples."""
+        return self._frames.take(sample, axis=0).T
+
+    def _refine(
+        self, road: Integers, s: Array, x: Array, y: Array, frame: Array | tuple[Array, ...]
+    ) -> tuple[Array, Array, Array, Bools]:
+        """Return s, t and the distance beyond an end of the road by Newton's method, and whether s is a fixed point.
+
+        s      (N,) initial values
+        frame  `_frame` there
+        """
+        tables, length = self._tables, self._tables.length.take(road)
         end = length
         open_: Integers | None = None
         """Points whose s is not found yet; None for all."""
-        found_s, found_t, found_along = s, s, s
-        for _ in range(10):
-            px, py, h, curvature, speed = tables.curves.at(road, s)
-            cos, sin = np.cos(h), np.sin(h)
+        found_s, found_t, found_along, last_change = s, s, s, s
+        for repetition in range(10):
+            px, py, cos, sin, curvature, speed = frame if repetition == 0 else self._frame(road, s)
             dx, dy = x - px, y - py
             along, left = cos * dx + sin * dy, cos * dy - sin * dx
             t = left
@@ -178,17 +203,23 @@ class Locator:
             moved = np.minimum(np.maximum(s + step, 0.0), length)
             change = np.abs(moved - s)
             if open_ is None:
-                found_s, found_t, found_along = moved, t, along
+                found_s, found_t, found_along, last_change = moved, t, along, change
             else:
-                found_s[open_], found_t[open_], found_along[open_] = moved, t, along
+                found_s[open_], found_t[open_], found_along[open_], last_change[open_] = moved, t, along, change
             going = (change > 1e-6).nonzero()[0]
+            if going.size == len(s):
+                s = moved
+                continue
             if not going.size:
                 break
             open_ = going if open_ is None else open_[going]
             road, s, x, y, length = road[going], moved[going], x[going], y[going], length[going]
-        off = np.abs(found_along)
-        is_beyond = ((found_s <= 0.0) | (found_s >= end)) & (off > 1e-6)
-        return found_s, found_t, np.where(is_beyond, off, 0.0)
+        beyond = np.zeros(len(end))
+        at_end = ((found_s <= 0.0) | (found_s >= end)).nonzero()[0]
+        if at_end.size:
+            off = np.abs(found_along[at_end])
+            beyond[at_end] = np.where(off > 1e-6, off, 0.0)
+        return found_s, found_t, beyond, last_change == 0.0
 
 
 def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:

@@ -11,12 +11,12 @@ from eidrive_scenario.roads.geometry.tables import RoadTables
 class Overlaps:
     """Nearby roads of the same junction for points on connecting roads.
 
-    points, road, s  (S,) samples along the lanes of all roads; samples of a road are contiguous
-    reach            maximum distance of a lane of a road from its nearest sample [m]
+    points, road  (S, 2) and (S,) samples along the lanes of all roads; samples of a road are contiguous
+    reach         maximum distance of a lane of a road from its nearest sample [m]
     """
 
-    def __init__(self, tables: RoadTables, points: Array, road: Integers, s: Array, reach: float) -> None:
-        self._points, self._s, self._reach = points, s, reach
+    def __init__(self, tables: RoadTables, points: Array, road: Integers, reach: float) -> None:
+        self._points, self._reach = points, reach
         count = len(tables.roads)
         self._first, self._last = np.searchsorted(road, [np.arange(count), np.arange(1, count + 1)])
         groups: dict[str, list[int]] = {}
@@ -34,12 +34,12 @@ class Overlaps:
         np.minimum.at(self._low, road, points)
         np.maximum.at(self._high, road, points)
 
-    def beneath(self, road: Integers, x: Array, y: Array) -> tuple[Integers, Integers, Array]:
-        """Return pairs of point index and nearby other road for points (N,), and s of its nearest sample."""
+    def beneath(self, road: Integers, x: Array, y: Array) -> tuple[Integers, Integers]:
+        """Return pairs for points (N,): point index and nearest sample of a nearby other road."""
         counts = self._counts[road]
         point = np.arange(len(road)).repeat(counts)
         if not point.size:
-            return point, point, np.empty(0)
+            return point, point
         step = np.arange(len(point)) - (counts.cumsum() - counts).repeat(counts)
         other = self._others[self._starts[road].repeat(counts) + step]
         px, py = x[point], y[point]
@@ -48,7 +48,7 @@ class Overlaps:
         near &= (py >= low[:, 1] - reach) & (py <= high[:, 1] + reach)
         point, other, px, py = point[near], other[near], px[near], py[near]
         if not point.size:
-            return point, other, np.empty(0)
+            return point, other
         first, sizes = self._first[other], self._last[other] - self._first[other]
         owner = np.arange(len(point)).repeat(sizes)
         begins = sizes.cumsum() - sizes
@@ -57,6 +57,6 @@ class Overlaps:
         least = np.minimum.reduceat(gap, begins)
         # Ties select the first sample, as argmin does.
         at = (gap == least[owner]).nonzero()[0]
-        at = at[np.unique(owner[at], return_index=True)[1]]
+        at = at[owner[at].searchsorted(np.arange(len(point)))]
         close = least <= reach * reach
-        return point[close], other[close], self._s[sample[at[close]]]
+        return point[close], sample[at[close]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from eidrive_scenario.roads.model.polynomials import spread
 
 EPSILON = float(np.finfo(np.float64).eps)
 """Argument of the cardinal sine in place of 0, as in numpy.sinc."""
+FEW = 12
+"""Maximum number of points on spirals that are evaluated individually, which is faster and gives the same result."""
+
+Value = TypeVar("Value", float, Array)
 
 
 class CurveTable:
@@ -26,28 +31,30 @@ class CurveTable:
         owner = np.repeat(np.arange(len(lines)), [len(group) for group in reached])
         self._starts = np.array([curve.s for curve in curves])
         first = np.diff(owner, prepend=-1) > 0
-        self._keys = self.base[owner] + np.where(first, 0.0, np.maximum(self._starts, 0.0))
+        self._borders = (self.base[owner] + np.where(first, 0.0, np.maximum(self._starts, 0.0)))[1:]
+        """Starts of all curves but the first one, on the common axis of all lines."""
         x, y, h = (np.array([getattr(curve, name) for curve in curves]) for name in ("x", "y", "h"))
         self._kind = np.array([_kind(curve) for curve in curves], dtype=np.int8)
         self._curvature = np.array([getattr(curve, "curvature", 0.0) for curve in curves])
         self._rate = np.array([getattr(curve, "rate", 0.0) for curve in curves])
         arcs = np.where(self._kind == 0, self._curvature, 0.0)
-        self._placing = np.column_stack([self._starts, arcs, x, y, h, np.cos(h), np.sin(h)])
+        self._placing = np.column_stack([self._starts, arcs, x, y, h, np.cos(h), np.sin(h), np.ones_like(x)])
         """Columns of the curves that each evaluation needs: start, curvature of arcs, x, y, heading, its cosine and
-        sine."""
+        sine, path length per meter of s of lines and arcs."""
         self._spiral = _spiral_columns(self._curvature, self._rate)
-        self._is_curved = bool(self._kind.any())
-        """Whether any curve is neither a line nor an arc."""
+        kinds = ((1, self._spirals), (2, self._cubics))
+        self._evaluations = [(kind, evaluate) for kind, evaluate in kinds if (self._kind == kind).any()]
+        """Kinds of curves on these lines that are neither lines nor arcs, and their evaluation."""
         self._cubic = np.array(
             [(*curve.u, *curve.v, curve.pace) if isinstance(curve, Cubic) else (0.0,) * 9 for curve in curves]
         ).reshape(-1, 9)
 
     def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return x, y, heading, curvature and path length per meter of s at s (N,) of lines (N,)."""
-        curve = np.maximum(self._keys.searchsorted(self.base[line] + s, side="right") - 1, 0)
-        start, curvature, x, y, h, cos, sin = self._placing.take(curve, axis=0).T
+        curve = self._curve(line, s)
+        start, curvature, x, y, h, cos, sin, speed = self._placing.take(curve, axis=0).T
         ds = s - start
-        if curvature.any():
+        if np.count_nonzero(curvature):
             turn = curvature * ds
             half = 0.5 * turn
             # As numpy.sinc(half / pi), bit for bit, at half of the time.
@@ -57,31 +64,54 @@ class CurveTable:
             u, v = chord * np.cos(half), chord * np.sin(half)
         else:
             u, v, turn = ds.copy(), np.zeros(len(ds)), np.zeros(len(ds))
-        speed = np.ones(len(ds))
-        if self._is_curved:
-            kind = self._kind[curve]
-            for number, evaluate in ((1, self._spirals), (2, self._cubics)):
+        if self._evaluations:
+            kind = self._kind.take(curve)
+            for number, evaluate in self._evaluations:
                 some = (kind == number).nonzero()[0]
                 if some.size:
                     u[some], v[some], turn[some], curvature[some], speed[some] = evaluate(curve[some], ds[some])
         return x + cos * u - sin * v, y + sin * u + cos * v, h + turn, curvature, speed
 
+    def heading(self, line: Integers, s: Array) -> Array:
+        """Return the heading at s (N,) of lines (N,) [rad], as `at` does."""
+        curve = self._curve(line, s)
+        start, curvature, _, _, h, _, _, _ = self._placing.take(curve, axis=0).T
+        ds = s - start
+        turn = curvature * ds
+        if self._evaluations:
+            kind = self._kind.take(curve)
+            some = (kind == 1).nonzero()[0]
+            if some.size:
+                k, rate, on = self._curvature[curve[some]], self._rate[curve[some]], ds[some]
+                turn[some] = on * (k + 0.5 * rate * on)
+            some = (kind == 2).nonzero()[0]
+            if some.size:
+                turn[some] = self._cubics(curve[some], ds[some])[2]
+        return np.asarray(h + turn)
+
     def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
         """Return the curvature and path length per meter of s at s (N,) of lines (N,), as `at` does."""
-        curve = np.maximum(self._keys.searchsorted(self.base[line] + s, side="right") - 1, 0)
-        ds = s - self._starts[curve]
+        curve = self._curve(line, s)
+        ds = s - self._starts.take(curve)
         curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)
         mask = self._kind[curve] == 2
         if mask.any():
             _, _, _, curvature[mask], speed[mask] = self._cubics(curve[mask], ds[mask])
         return curvature, speed
 
+    def _curve(self, line: Integers, s: Array) -> Integers:
+        """Return the indices of the curves at s (N,) of lines (N,)."""
+        found: Integers = self._borders.searchsorted(self.base.take(line) + s, side="right")
+        return found
+
     def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
-        k, rate, shift, scale, cosine0, sine0, sign, cos, sin = self._spiral.take(curve, axis=0).T
-        sine, cosine = fresnel((ds + shift) * scale)
-        along, across = (cosine - cosine0) / scale, sign * (sine - sine0) / scale
-        turn = ds * (k + 0.5 * rate * ds)
-        return cos * along - sin * across, sin * along + cos * across, turn, k + rate * ds, np.ones(len(ds))
+        columns = self._spiral.take(curve, axis=0)
+        if len(ds) > FEW:
+            u, v, turn, curvature = _on_spiral(ds, *columns.T)
+        else:
+            each = zip(ds.tolist(), columns.tolist(), strict=True)
+            u, v, turn, curvature = np.array([_on_spiral(one, *row) for one, row in each]).T
+        return u, v, turn, curvature, np.ones(len(ds))
 
     def _cubics(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
         u0, u1, u2, u3, v0, v1, v2, v3, pace = self._cubic[curve].T
@@ -92,6 +122,25 @@ class CurveTable:
         bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > 0.0)
         u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
         return u, v, np.arctan2(dv, du), bend, norm * pace
+
+
+def _on_spiral(
+    ds: Value,
+    k: Value,
+    rate: Value,
+    shift: Value,
+    scale: Value,
+    cosine0: Value,
+    sine0: Value,
+    sign: Value,
+    cos: Value,
+    sin: Value,
+) -> tuple[Value, Value, Value, Value]:
+    """Return u, v, turn and curvature at a distance from the start of a spiral with these columns."""
+    sine, cosine = fresnel((ds + shift) * scale)
+    along, across = (cosine - cosine0) / scale, sign * (sine - sine0) / scale
+    u, v = cos * along - sin * across, sin * along + cos * across
+    return u, v, ds * (k + 0.5 * rate * ds), k + rate * ds
 
 
 def _spiral_columns(curvature: Array, rate: Array) -> Array:

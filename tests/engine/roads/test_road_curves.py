@@ -102,3 +102,16 @@ def test_curve_table_equals_single_lines() -> None:
     found = np.column_stack(table.at(index, s))
     assert found == pytest.approx(np.array([lines[i].at(v) for i, v in zip(index, s, strict=True)]), abs=1e-12)
     assert np.column_stack(table.bend(index, s)) == pytest.approx(found[:, 3:], abs=1e-12)
+
+
+def test_curve_table_of_mixed_curves_is_independent_of_other_points() -> None:
+    bent = Cubic(150.0, 80.0, 9.0, 0.4, 40.0, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.01, -0.0002))
+    mixed = [Arc(0.0, 1.0, 2.0, 0.3, 50.0), Arc(50.0, 49.0, 17.0, 0.3, 50.0, curvature=0.02)]
+    turning = curves.spiral(100.0, 70.0, 40.0, 1.3, 50.0, 0.02, -0.03)
+    table = CurveTable([ReferenceLine([*mixed, turning, bent], 190.0), ReferenceLine([mixed[0]], 50.0)])
+    line = np.repeat([0, 1], 200)
+    s = np.concatenate([np.linspace(0.0, 190.0, 200), np.linspace(0.0, 50.0, 200)])
+    together, heading = np.array(table.at(line, s)), table.heading(line, s)
+    for n in range(len(s)):
+        np.testing.assert_array_equal(np.array(table.at(line[[n]], s[[n]]))[:, 0], together[:, n])
+    np.testing.assert_array_equal(heading, together[2])
