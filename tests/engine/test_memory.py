@@ -80,13 +80,45 @@ def test_triangle_shape_vertices_are_released() -> None:
 
 
 def test_simulation_dropped_without_close_frees_its_client(scenario: Path) -> None:
+    """The next world uses the client, without the bodies of the dropped one."""
     simulation = Simulation(load_scenario(scenario))
     simulation.tick()
     client = simulation.world._client
-    assert is_connected(client)
+    assert bullet.getNumBodies(client) > 0
     del simulation
     gc.collect()
-    assert not is_connected(client)
+    assert bullet.getNumBodies(client) == 0
+    with World() as world:
+        assert world._client == client
+
+
+def test_clients_of_worlds_are_freed_but_for_one() -> None:
+    worlds = [World() for _ in range(3)]
+    clients = [world._client for world in worlds]
+    for world in worlds:
+        world.close()
+    assert sum(is_connected(client) for client in clients) == 1
+
+
+def test_reused_client_has_no_collision_filter_of_its_former_world() -> None:
+    """Boxes of 2 m whose centers are 1 m apart overlap, unless their pair is filtered."""
+    contacts = []
+    for is_filtered in (True, False):
+        client = connect()
+        try:
+            shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[1.0, 1.0, 1.0], physicsClientId=client)
+            boxes = [
+                bullet.createMultiBody(1.0, shape, basePosition=[x, 0.0, 0.0], physicsClientId=client)
+                for x in (0.0, 1.0)
+            ]
+            if is_filtered:
+                bullet.setCollisionFilterPair(*boxes, -1, -1, 0, physicsClientId=client)
+            bullet.performCollisionDetection(client)
+            contacts.append(len(bullet.getContactPoints(*boxes, physicsClientId=client)))
+        finally:
+            disconnect(client)
+    assert contacts[0] == 0
+    assert contacts[1] > 0
 
 
 def test_world_closed_twice_leaves_the_client_of_another_world_alone() -> None:
