@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Hashable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -119,7 +120,7 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
         diagnostic = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
         raise SettingError(diagnostic)
     try:
-        return yaml.load(text, _Loader)
+        return _copy(_parsed(text)[0])
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         error_line = (line or 1) + min(mark.line, text.count("\n")) if mark is not None else line
@@ -147,8 +148,44 @@ def key_lines(text: str, first: int = 1) -> dict[str, int]:
 
     Nested keys are joined by dots, and entries of lists are numbered: `delay`, `delay.seconds`, `limits.0`.
     """
+    return {path: first + line for path, line in _parsed(text)[1].items()}
+
+
+def _parsed(text: str) -> tuple[Any, dict[str, int]]:
+    """Return the data of a text, and the line of each key, from 0. Both are shared by all calls with the text.
+
+    A run reads a text several times, and each run of a sweep reads the same texts. Long ones are not kept.
+    """
+    return _remembered(text) if len(text) <= _MAX_REMEMBERED else _parse(text)
+
+
+def _parse(text: str) -> tuple[Any, dict[str, int]]:
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        data = None if node is None else loader.construct_document(node)
+    finally:
+        loader.dispose()
+    return data, _lines_of(node)
+
+
+_MAX_REMEMBERED = 4096
+"""Maximum number of characters of a text whose data is kept in the process."""
+_remembered = lru_cache(maxsize=256)(_parse)
+
+
+def _copy(data: Any) -> Any:
+    """Return data of YAML with copies of its mappings, lists and sets; all other values are immutable."""
+    if isinstance(data, dict):
+        return {key: _copy(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_copy(value) for value in data]
+    return set(data) if isinstance(data, set) else data
+
+
+def _lines_of(root: yaml.Node | None) -> dict[str, int]:
     lines: dict[str, int] = {}
-    waiting = [("", yaml.compose(text, Loader=_Loader))]
+    waiting = [("", root)]
     while waiting:
         path, node = waiting.pop()
         entries: list[tuple[str, yaml.Node, yaml.Node]] = []
@@ -158,6 +195,6 @@ def key_lines(text: str, first: int = 1) -> dict[str, int]:
             entries = [(str(index), value, value) for index, value in enumerate(node.value)]
         for name, start, value in entries:
             inner = f"{path}.{name}" if path else name
-            lines[inner] = first + start.start_mark.line
+            lines[inner] = start.start_mark.line
             waiting.append((inner, value))
     return lines

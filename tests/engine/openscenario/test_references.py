@@ -115,3 +115,13 @@ def test_hidden_parameter_is_unknown() -> None:
 def test_unclosed_expression_is_invalid_yaml(text: str) -> None:
     with pytest.raises(SettingError, match="not valid YAML"):
         load_yaml(text, source="a.xosc")
+
+
+def test_changed_data_of_a_text_is_not_returned_again() -> None:
+    text = "{limits: [1, 2], of: {name: Ego}}"
+    data, lines = load_yaml(text, source="a.xosc"), key_lines(text)
+    data["limits"].append(3)
+    data["of"]["name"] = "Other"
+    lines.clear()
+    assert load_yaml(text, source="a.xosc") == {"limits": [1, 2], "of": {"name": "Ego"}}
+    assert key_lines(text, 7) == {"limits": 7, "limits.0": 7, "limits.1": 7, "of": 7, "of.name": 7}
