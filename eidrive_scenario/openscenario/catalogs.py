@@ -14,6 +14,7 @@ from eidrive_scenario.files.bounded import is_folder, is_regular_file
 from eidrive_scenario.files.xml_lines import line_of
 from eidrive_scenario.library import CATALOGS, LIBRARY_FOLDER, library_path, resolve_path
 from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
+from eidrive_scenario.openscenario.catalog_files import CatalogFiles, Listing, listing_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
@@ -58,6 +59,9 @@ class CatalogLibrary:
             if directory is not None and isinstance(directory.path, str):
                 kind = type(location).__name__.removesuffix("CatalogLocation")
                 self._places[kind] = resolve_path(directory.path, folder)
+        self.folders: dict[Path, Listing] = {place: listing_of(place) for place in self._places.values()}
+        """Locations of catalogs with their listings, before any file in them is read."""
+        self._is_complete = True
         self._circular: set[CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
         self._unreadable: dict[Path, tuple[Diagnostic, ...]] = {}
@@ -92,6 +96,14 @@ class CatalogLibrary:
         used = {entry.source for entry in self.entries.values()}
         documents = [catalog.document for catalog in self._files.values() if catalog is not None]
         return {document.name: document.digest for document in documents if document.name in used}
+
+    @property
+    def files(self) -> CatalogFiles | None:
+        """Return all that was read; None if some file was unreadable or outside the given locations."""
+        catalogs = {path: catalog for path, catalog in self._files.items() if catalog is not None}
+        if not self._is_complete or len(catalogs) < len(self._files):
+            return None
+        return CatalogFiles(self.folders, {path: catalog.document.digest for path, catalog in catalogs.items()})
 
     def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> Element | None:
         reference = found.reference
@@ -185,6 +197,7 @@ class CatalogLibrary:
 
     def _beside(self, name: str) -> CatalogFile | None:
         """Return the catalog from a sibling of the given folders; this finds it if only some files were moved."""
+        self._is_complete = False
         folders = {
             folder
             for place in self._places.values()

@@ -9,6 +9,7 @@ from pathlib import Path
 from eidrive_scenario.errors import ErrorCollector
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario.distributions import ConcreteRun
+from eidrive_scenario.openscenario.kept_scenarios import load_kept
 from eidrive_scenario.openscenario.reading.parsing import Source
 from eidrive_scenario.openscenario.scenario import Scenario, load_scenario
 from eidrive_scenario.openscenario.values.parameters import Assignment, as_assignments
@@ -34,8 +35,10 @@ def _load(source: Scenario | Source | ConcreteRun, parameters: Mapping[str, str 
     if isinstance(source, Scenario):
         return source
     if isinstance(source, ConcreteRun):
-        return load_scenario(source.scenario, {**source.assignments, **(parameters or {})})
-    return load_scenario(resolve_scenario(source) if isinstance(source, str | Path) else source, parameters)
+        return load_kept(source.scenario, {**source.assignments, **(parameters or {})})
+    if isinstance(source, str | Path):
+        return load_kept(resolve_scenario(source), parameters)
+    return load_scenario(source, parameters)
 
 
 def _draw(scenario: Scenario, seed: int, parameters: Mapping[str, str | Assignment] | None) -> Scenario:

@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.library import from_library
+from eidrive_scenario.openscenario.catalog_files import CatalogFiles
 from eidrive_scenario.openscenario.catalogs import CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
@@ -66,6 +67,7 @@ class Scenario:
     assigned     parameter values of the caller; they take precedence over drawn ones
     digest       SHA-256 of the content, as hexadecimal digits
     catalogs     SHA-256 of each used catalog file, by its path
+    catalog_files  all that was read to find catalog entries; None if it cannot be compared with that of later readings
     scope        parameters with their types, for references in settings outside the file
     driven       entities to which the settings of a run give a driving stack; actions cannot switch its controller
     """
@@ -87,6 +89,7 @@ class Scenario:
     assigned: Mapping[str, Assignment] = field(repr=False, default_factory=dict)
     digest: str = ""
     catalogs: Mapping[str, str] = field(default_factory=dict)
+    catalog_files: CatalogFiles | None = field(repr=False, default=None)
     scope: Scope | None = field(repr=False, default=None)
     driven: frozenset[str] = frozenset()
 
@@ -161,6 +164,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         assigned=assignments,
         digest=document.digest,
         catalogs=library.digests,
+        catalog_files=library.files,
         scope=Scope(parameters=dict(read.parameters), budget=collector.budget),
     )
 

@@ -1,0 +1,72 @@
+"""Scenarios that stay in the process, so that each run of a sweep does not read the same files again."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from pathlib import Path
+
+import msgspec
+
+from eidrive_scenario.files.bounded import read_regular_file
+from eidrive_scenario.openscenario.catalogs import CatalogLibrary
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.roadfile import find_road_file
+from eidrive_scenario.openscenario.scenario import Scenario, load_scenario
+from eidrive_scenario.openscenario.values.parameters import Assignment, as_assignments
+from eidrive_scenario.resolved_settings import sha256_of
+
+MAX_KEPT = 2**18
+"""Maximum size of the files of all scenarios that are kept [byte]; their objects take about 40 times as much."""
+
+Key = tuple[str, str, tuple[tuple[str, Assignment], ...]]
+"""Path and SHA-256 of a scenario file, and the values of its parameters."""
+
+
+class _Kept(msgspec.Struct, frozen=True):
+    """Scenario, the size of its file [byte], and the characters of its expressions before the first run."""
+
+    scenario: Scenario
+    size: int
+    concatenated: int
+
+
+_kept: OrderedDict[Key, _Kept] = OrderedDict()
+
+
+def load_kept(path: Path, parameters: Mapping[str, str | Assignment] | None = None) -> Scenario:
+    """Return the scenario of a file like `load_scenario`, without reading it again if all its files are unchanged.
+
+    The contents of the scenario and of its catalogs are compared by their SHA-256, and the folders of catalogs by the
+    names in them. Scenarios are immutable, so that runs can share one. Raise the errors of `load_scenario`.
+    """
+    assignments = as_assignments(parameters)
+    try:
+        content = read_regular_file(path, MAX_KEPT)
+    except OSError:  # Larger, or an error that `load_scenario` reports
+        return load_scenario(path, assignments)
+    key = str(path), sha256_of(content), tuple(assignments.items())
+    kept = _kept.get(key)
+    if kept is not None and _is_current(kept.scenario, path):
+        _kept.move_to_end(key)
+        if kept.scenario.scope is not None:
+            kept.scenario.scope.budget.concatenated = kept.concatenated  # Each run may use the whole limit
+        return kept.scenario
+    scenario = load_scenario(path, assignments)
+    if scenario.catalog_files is not None and scenario.scope is not None:
+        key = key[0], scenario.digest, key[2]  # The content that was read, if the file has changed since
+        _kept[key] = _Kept(scenario, len(content), scenario.scope.budget.concatenated)
+        _kept.move_to_end(key)
+        while sum(one.size for one in _kept.values()) > MAX_KEPT:
+            _kept.popitem(last=False)
+    return scenario
+
+
+def _is_current(scenario: Scenario, path: Path) -> bool:
+    """Whether the catalogs and the road file of a scenario would be found and read as before."""
+    folder = path.parent
+    collector = DiagnosticCollector()
+    if find_road_file(scenario.document.road_network, folder, collector) != scenario.road_file:
+        return False
+    library = CatalogLibrary(scenario.document.catalog_locations, folder, {}, collector)
+    return scenario.catalog_files is not None and scenario.catalog_files.are_current(library.folders)
