@@ -84,6 +84,11 @@ def sweep(
 
     Example: eidrive sweep coop/scenario_1 --vary channel.delay.seconds=0:1:0.1 --store s.db
     """
+    from eidrive_scenario.experiments.sweeps.worker_start import start_server
+
+    if scheduler is None and not dry_run:
+        start_server()  # First, as it imports for as long as the imports below
+
     from eidrive_scenario.cli.sweep_progress import ProgressDisplay
     from eidrive_scenario.cli.sweep_search import Search
     from eidrive_scenario.experiments.repetitions import cores

@@ -37,6 +37,9 @@ CREATE TABLE IF NOT EXISTS runs (
 """
 
 
+_INSERT = f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * 12)})"
+
+
 class StoredRun(msgspec.Struct, frozen=True):
     """Run of a sweep in the store.
 
@@ -66,7 +69,9 @@ class StoredRun(msgspec.Struct, frozen=True):
 
 
 class ResultStore:
-    """Results of sweeps. Only one process writes; the result of a run is on the disk when `add` returns.
+    """Results of sweeps. Only one process writes; the results of runs are on the disk when `add` returns.
+
+    Any thread may call its methods, one at a time.
 
     The journal is a separate file, as in all SQLite files that network file systems may hold.
     """
@@ -140,25 +145,15 @@ class ResultStore:
         rows = dict(self._connection.execute("SELECT name, value FROM meta WHERE name = 'versions'"))
         return dict(json.loads(rows["versions"])) if rows else {}
 
-    def add(self, run: StoredRun) -> None:
-        """Add a run, or replace the one with its key. Raise SimulationError if it cannot be written."""
-        row = (
-            run.key,
-            run.number,
-            run.scenario,
-            run.run,
-            run.seed,
-            run.status,
-            json.dumps(run.point),
-            json.dumps(run.result),
-            run.error,
-            run.command,
-            run.wall_s,
-            zlib.compress(run.settings.encode()),
-        )
+    def add(self, *runs: StoredRun) -> None:
+        """Add runs in one transaction, or replace those with their keys.
+
+        Raise SimulationError if they cannot be written.
+        """
+        rows = [_row(run) for run in runs]
         try:
             with self._connection:
-                self._connection.execute(f"INSERT OR REPLACE INTO runs VALUES ({', '.join('?' * len(row))})", row)
+                self._connection.executemany(_INSERT, rows)
         except sqlite3.Error as error:
             raise SimulationError(
                 f"{self.path}: cannot write a result: {error}; the results of all earlier runs are stored, and the "
@@ -185,6 +180,23 @@ class ResultStore:
         return found
 
 
+def _row(run: StoredRun) -> tuple[Any, ...]:
+    return (
+        run.key,
+        run.number,
+        run.scenario,
+        run.run,
+        run.seed,
+        run.status,
+        json.dumps(run.point),
+        json.dumps(run.result),
+        run.error,
+        run.command,
+        run.wall_s,
+        zlib.compress(run.settings.encode()),
+    )
+
+
 def _stored_run(row: Sequence[Any]) -> StoredRun:
     key, number, scenario, run, seed, status, point, result, error, command, wall_s, settings = row
     texts = json.loads(point), json.loads(result), error, command, wall_s, zlib.decompress(settings).decode()
@@ -193,7 +205,7 @@ def _stored_run(row: Sequence[Any]) -> StoredRun:
 
 def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:
     uri = f"{path.absolute().as_uri()}{'?mode=ro' if read_only else ''}"
-    return sqlite3.connect(uri, uri=True, timeout=30.0)
+    return sqlite3.connect(uri, uri=True, timeout=30.0, check_same_thread=False)
 
 
 def _is_empty(connection: sqlite3.Connection) -> bool:

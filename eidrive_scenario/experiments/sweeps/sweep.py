@@ -7,12 +7,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from eidrive_scenario.experiments.sweeps.execution import crashed, execute
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import EXCLUDED, FAILED, PASSED, REPEATABLE, ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.workers import Workers
+from eidrive_scenario.experiments.sweeps.writing import RunWriter
 
 JUDGED = frozenset({PASSED, FAILED, EXCLUDED})
 """Outcomes with a verdict, and those of runs that constraints exclude."""
@@ -41,6 +42,13 @@ class SweepProgress:
     counts: Counter[str] = field(default_factory=Counter)
     errors: Counter[tuple[str, str]] = field(default_factory=Counter)
     start: float = field(default_factory=time.perf_counter)
+
+    def count(self, run: StoredRun) -> None:
+        """Count a run that has ended."""
+        self.counts[run.status] += 1
+        reason = run.status, run.error.partition("\n")[0]
+        if run.status not in JUDGED and (reason in self.errors or len(self.errors) < MOST_REASONS):
+            self.errors[reason] += 1
 
     @property
     def kept(self) -> int:
@@ -91,7 +99,7 @@ def run_sweep(
 
     wall_limit  limit of the wall time of each run [s]
     retry       repeat runs that were aborted or whose worker ended
-    shown       function that gets the progress at the start and after each run
+    shown       function that gets the progress at the start, at the end, and each run once it is stored
 
     Raise SimulationError if the store cannot be written; the results of all earlier runs are stored.
     """
@@ -110,29 +118,34 @@ def run_sweep(
             else:
                 progress.stored[status] += 1
 
+    def written(run: StoredRun) -> None:
+        progress.count(run)
+        shown(progress, run)
+
     waiting = left()
     shown(progress, None)
-    while True:
-        while len(running) < workers.capacity and (job := next(waiting, None)) is not None:
-            start(job, 1)
-        if not running:
-            shown(progress, None)
-            return progress
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            job, tries = running.pop(future)
-            error = future.exception()
-            if error is None:
-                run = future.result()
-            elif not workers.is_crash(error):
-                raise error
-            elif tries < TRIES:
-                start(job, tries + 1)
-                continue
-            else:
-                run = crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}")
-            store.add(run)
-            progress.counts[run.status] += 1
-            reason = run.status, run.error.partition("\n")[0]
-            if run.status not in JUDGED and (reason in progress.errors or len(progress.errors) < MOST_REASONS):
-                progress.errors[reason] += 1
-            shown(progress, run)
+    with RunWriter(store, written) as writer:
+        while True:
+            while len(running) < workers.capacity and (job := next(waiting, None)) is not None:
+                start(job, 1)
+            events: list[Future[Any]] = [*running]
+            if writer.transaction is not None:
+                events.append(writer.transaction)
+            if not events:
+                break
+            ended = wait(events, return_when=FIRST_COMPLETED).done
+            if writer.transaction in ended:
+                writer.collect()
+            for future in [future for future in running if future in ended]:
+                job, tries = running.pop(future)
+                error = future.exception()
+                if error is None:
+                    writer.add(future.result())
+                elif not workers.is_crash(error):
+                    raise error
+                elif tries < TRIES:
+                    start(job, tries + 1)
+                else:
+                    writer.add(crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}"))
+    shown(progress, None)
+    return progress

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +10,7 @@ from typing import Any, Protocol, TypeVar
 
 from eidrive_scenario.experiments.repetitions import end_with_parent
 from eidrive_scenario.experiments.sweeps.execution import prepare_process
+from eidrive_scenario.experiments.sweeps.worker_start import worker_context
 
 R = TypeVar("R")
 
@@ -36,7 +36,7 @@ class LocalWorkers:
     """Processes of this machine. The end of one affects its own call only; it is replaced."""
 
     def __init__(self, count: int) -> None:
-        self._context = multiprocessing.get_context("spawn")
+        self._context = worker_context()
         self._idle = [self._start() for _ in range(count)]
         self._busy: dict[Future[Any], ProcessPoolExecutor] = {}
         self.capacity = count
