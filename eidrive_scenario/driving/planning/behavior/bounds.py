@@ -42,8 +42,8 @@ class Limits:
     @classmethod
     def ahead(cls, course: Course, s: float, reach: float) -> Limits | None:
         """Return the limits from s to s + reach [m]; None if none is below the wanted speed."""
-        first = max(int(np.searchsorted(course.along, s, side="right")) - 1, 0)
-        last = int(np.searchsorted(course.along, s + reach)) + 1
+        first = max(int(course.along.searchsorted(s, side="right")) - 1, 0)
+        last = int(course.along.searchsorted(s + reach)) + 1
         limits = course.limits[first:last]
         return cls(course.along[first:last], limits) if float(limits.min()) < course.wanted else None
 

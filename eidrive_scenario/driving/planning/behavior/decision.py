@@ -160,10 +160,11 @@ class Decider:
 
     def _with_brake(self, options: Options, best: int) -> int:
         """Return the best proposal, or emergency braking if it was active and the best one still brakes hard."""
-        steps = np.diff(options.rolled.speed[best]) / np.diff(self._times)
-        brakes_hard = float(steps[: round(URGENT / self._times[1])].min()) < -RELEASE * self._settings.hard_deceleration
-        if self._brakes and brakes_hard:
-            best = options.emergency
+        if self._brakes:
+            steps = np.diff(options.rolled.speed[best]) / np.diff(self._times)
+            hardest = float(steps[: round(URGENT / self._times[1])].min())
+            if hardest < -RELEASE * self._settings.hard_deceleration:
+                best = options.emergency
         self._brakes = options.proposals[best].is_emergency
         return best
 
@@ -223,11 +224,13 @@ class Decider:
         proposals: list[Proposal] = []
         walls: list[list[Wall]] = []
         leads: list[Bools] = []
+        ways: list[Bools] = []
         reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
         here = (self._front, situation.s, situation.speed)
         stops = [situation.stop] if situation.stop is not None else []
         for number, profile in enumerate(profiles):
             way = inside_way(scene, profile, self._half_width)
+            ways.append(way)
             found = conflicts(scene, way, situation.s)
             made = proposals_for(number, found, self._settings, emergency=self._emergency, is_current=number == 0)
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
@@ -251,6 +254,7 @@ class Decider:
         evaluation = evaluate(
             proposals,
             profiles,
+            ways,
             rolled,
             scene,
             self._times,

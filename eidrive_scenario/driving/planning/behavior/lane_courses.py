@@ -49,8 +49,10 @@ class Course:
         self.stops, self.passages = stops, passages
         self._x, self._y = (np.ascontiguousarray(column) for column in points.T)
         step = np.diff(points, axis=0)
-        self._unit = step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
-        self._heading = np.arctan2(self._unit[:, 1], self._unit[:, 0])
+        unit = step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
+        self._heading = np.arctan2(unit[:, 1], unit[:, 0])
+        self._segments: Array = np.stack([self._x[:-1], self._y[:-1], along[:-1], *unit.T, self._heading])
+        """Start, distance along the course, direction and heading of the segments (6, M - 1)."""
         self._inside = along[1:-1]
         """Distances at which the next segment begins."""
 
@@ -58,15 +60,21 @@ class Course:
         """Return the distance along the course, the offset to the left and the heading at the nearest point."""
         gap = (self._x - x) ** 2 + (self._y - y) ** 2
         index = min(int(gap.argmin()), len(gap) - 2)
-        (x0, y0), (x1, y1) = self.points[index].tolist(), self.points[index + 1].tolist()
+        x0, y0, x1, y1 = self._corners[index]
         length = math.hypot(x1 - x0, y1 - y0) or 1.0
         ux, uy = (x1 - x0) / length, (y1 - y0) / length
         ahead = (x - x0) * ux + (y - y0) * uy
-        return float(self.along[index]) + ahead, (y - y0) * ux - (x - x0) * uy, math.atan2(uy, ux)
+        return self._places[index] + ahead, (y - y0) * ux - (x - x0) * uy, math.atan2(uy, ux)
 
     def can_follow(self, along: float, speed: float) -> bool:
         """Return whether a vehicle with a speed [m/s] at a distance along the course can pass the curves ahead."""
         return speed <= self._fastest[max(bisect_right(self._places, along) - 1, 0)]
+
+    @cached_property
+    def _corners(self) -> list[tuple[float, float, float, float]]:
+        """Start and end of each segment [m]."""
+        x, y = self._x.tolist(), self._y.tolist()
+        return list(zip(x[:-1], y[:-1], x[1:], y[1:], strict=True))
 
     @cached_property
     def _places(self) -> list[float]:
@@ -90,9 +98,9 @@ class Course:
     def poses(self, along: Array, left: Array | float) -> tuple[Array, Array, Array]:
         """Return x, y and heading (K,) at distances along the course and offsets to the left; straight beyond it."""
         index = self._inside.searchsorted(along, side="right")
-        ux, uy = self._unit[index].T
-        ahead = along - self.along[index]
-        return self._x[index] + ahead * ux - left * uy, self._y[index] + ahead * uy + left * ux, self._heading[index]
+        x, y, begin, ux, uy, heading = self._segments.take(index, axis=1)
+        ahead = along - begin
+        return x + ahead * ux - left * uy, y + ahead * uy + left * ux, heading
 
 
 class LaneCourses:

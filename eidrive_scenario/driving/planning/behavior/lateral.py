@@ -64,12 +64,12 @@ class LateralProfile(msgspec.Struct, frozen=True):
     def offset(self, s: Array) -> Array:
         """Return the offsets (…) at distances (…) along the line."""
         if len(self.places) == 1:
-            return np.full(np.shape(s), self.values[0])
+            return np.full(s.shape, self.values[0])
         places, values = np.array(self.places), np.array(self.values)
         index = places[1:-1].searchsorted(s, side="right")
-        begin, start = places[index], values[index]
-        share = np.minimum(np.maximum((s - begin) / (places[index + 1] - begin), 0.0), 1.0)
-        found = start + (values[index + 1] - start) * blend(share)
+        begin, length = places[index], (places[1:] - places[:-1])[index]
+        share = np.minimum(np.maximum((s - begin) / length, 0.0), 1.0)
+        found = values[index] + (values[1:] - values[:-1])[index] * blend(share)
         if self.slope:
             first = np.where(index == 0, share, 1.0)
             found = found + self.slope * float(places[1] - places[0]) * _leaving(first)

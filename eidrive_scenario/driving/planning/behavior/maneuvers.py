@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
+from typing import NamedTuple
 
 import msgspec
-import numpy as np
 
 from eidrive_scenario.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, change_length, passing, towards
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE
+from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
-from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
+from eidrive_scenario.driving.planning.behavior.surroundings import Present, Surroundings
 
 SLOWER = 2.0
 """Difference to the wanted speed from which on a slower vehicle is passed [m/s]."""
@@ -49,6 +51,18 @@ REAR_REACTION, REAR_DECELERATION, REAR_GAP = 1.0, 1.5, 3.0
 [m]."""
 
 
+class _Obstacle(NamedTuple):
+    """Objects that hold the vehicle up, the nearest first, and the places between which it is beside them [m].
+
+    beside  lanes at places between both
+    """
+
+    objects: list[Present]
+    begin: float
+    end: float
+    beside: list[LanesBeside]
+
+
 def passing_profiles(
     situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body
 ) -> list[LateralProfile]:
@@ -72,30 +86,37 @@ def passing_profiles(
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = (*situation.steered, situation.speed)
         found.append(towards(name, faster, *start, settings.lateral_acceleration, side=overtaking))
-    for side in (overtaking, -overtaking):
-        profile = _around_blocker(situation, scene, settings, blocker, body, side)
-        if profile is not None:
-            found.append(profile)
+    obstacle = _obstacle(situation, scene, blocker, body)
+    if obstacle is not None:
+        sides = (_around(situation, settings, obstacle, body, side) for side in (overtaking, -overtaking))
+        found += [profile for profile in sides if profile is not None]
     return found
 
 
-def _head_on(situation: Situation, scene: Surroundings, body: Body) -> int | None:
+def _head_on(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
     """Return the nearest hypothesis that comes towards the vehicle in the lane of its route."""
-    ahead = scene.certain & (scene.s[:, 0] > situation.s + body.center) & ~scene.crosses[:, 0]
-    in_way = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < body.half_width
-    found: list[int] = np.flatnonzero(ahead & in_way & (scene.speed[:, 0] < -WRONG_WAY)).tolist()
-    return min(found, key=lambda row: float(scene.s[row, 0])) if found else None
+    center = situation.s + body.center
+    found = [
+        one
+        for one in scene.present
+        if one.speed < -WRONG_WAY
+        and one.s > center
+        and not one.crosses
+        and abs(one.d) - one.half_width < body.half_width
+        and scene.certain[one.row]
+    ]
+    return min(found, key=attrgetter("s"), default=None)
 
 
 def _evasions(
-    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, head_on: int
+    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body, head_on: Present
 ) -> list[LateralProfile]:
     """Return changes to the neighboring lanes that reach as far as an oncoming vehicle, and are free behind.
 
     The first one is away from the lanes of the opposite direction.
     """
-    far = float(scene.s[head_on, 0])
-    here, there = (situation.line.lanes_beside(situation.lanes_at(place)) for place in (situation.s + 10.0, far))
+    places = (situation.s + 10.0, head_on.s)
+    here, there = (situation.line.lanes_beside(situation.lanes_at(place)) for place in places)
     found = []
     for side in (-here.overtaking, here.overtaking):
         offset, beyond = (lanes.left if side > 0 else lanes.right for lanes in (here, there))
@@ -117,109 +138,126 @@ def _behind_neighbor(
     if abs(d) < SWUNG:
         return None
     side = 1 if d > 0.0 else -1
-    ends = scene.s[:, 0] + scene.half_length[:, 0]
-    is_beside = (ends > situation.s - body.rear) & (scene.s[:, 0] - scene.half_length[:, 0] < situation.s + body.front)
-    between = side * scene.d[:, 0] - scene.half_width[:, 0] < side * d
-    in_way = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < body.half_width + scene.margin
-    rows = np.flatnonzero(is_beside & between & in_way & ~scene.crosses[:, 0] & (np.abs(scene.speed[:, 0]) < WAITING))
-    if not rows.size:
+    rear, front = situation.s - body.rear, situation.s + body.front
+    found = [
+        one
+        for one in scene.present
+        if one.front > rear
+        and one.rear < front
+        and side * one.d - one.half_width < side * d
+        and _is_in_way(one, body.half_width)
+        and not one.crosses
+        and abs(one.speed) < WAITING
+    ]
+    if not found:
         return None
-    last = int(rows[np.argmax(ends[rows])])
-    end = max(float(ends[last]) + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
+    last = max(found, key=attrgetter("front"))
+    end = max(last.front + body.rear + body.wheelbase + BEFORE_OBSTACLE, s + 1.0)
     back = change_length(d, max(situation.speed, 2.0), settings.lateral_acceleration)
-    name = f"pass {situation.kind_of(scene.owner[last])} on the {'left' if side > 0 else 'right'}"
+    name = f"pass {situation.kind_of(last.owner)} on the {'left' if side > 0 else 'right'}"
     own, _ = situation.line.lanes_beside(situation.lanes_at(end)).room(side)
     return LateralProfile(
         name, (s, end, end + back), (d, d, 0.0), slope, side, uses_oncoming=abs(d) + body.half_width > own
     )
 
 
-def _blocker(situation: Situation, scene: Surroundings, center: float, half_width: float) -> int | None:
+def _is_in_way(one: Present, half_width: float) -> bool:
+    """Return whether a hypothesis is closer to the route than a vehicle on it should pass."""
+    return abs(one.d) - one.half_width < half_width + one.margin
+
+
+def _blocker(situation: Situation, scene: Surroundings, center: float, half_width: float) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
-    ahead = (scene.s[:, 0] > situation.s + center) & ~scene.crosses[:, 0]
-    in_way = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < half_width + scene.margin
-    slower = (scene.speed[:, 0] > -0.5) & (scene.speed[:, 0] < situation.wanted - SLOWER)
-    found: list[int] = np.flatnonzero(ahead & in_way & slower).tolist()
-    passable = [row for row in found if _is_passable(situation, scene, row)]
-    return min(passable, key=lambda row: float(scene.s[row, 0])) if passable else None
+    place, slower = situation.s + center, situation.wanted - SLOWER
+    found = [
+        one
+        for one in scene.present
+        if one.s > place
+        and -0.5 < one.speed < slower
+        and not one.crosses
+        and _is_in_way(one, half_width)
+        and _is_passable(situation, one)
+    ]
+    return min(found, key=attrgetter("s"), default=None)
 
 
-def _is_passable(situation: Situation, scene: Surroundings, row: int) -> bool:
+def _is_passable(situation: Situation, one: Present) -> bool:
     """Return whether an object may be passed: not a crossing pedestrian, and standing for some time or moving."""
-    known = situation.objects[scene.owner[row]]
+    known = situation.objects[one.owner]
     if known.still_since is not None:
         stands = situation.now - known.still_since
-        is_aside = abs(float(scene.d[row, 0])) > ASIDE
+        is_aside = abs(one.d) > ASIDE
         waits = situation.speed < WAITING or stands >= LONG
         return known.kind == "misc" or (stands >= PATIENCE and (is_aside or waits))
     return known.kind not in ("pedestrian",)
 
 
-def _is_steady(situation: Situation, scene: Surroundings, row: int) -> bool:
+def _is_steady(situation: Situation, one: Present) -> bool:
     """Return whether an object has moved for some time, and neither sets off nor brakes."""
-    known = situation.objects[scene.owner[row]]
+    known = situation.objects[one.owner]
     has_moved = known.moving_since is not None and situation.now - known.moving_since >= SETTING_OFF
     return has_moved and known.acceleration > -NOTICEABLE
 
 
-def _queues(situation: Situation, scene: Surroundings, blocker: int) -> bool:
+def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool:
     """Return whether the blocker waits at a place where the vehicle stops as well, or behind another vehicle."""
-    if situation.stop is not None and situation.stop.s < float(scene.s[blocker, 0]) + NEAR_STOP:
+    if situation.stop is not None and situation.stop.s < blocker.s + NEAR_STOP:
         return True
-    known = situation.objects[scene.owner[blocker]]
+    known = situation.objects[blocker.owner]
     if known.still_since is None or situation.now - known.still_since >= QUEUE_PATIENCE:
         return False
-    gap = scene.s[:, 0] - scene.half_length[:, 0] - float(scene.s[blocker, 0] + scene.half_length[blocker, 0])
-    before = (gap > -0.5) & (gap < QUEUE_GAP) & (np.abs(scene.d[:, 0] - scene.d[blocker, 0]) < 1.0)
-    return bool(before.any())
+    return any(-0.5 < one.rear - blocker.front < QUEUE_GAP and abs(one.d - blocker.d) < 1.0 for one in scene.present)
 
 
 def _rear_is_free(situation: Situation, scene: Surroundings, offset: float, center: float) -> bool:
     """Return whether traffic behind on a lane can adapt to the vehicle with little braking."""
-    on_lane = np.abs(scene.d[:, 0] - offset) < scene.half_width[:, 0] + 1.0
-    for row in np.flatnonzero(on_lane & (scene.s[:, 0] <= situation.s + center)).tolist():
-        gap = situation.s - 1.0 - float(scene.s[row, 0] + scene.half_length[row, 0])
-        closing = max(float(scene.speed[row, 0]) - situation.speed, 0.0)
-        if gap < REAR_GAP + REAR_REACTION * closing + closing**2 / (2.0 * REAR_DECELERATION):
-            return False
+    for one in scene.present:
+        if abs(one.d - offset) < one.half_width + 1.0 and one.s <= situation.s + center:
+            gap = situation.s - 1.0 - one.front
+            closing = max(one.speed - situation.speed, 0.0)
+            if gap < REAR_GAP + REAR_REACTION * closing + closing**2 / (2.0 * REAR_DECELERATION):
+                return False
     return True
 
 
-def _around_blocker(
-    situation: Situation,
-    scene: Surroundings,
-    settings: BehaviorSettings,
-    blocker: int,
-    body: Body,
-    side: int,
-) -> LateralProfile | None:
-    """Return the motion past the blocker, and what stands close behind it, on one side; None if that is too narrow."""
-    half_width = body.half_width
-    rows = _together(situation, scene, blocker, half_width)
+def _obstacle(situation: Situation, scene: Surroundings, blocker: Present, body: Body) -> _Obstacle | None:
+    """Return the blocker with what stands close behind it; None if it is too fast or not steady enough to pass it."""
+    objects = _together(scene, blocker, body.half_width)
     wanted = max(situation.wanted, 1.0)
-    begin = float((scene.s[rows, 0] - scene.half_length[rows, 0]).min()) - (body.front - body.wheelbase) + SWUNG_OUT
-    ends = scene.s[rows, 0] + scene.half_length[rows, 0]
-    speed = np.maximum(scene.speed[rows, 0], 0.0)
-    if bool((speed > 0.5).any()):
-        if float(wanted - speed.max()) < SLOWER or not all(_is_steady(situation, scene, row) for row in rows):
+    begin = min([one.rear for one in objects]) - (body.front - body.wheelbase) + SWUNG_OUT
+    ends = [one.front for one in objects]
+    speed = [max(one.speed, 0.0) for one in objects]
+    fastest, slowest = max(speed), min(speed)
+    if fastest > 0.5:
+        if wanted - fastest < SLOWER or not all(_is_steady(situation, one) for one in objects):
             return None
-        duration = (ends - situation.s) / np.maximum(wanted - speed, 0.5)
-        ends = ends + speed * duration
-        begin += float(speed.min()) * max(begin - situation.s, 0.0) / max(wanted - float(speed.min()), 0.5)
-    end = float(ends.max()) + body.rear + body.wheelbase + BEFORE_OBSTACLE
-    beside = [situation.line.lanes_beside(situation.lanes_at(place)) for place in np.linspace(begin, end, 4).tolist()]
-    vulnerable = any(situation.kind_of(scene.owner[row]) in VULNERABLE for row in rows)
+        durations = [(end - situation.s) / max(wanted - own, 0.5) for end, own in zip(ends, speed, strict=True)]
+        ends = [end + own * duration for end, own, duration in zip(ends, speed, durations, strict=True)]
+        begin += slowest * max(begin - situation.s, 0.0) / max(wanted - slowest, 0.5)
+    end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
+    step = (end - begin) / 3.0
+    places = (begin, begin + step, begin + 2.0 * step, end)
+    beside = [situation.line.lanes_beside(situation.lanes_at(place)) for place in places]
+    return _Obstacle(objects, begin, end, beside)
+
+
+def _around(
+    situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle, body: Body, side: int
+) -> LateralProfile | None:
+    """Return the motion past an obstacle on one side; None if that is too narrow."""
+    half_width = body.half_width
+    vulnerable = any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
     clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
-    outer = float((side * scene.d[rows, 0] + scene.half_width[rows, 0]).max())
-    own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in beside), strict=True))
+    outer = max([side * one.d + one.half_width for one in obstacle.objects])
+    own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in obstacle.beside), strict=True))
     room = every - outer - 2.0 * half_width
     if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
     value = max(outer + _beside_obstacle(room, clearance) + half_width, 0.0)
     profile = passing(
-        f"pass {situation.kind_of(scene.owner[blocker])} on the {'left' if side > 0 else 'right'}",
+        f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
         side * value,
-        (begin, end),
+        (obstacle.begin, obstacle.end),
         *situation.steered,
         max(situation.speed, 2.0),
         settings.lateral_acceleration,
@@ -237,18 +275,20 @@ def _beside_obstacle(room: float, clearance: float) -> float:
     return (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
 
 
-def _together(situation: Situation, scene: Surroundings, blocker: int, half_width: float) -> list[int]:
+def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:
     """Return the blocker and the objects of similar speed in the way that follow it closely."""
-    in_way = np.abs(scene.d[:, 0]) - scene.half_width[:, 0] < half_width + scene.margin
-    alike = np.abs(scene.speed[:, 0] - scene.speed[blocker, 0]) < 1.0
-    rows = np.flatnonzero(in_way & alike & ~scene.crosses[:, 0] & (scene.s[:, 0] >= scene.s[blocker, 0]))
-    order = sorted(rows.tolist(), key=lambda row: float(scene.s[row, 0]))
+    alike = [
+        one
+        for one in scene.present
+        if one.s >= blocker.s
+        and not one.crosses
+        and abs(one.speed - blocker.speed) < 1.0
+        and _is_in_way(one, half_width)
+    ]
     found = [blocker]
-    for row in order:
-        last = found[-1]
-        gap = float(scene.s[row, 0] - scene.half_length[row, 0] - scene.s[last, 0] - scene.half_length[last, 0])
-        if gap > TOGETHER:
+    for one in sorted(alike, key=attrgetter("s")):
+        if one.rear - found[-1].s - found[-1].half_length > TOGETHER:
             break
-        if row != blocker:
-            found.append(row)
+        if one.row != blocker.row:
+            found.append(one)
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -129,8 +130,9 @@ class ObjectMemory:
             known.row = None
         self._time = now
         found = _objects_of(detections, now, self._settings.possible_existence)
+        shares = _Shares.of(step)
         for index, known in self._pairs(found):
-            _take_over(known, found[index], step)
+            _take_over(known, found[index], step, shares)
             found[index] = known
         lost = [known for known in self._objects if known.row is None]
         for known in lost:
@@ -142,8 +144,9 @@ class ObjectMemory:
             if known.still_since is None:
                 known.error = min(known.error + SPEED_ERROR * step, LARGEST_ERROR)
         self._objects = found + lost
+        uncertainty = self._settings.uncertainty
         for known in self._objects:
-            is_still = known.speed < STILL or _still_stands(known, self._settings.uncertainty)
+            is_still = known.speed < STILL or _still_stands(known, uncertainty)
             if is_still and known.still_since is None:
                 known.stands_at = known.x, known.y
             known.still_since = (now if known.still_since is None else known.still_since) if is_still else None
@@ -155,14 +158,14 @@ class ObjectMemory:
         if not found or not self._objects:
             return []
         ahead: Array = np.array([(known.x, known.y) for known in self._objects])
-        places: Array = np.array([(fresh.x, fresh.y) for fresh in found])
+        places: Array = np.array([(known.x, known.y) for known in found])
         gap = np.hypot(places[:, None, 0] - ahead[None, :, 0], places[:, None, 1] - ahead[None, :, 1])
-        near = np.argwhere(gap < GATE)
-        order = np.argsort(gap[near[:, 0], near[:, 1]], kind="stable")
+        fresh, earlier = (gap < GATE).nonzero()
+        order = gap[fresh, earlier].argsort(kind="stable")
         pairs: list[tuple[int, KnownObject]] = []
         new: set[int] = set()
         old: set[int] = set()
-        for first, second in near[order].tolist():
+        for first, second in zip(fresh[order].tolist(), earlier[order].tolist(), strict=True):
             if first not in new and second not in old:
                 new.add(first)
                 old.add(second)
@@ -174,7 +177,9 @@ class ObjectMemory:
     ) -> None:
         """Update since when the places of lost objects are out of view; an object that should be in view is forgotten
         in `memory`."""
-        shown = np.ones(len(lost), dtype=bool) if in_view is None or not lost else in_view(lost)
+        if not lost:
+            return
+        shown = np.ones(len(lost), dtype=bool) if in_view is None else in_view(lost)
         for known, is_shown in zip(lost, shown.tolist(), strict=True):
             if is_shown and known.hidden_since is not None:
                 known.seen += now - known.hidden_since
@@ -193,24 +198,23 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
     of_x, of_y, of_both = (detections.covariance[:, row, column] for row, column in ((0, 0), (1, 1), (0, 1)))
     mean, half = 0.5 * (of_x + of_y), 0.5 * (of_x - of_y)
     greatest = mean + np.hypot(half, of_both)
-    ellipses = np.column_stack([mean, half, of_both]) / np.where(greatest > 0.0, greatest, 1.0)[:, None]
+    scale = np.where(greatest > 0.0, greatest, 1.0)
+    ellipses = zip((mean / scale).tolist(), (half / scale).tolist(), (of_both / scale).tolist(), strict=True)
+    errors = zip(greatest.tolist(), ellipses, strict=True)
+    age = max(now - detections.time, 0.0)
     found = []
-    for row, (box, (vx, vy)) in enumerate(zip(detections.boxes.tolist(), detections.velocity.tolist(), strict=True)):
+    columns = (detections.boxes.tolist(), detections.velocity.tolist(), errors)
+    for row, (box, (vx, vy), (variance, ellipse)) in enumerate(zip(*columns, strict=True)):
         if existence[row] < least:
             continue
         x, y, _, length, width, _, yaw = box
         moving = not (math.isnan(vx) or math.isnan(vy))
         vx, vy = (vx, vy) if moving else (0.0, 0.0)
-        variance, ellipse = greatest[row].item(), (1.0, 0.0, 0.0)
-        if variance > 0.0:
-            first, second, third = ellipses[row].tolist()
-            ellipse = first, second, third
         error = math.sqrt(variance) if variance >= 0.0 else USUAL_ERROR
         kind = detections.classes[row]
-        age = max(now - detections.time, 0.0)
         x, y, error = x + vx * age, y + vy * age, min(error + SPEED_ERROR * age, LARGEST_ERROR)
         known = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
-        known.mean_speed, known.ellipse = known.speed, ellipse
+        known.mean_speed, known.ellipse = known.speed, ellipse if variance > 0.0 else (1.0, 0.0, 0.0)
         known.first_seen, known.mean_place = now, (x, y)
         found.append(known)
     return found
@@ -220,8 +224,9 @@ def nearest_rows(detections: Detections, places: Array) -> tuple[int, ...]:
     """Return the rows of the objects that were at places (N, 2) shortly before; none for an object that is lost."""
     if not len(places) or not len(detections):
         return ()
-    gap = np.hypot(*(detections.boxes[None, :, :2] - places[:, None]).transpose(2, 0, 1))
-    nearest = np.argmin(gap, axis=1)
+    boxes = detections.boxes
+    gap = np.hypot(boxes[:, 0] - places[:, :1], boxes[:, 1] - places[:, 1:])
+    nearest = gap.argmin(axis=1)
     near = gap[np.arange(len(places)), nearest] < GATE
     return tuple(dict.fromkeys(nearest[near].tolist()))
 
@@ -253,8 +258,25 @@ def _keep_course(known: KnownObject) -> None:
     known.acceleration = min(known.acceleration, 0.0)
 
 
-def _take_over(known: KnownObject, fresh: KnownObject, step: float) -> None:
-    """Update a known object by its new observation."""
+class _Shares(NamedTuple):
+    """Weights of a new observation in the estimates of acceleration, mean speed and mean place."""
+
+    acceleration: float
+    speed: float
+    place: float
+
+    @classmethod
+    def of(cls, step: float) -> _Shares:
+        """Return the weights after a time step [s]."""
+        return cls(*[1.0 - math.exp(-step / time) for time in (CHANGING, LASTING, STAYING)])
+
+
+def _take_over(known: KnownObject, fresh: KnownObject, step: float, shares: _Shares) -> None:
+    """Update a known object by its new observation.
+
+    step    time since the last observations [s]
+    shares  weights of the new observation after this time
+    """
     before = known.speed if known.has_velocity else None
     if fresh.has_velocity:
         known.vx, known.vy = fresh.vx, fresh.vy
@@ -262,11 +284,11 @@ def _take_over(known: KnownObject, fresh: KnownObject, step: float) -> None:
         share = SMOOTHING if known.has_velocity else 1.0
         known.vx += share * (fresh.x - known.x) / step
         known.vy += share * (fresh.y - known.y) / step
+    speed = known.speed
     if before is not None and step > 0.0:
-        change = (known.speed - before) / step
-        known.acceleration += (change - known.acceleration) * (1.0 - math.exp(-step / CHANGING))
-    share = 1.0 if before is None else 1.0 - math.exp(-step / LASTING)
-    known.mean_speed += (known.speed - known.mean_speed) * share
+        change = (speed - before) / step
+        known.acceleration += (change - known.acceleration) * shares.acceleration
+    known.mean_speed += (speed - known.mean_speed) * (1.0 if before is None else shares.speed)
     known.has_velocity |= fresh.has_velocity or step > 0.0
     known.hidden_since = None
     known.row, known.kind, known.seen = fresh.row, fresh.kind, fresh.seen
@@ -274,5 +296,4 @@ def _take_over(known: KnownObject, fresh: KnownObject, step: float) -> None:
     known.length, known.width = fresh.length, fresh.width
     known.error, known.ellipse, known.existence = fresh.error, fresh.ellipse, fresh.existence
     x, y = known.mean_place
-    share = 1.0 - math.exp(-step / STAYING)
-    known.mean_place = x + share * (fresh.x - x), y + share * (fresh.y - y)
+    known.mean_place = x + shares.place * (fresh.x - x), y + shares.place * (fresh.y - y)

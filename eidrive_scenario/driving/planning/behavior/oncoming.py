@@ -8,7 +8,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
-from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, inside_way
+from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -30,7 +30,8 @@ class OncomingTraffic:
     """
 
     def __init__(self, view: float) -> None:
-        self._view = view
+        self._ahead: Array = np.arange(SAMPLE, view + SAMPLE, SAMPLE)
+        """Distances of the places that are checked for a view [m]."""
         self._last = -math.inf
         self._held_up_since: float | None = None
         self._held_up_until = -math.inf
@@ -60,22 +61,23 @@ class OncomingTraffic:
         if now - since >= PAUSE or math.isnan(beside.oncoming):
             return math.inf
         s, d = ego
-        places = s + np.arange(SAMPLE, self._view + SAMPLE, SAMPLE)
-        center, half, ahead = scene.d[:, 0, None], scene.half_width[:, 0, None], places - s
-        hidden = np.zeros(len(places), dtype=bool)
-        for edge in (scene.s[:, 0] - scene.half_length[:, 0], scene.s[:, 0] + scene.half_length[:, 0]):
-            share = (edge[:, None] - s) / ahead
-            at_edge = d + share * (beside.oncoming - d)
-            crosses = (share > 0.0) & (share < 1.0) & (at_edge > center - half) & (at_edge < center + half)
-            hidden |= crosses.any(axis=0)
-        first = int(np.argmax(hidden)) if hidden.any() else len(places)
+        places = s + self._ahead
+        center, half = scene.d[:, 0, None], scene.half_width[:, 0, None]
+        edges = np.concatenate([scene.rear[:, 0], scene.front[:, 0]])
+        share = ((edges - s)[:, None] / (places - s)).reshape(2, len(scene), len(places))
+        at_edge = d + share * (beside.oncoming - d)
+        crosses = (share > 0.0) & (share < 1.0) & (at_edge > center - half) & (at_edge < center + half)
+        hidden: Bools = np.logical_or.reduce(crosses, axis=(0, 1))
+        first = int(hidden.argmax()) if hidden.any() else len(places)
         return float(s + first * SAMPLE)
 
 
-def first_oncoming(profile: LateralProfile, s: float, scene: Surroundings, half_width: float) -> int:
-    """Return the index of the first time at which oncoming traffic is in the way of a vehicle at s; K if never."""
-    oncoming = (scene.speed < -ONCOMING_SPEED) & (scene.s + scene.half_length > s)
-    meets: Bools = np.asarray((inside_way(scene, profile, half_width) & oncoming).any(axis=0))
+def first_oncoming(way: Bools, s: float, scene: Surroundings) -> int:
+    """Return the index of the first time at which oncoming traffic is in the way of a vehicle at s; K if never.
+
+    way  where hypotheses are in the way of the vehicle (N, K)
+    """
+    meets: Bools = np.logical_or.reduce(way & (scene.speed < -ONCOMING_SPEED) & (scene.front > s), axis=0)
     return int(meets.argmax()) if meets.any() else len(meets)
 
 
@@ -95,4 +97,4 @@ def meets_oncoming(profile: LateralProfile, s: Array, times: Array, oncoming: in
 
 def _ahead(scene: Surroundings, place: float) -> Bools:
     is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < LANES)
-    return np.asarray(is_oncoming & (scene.s[:, 0] + scene.half_length[:, 0] > place))
+    return np.asarray(is_oncoming & (scene.front[:, 0] > place))

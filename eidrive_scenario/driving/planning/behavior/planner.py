@@ -95,18 +95,18 @@ class BehaviorPlanner(RoutePlanner):
         x, y, _ = ego.position.tolist()
         path = self._advanced_path(x, y, ego.yaw, goal)
         line = self._line_of(path, x, y)
+        place = self._place_on(line, x, y)
         wanted = self._target_speed(ego, goal)
         if self._decision is None or now - self._decided >= self.planner_settings.period - TIME_TOLERANCE:
             self._decided = now
-            self._decision = self._decide(ego, objects, line, wanted, now)
+            self._decision = self._decide(ego, objects, line, place, wanted, now)
             rows = self._decision.objects
             self._reasons = objects.boxes[list(rows), :2]
         else:
             rows = nearest_rows(objects, self._reasons)
-        s = self._place_on(line, x, y)[0]
-        plan = _trajectory(line, self._decision, s, rows)
+        plan = _trajectory(line, self._decision, place[0], rows)
         if goal is not None and goal.acceleration and self._decision.is_free:
-            limits = self._limits[_planned_part(line, s)]
+            limits = self._limits[_planned_part(line, place[0])]
             if float(limits[0]) >= wanted:
                 return replace(plan, speeds=np.minimum(limits, wanted), acceleration=goal.acceleration)
         return plan
@@ -178,9 +178,17 @@ class BehaviorPlanner(RoutePlanner):
         turn = wrap_angle(ego.yaw - float(line.heading[line.index_at(s)]))
         return s, d, math.tan(min(max(turn, -STEEPEST), STEEPEST))
 
-    def _decide(self, ego: EgoState, objects: Detections, line: ReferenceLine, wanted: float, now: float) -> Decision:
+    def _decide(
+        self,
+        ego: EgoState,
+        objects: Detections,
+        line: ReferenceLine,
+        place: tuple[float, float],
+        wanted: float,
+        now: float,
+    ) -> Decision:
         x, y, _ = ego.position.tolist()
-        s, d = self._place_on(line, x, y)
+        s, d = place
         known = self._memory.update(objects, now, self._in_view(ego))
         lanes = self._predictor.lanes(known)
         self._predictor.follow_lanes(known, lanes)
@@ -250,8 +258,7 @@ def _trajectory(line: ReferenceLine, decision: Decision, s: float, rows: tuple[i
     part = _planned_part(line, s)
     along = line.along[part]
     offset = decision.profile.offset(along)
-    normal = np.column_stack([-line.tangent[part, 1], line.tangent[part, 0]])
-    points = line.points[part] + offset[:, None] * normal
+    points = line.points[part] + offset[:, None] * line.normal[part]
     squares = np.interp(along, decision.s, decision.speed**2)
     speeds = np.sqrt(squares) if s < line.length or not line.path.ends else np.zeros(len(along))
     acceleration = decision.acceleration

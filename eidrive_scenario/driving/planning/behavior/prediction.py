@@ -98,29 +98,30 @@ class Predictor:
         if not found:
             nothing = np.empty((0, len(self._times)))
             return Prediction((), nothing, nothing, nothing, nothing, np.empty(0))
-        x, y, yaw = (np.array([entry.poses[axis] for entry in found]) for axis in range(3))
+        columns = [*zip(*[entry.poses for entry in found], strict=True), [entry.speed for entry in found]]
+        x, y, yaw, speed = (np.concatenate(column).reshape(len(found), -1) for column in columns)
         return Prediction(
             tuple(owners),
             x,
             y,
             yaw,
-            np.array([entry.speed for entry in found]),
+            speed,
             np.array([entry.room for entry in found]),
             tuple([entry.passages for entry in found]),
         )
 
     def _hypotheses(self, known: KnownObject, courses: list[Course]) -> list[Hypothesis]:
-        times = self._times
-        travelled, speed = longitudinal_motion(known.speed, known.acceleration, times)
-        if known.speed < STANDING or known.seems_to_stand:
-            x, y, yaw = (np.full(len(times), value) for value in (known.x, known.y, known.yaw))
-            return [Hypothesis((x, y, yaw), np.zeros(len(times)))]
+        times, now = self._times, known.speed
+        if now < STANDING or known.seems_to_stand:
+            x, y, yaw, speed = np.array([known.x, known.y, known.yaw, 0.0])[:, None].repeat(len(times), axis=1)
+            return [Hypothesis((x, y, yaw), speed)]
+        travelled, speed = longitudinal_motion(now, known.acceleration, times)
         found: list[Hypothesis] = []
         too_fast: list[Hypothesis] = []
         """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         direction = math.atan2(known.vy, known.vx)
         noise = known.speed_error
-        is_unknown = known.speed < noise
+        is_unknown = now < noise
         for course in courses:
             along, left, heading = course.place(known.x, known.y)
             turn = float(wrap_angle(direction - heading))
@@ -129,14 +130,14 @@ class Predictor:
                 along_lane, turn = travelled * max(math.cos(turn), 0.0), 0.0
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
-            aside = known.speed * math.sin(turn)
+            aside = now * math.sin(turn)
             offset: float | Array = left
             if abs(aside) > max(LEAVING_RATE, LEAVING_ERROR * known.error):
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
             way, speeds = _held_by_sign(known, course, along, times) or (along_lane, speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
-            fits = known.speed <= noise or course.can_follow(along, known.speed - noise)
+            fits = now <= noise or course.can_follow(along, now - noise)
             (found if fits else too_fast).append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead))
             if len(found) == MOST_HYPOTHESES:
                 break
@@ -149,7 +150,7 @@ class Predictor:
         moving = [index for index, known in enumerate(objects) if known.speed >= STANDING and known.kind not in ON_FOOT]
         if not moving or self._roads is None or self._courses is None:
             return found
-        x, y = (np.array([getattr(objects[index], axis) for index in moving]) for axis in ("x", "y"))
+        x, y = np.array([(objects[index].x, objects[index].y) for index in moving]).T.copy()
         rows, _, owners = self._roads.overlapped_lanes(x, y)
         drivable = self._roads.tables.lane_drivable
         for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):

@@ -74,18 +74,16 @@ def inside_way(scene: Surroundings, profile: LateralProfile, half_width: float, 
 def conflicts(scene: Surroundings, way: Bools, front: float) -> list[Conflict]:
     """Return the objects that are outside the way (N, K) now and inside it later, ahead of `front` [m]."""
     found = []
-    later = way.any(axis=1) & ~scene.behind
-    for row in np.flatnonzero(later).tolist():
+    meets: Bools = np.logical_or.reduce(way & scene.crosses, axis=1) | (np.logical_or.reduce(way, axis=1) & ~way[:, 0])
+    for row in (meets & ~scene.behind).nonzero()[0].tolist():
         steps = np.flatnonzero(way[row])
         first = int(steps[0])
         crosses = bool(scene.crosses[row, steps].any())
-        if first == 0 and not crosses:
-            continue
         run = int(np.argmin(np.append(way[row, first:], False))) + first - 1
         occupied = slice(first, run + 1)
-        s = float((scene.s[row, occupied] - scene.half_length[row, occupied]).min())
-        if float((scene.s[row, occupied] + scene.half_length[row, occupied]).max()) < front:
+        if float(scene.front[row, occupied].max()) < front:
             continue
+        s = float(scene.rear[row, occupied].min())
         found.append(Conflict(row, first, run, s, crosses))
     return found
 
@@ -144,7 +142,7 @@ def leading(scene: Surroundings, way: Bools, found: list[Conflict], center: floa
 
     An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way.
     """
-    leads = way & ~scene.crosses & ~scene.behind[:, None]
+    leads = way & scene.may_lead
     if proposal.precedence == "all":
         for conflict in found:
             row = conflict.hypothesis

@@ -79,8 +79,10 @@ class ReferenceLine:
         self.spacing = float(self.along[-1]) / len(length)
         middle = np.vstack([self.points[1] - self.points[0], self.points[2:] - self.points[:-2], step[-1]])
         self.tangent: Array = middle / np.maximum(np.hypot(middle[:, 0], middle[:, 1]), 1e-9)[:, None]
+        self.normal: Array = np.column_stack([-self.tangent[:, 1], self.tangent[:, 0]])
         self.heading: Array = np.unwrap(np.arctan2(self.tangent[:, 1], self.tangent[:, 0]))
         self.curvature: Array = np.gradient(self.heading, self.along) if len(self.along) > 1 else np.zeros(1)
+        self._columns: Array = np.stack([*self.points.T, *self.tangent.T, self.along, self.heading])
         self._roads = roads
         self._beside: dict[int, LanesBeside] = {}
         self._place: LaneLocation | None = None
@@ -103,12 +105,12 @@ class ReferenceLine:
         half = 0.5 * np.einsum("mi,mi->m", shifted, shifted)
         places = np.column_stack([flat_x - line[0, 0], flat_y - line[0, 1], np.ones(len(flat_x))])
         gap = places @ np.vstack([-shifted.T, half])
-        index = low + np.argmin(gap, axis=1)
-        dx, dy = flat_x - self.points[index, 0], flat_y - self.points[index, 1]
-        tx, ty = self.tangent[index, 0], self.tangent[index, 1]
-        s = self.along[index] + dx * tx + dy * ty
+        index = low + gap.argmin(axis=1)
+        at_x, at_y, tx, ty, along, heading = self._columns.take(index, axis=1)
+        dx, dy = flat_x - at_x, flat_y - at_y
+        s = along + dx * tx + dy * ty
         d = dy * tx - dx * ty
-        return s.reshape(x.shape), d.reshape(x.shape), self.heading[index].reshape(x.shape)
+        return s.reshape(x.shape), d.reshape(x.shape), heading.reshape(x.shape)
 
     def place(self, x: float, y: float, low: int, high: int) -> tuple[float, float]:
         """Return s and d of one point, nearest among the points from `low` to `high`."""

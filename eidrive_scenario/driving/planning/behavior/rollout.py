@@ -25,16 +25,14 @@ from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
 ROLLED = 6
 """Number of first steps whose causes are kept."""
-FAR = 1e6
-"""Acceleration without a leader [m/s²]."""
 NEGLIGIBLE = 1e-6
 """Deceleration due to a leader below which there is none [m/s²], and difference of accelerations that is none."""
 LEAST_GAP, LEAST_SPEED = 1e-3, 1e-3
 """Minimum of gaps [m] and of desired speeds [m/s], by which the model divides."""
 
-Leader = tuple[float, float, float, int]
-"""Leader at a time: places of the reference point of the vehicle beside its center and in contact with its rear [m],
-its speed [m/s], and the index of the hypothesis."""
+Leader = tuple[float, int, float, float]
+"""Leader at a time: place of the reference point of the vehicle in contact with its rear [m], index of the hypothesis,
+place of the reference point beside its center [m], and its speed [m/s]. So leaders sort by their rears."""
 
 
 class Rollout(msgspec.Struct, frozen=True):
@@ -70,7 +68,9 @@ class Roller:
             deceleration=settings.comfortable_deceleration,
             emergency=settings.hard_deceleration,
         )
-        self._twice_root = 2.0 * math.sqrt(self._driver.acceleration * self._driver.deceleration)
+        driver = self._driver
+        twice_root = 2.0 * math.sqrt(driver.acceleration * driver.deceleration)
+        self._constants = driver.time_gap, driver.standstill_gap, twice_root, driver.exponent
 
     def roll(
         self,
@@ -111,65 +111,62 @@ class Roller:
         self, proposal: Proposal, bounds: Bounds, start: tuple[float, float], leaders: list[list[Leader]]
     ) -> _Motion:
         s, speed = start
-        found = _Motion([s], [speed], [])
+        motion = _Motion([s], [speed], [])
+        add_place, add_speed, add_cause = motion.s.append, motion.speed.append, motion.cause.append
+        time_gap, standstill_gap, twice_root, exponent = self._constants
         greatest, least = self._driver.acceleration, -proposal.deceleration
-        is_emergency, is_free, wanted = proposal.is_emergency, bounds.are_free, bounds.wanted
+        is_emergency, is_free, desired = proposal.is_emergency, bounds.are_free, bounds.wanted
         for step, dt in enumerate(self._steps):
-            desired, cause = (wanted, FREE) if is_free else bounds.allow(s + speed * dt, step)
+            cause = FREE
+            if not is_free:
+                desired, cause = bounds.allow(s + speed * dt, step)
             acceleration = least if is_emergency else (desired - speed) / dt
             if acceleration > greatest:
                 acceleration = greatest
             # A leader has no effect on a vehicle that brakes with its limit or stands.
             if leaders[step] and (step < ROLLED or (acceleration > least and (speed > 0.0 or acceleration > 0.0))):
-                follow, leader = self._following(s, speed, desired, leaders[step])
-                if follow < acceleration - NEGLIGIBLE:
-                    cause = leader
-                if follow < acceleration:
-                    acceleration = follow
+                hardest, slowest, leader = NEGLIGIBLE, math.inf, FREE
+                # In the order of their rears, one that is not slower than a nearer one has no effect.
+                for rear, row, center, other in leaders[step]:
+                    if other < slowest and center > s:
+                        slowest = other
+                        wish = speed * time_gap + speed * (speed - other) / twice_root
+                        gap = standstill_gap + wish if wish > 0.0 else standstill_gap
+                        room = rear - s
+                        share = gap / (room if room > LEAST_GAP else LEAST_GAP)
+                        slowing = greatest * (share * share)
+                        if slowing > hardest:
+                            hardest, leader = slowing, row
+                if leader != FREE:
+                    bound = desired if desired > speed else speed
+                    share = speed / (bound if bound > LEAST_SPEED else LEAST_SPEED)
+                    follow = greatest * (1.0 - share**exponent) - hardest
+                    if follow < acceleration - NEGLIGIBLE:
+                        cause = leader
+                    if follow < acceleration:
+                        acceleration = follow
             after = speed + (acceleration if acceleration > least else least) * dt
             if after < 0.0:
                 after = 0.0
             s += 0.5 * (speed + after) * dt
             speed = after
-            found.s.append(s)
-            found.speed.append(speed)
+            add_place(s)
+            add_speed(speed)
             if step < ROLLED:
-                found.cause.append(cause)
-        return found
-
-    def _following(self, s: float, speed: float, desired: float, leaders: list[Leader]) -> tuple[float, int]:
-        """Return the acceleration behind leaders [m/s²], FAR if none is ahead, and the leader that determines it.
-
-        The leaders are in the order of their rears: one that is not slower than a nearer one has no effect.
-        """
-        driver = self._driver
-        hardest, slowest, cause = NEGLIGIBLE, math.inf, FREE
-        for center, rear, other, row in leaders:
-            if center > s and other < slowest:
-                slowest = other
-                wish = speed * driver.time_gap + speed * (speed - other) / self._twice_root
-                gap = driver.standstill_gap + wish if wish > 0.0 else driver.standstill_gap
-                room = rear - s
-                share = gap / (room if room > LEAST_GAP else LEAST_GAP)
-                slowing = driver.acceleration * (share * share)
-                if slowing > hardest:
-                    hardest, cause = slowing, row
-        if cause == FREE:
-            return FAR, FREE
-        share = speed / max(desired, speed, LEAST_SPEED)
-        free: float = driver.acceleration * (1.0 - share**driver.exponent)
-        return free - hardest, cause
+                add_cause(cause)
+        return motion
 
 
 class _Leaders:
     """Leaders of proposals over time; proposals with the same ones share them."""
 
     def __init__(self, scene: Surroundings, leads: Sequence[Bools], body: tuple[float, float]) -> None:
-        self._front, self._center = body
-        self._scene = scene
+        front, center = body
         self._leads = list(leads)
         self._known: dict[int, list[list[Leader]]] = {}
-        self._entries: dict[int, list[Leader]] = {}
+        self._rears: list[list[float]] = (scene.rear - scene.passing_gap[:, None] - front).tolist()
+        self._centers: list[list[float]] = (scene.s - center).tolist()
+        self._speeds: list[list[float]] = scene.speed.tolist()
 
     def of(self, proposal: int) -> tuple[int, list[list[Leader]]]:
         """Return a number of the leaders of a proposal, the same for shared ones, and the leaders at each time."""
@@ -178,26 +175,12 @@ class _Leaders:
         found = self._known.get(number)
         if found is None:
             found = self._known[number] = [[] for _ in range(leads.shape[1])]
-            for row in np.flatnonzero(leads.any(axis=1)).tolist():
-                entry = self._entry(row)
-                for step in leads[row].nonzero()[0].tolist():
-                    found[step].append(entry[step])
-            for leaders in found:
-                if len(leaders) > 1:
-                    leaders.sort(key=_rear)
+            for row in np.logical_or.reduce(leads, axis=1).nonzero()[0].tolist():
+                columns = (found, leads[row].tolist(), self._rears[row], self._centers[row], self._speeds[row])
+                for ahead, leads_now, rear, center, speed in zip(*columns, strict=True):
+                    if leads_now:
+                        ahead.append((rear, row, center, speed))
+            for ahead in found:
+                if len(ahead) > 1:
+                    ahead.sort()
         return number, found
-
-    def _entry(self, row: int) -> list[Leader]:
-        """Return a hypothesis at all times as a leader."""
-        found = self._entries.get(row)
-        if found is None:
-            scene = self._scene
-            centers = scene.s[row] - self._center
-            rears = scene.s[row] - scene.half_length[row] - scene.passing_gap[row] - self._front
-            values = zip(centers.tolist(), rears.tolist(), scene.speed[row].tolist(), strict=True)
-            found = self._entries[row] = [(center, rear, speed, row) for center, rear, speed in values]
-        return found
-
-
-def _rear(leader: Leader) -> float:
-    return leader[1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
+
 import msgspec
 import numpy as np
 
@@ -52,6 +54,7 @@ class Evaluation(msgspec.Struct, frozen=True):
 def evaluate(
     proposals: list[Proposal],
     profiles: list[LateralProfile],
+    ways: list[Bools],
     rolled: Rollout,
     scene: Surroundings,
     times: Array,
@@ -63,28 +66,23 @@ def evaluate(
 ) -> Evaluation:
     """Return the evaluation of all proposals.
 
+    ways     where the hypotheses are in the way (N, K) of a vehicle that follows each profile
     kept     names of the maneuvers that are no change: the current one, and the route after a complete one
     hidden   place from which oncoming traffic may come unseen [m], inf without one
     """
-    count = len(proposals)
-    front, rear = np.empty_like(rolled.s), np.empty_like(rolled.s)
-    own: list[list[int]] = [[] for _ in profiles]
-    for row, proposal in enumerate(proposals):
-        own[proposal.profile].append(row)
-    for rows, profile in zip(own, profiles, strict=True):
-        place = rolled.s[rows]
-        front[rows], rear[rows] = profile.offset(place + ego.wheelbase), profile.offset(place)
+    count, horizon = len(proposals), float(times[-1])
+    offsets = _offsets(proposals, profiles, rolled, ego)
     collision, risk = np.full(count, np.inf), np.zeros(count)
     impact, cause = np.zeros(count), np.full(count, -1)
-    near = _near(rolled, (front, rear), scene, ego)
+    near = _near(rolled, offsets, scene, ego)
     if near.size:
         stops = np.array([proposal.share == 0.0 for proposal in proposals])
-        touching, lack = _overlaps(rolled, (front, rear), stops, scene.rows(near), times, ego, settings)
-        collision, step, cause = _first(touching, times)
-        cause = np.where(cause >= 0, near[cause], -1)
-        impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
-        risk = (lack.max(axis=1) * (1.0 - FARTHER * times / float(times[-1]))).max(axis=1)
-    horizon = float(times[-1])
+        touching, lack = _overlaps(rolled, offsets, stops, scene.rows(near), times, ego, settings)
+        risk = (lack.max(axis=1) * (1.0 - FARTHER * times / horizon)).max(axis=1)
+        if touching.any():
+            collision, step, cause = _first(touching, times)
+            cause = np.where(cause >= 0, near[cause], -1)
+            impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
     far = max(wanted * horizon, 1.0)
     progress = np.minimum(np.maximum((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0), 1.0)
     slowing = (rolled.speed[:, 1:] - rolled.speed[:, :-1]) / (times[1:] - times[:-1])
@@ -93,8 +91,10 @@ def evaluate(
     score -= RISK * risk
     score -= CRASH * np.where(np.isfinite(collision), 1.0 + (1.0 - collision / horizon) + 0.05 * impact, 0.0)
     oncoming = [
-        first_oncoming(profile, float(rolled.s[0, 0]), scene, ego.half_width) if profile.uses_oncoming else len(times)
-        for profile in profiles
+        first_oncoming(way, float(rolled.s[0, 0]), scene)
+        if profile.uses_oncoming and profile.name not in kept
+        else len(times)
+        for profile, way in zip(profiles, ways, strict=True)
     ]
     values: list[float] = score.tolist()
     for row, proposal in enumerate(proposals):
@@ -105,33 +105,50 @@ def evaluate(
             first = oncoming[proposal.profile]
             values[row] -= RISK * meets_oncoming(profile, rolled.s[row], times, first, (hidden, wanted))
         values[row] -= ASIDE * (profile.side != 0) + ONCOMING * profile.uses_oncoming + SWITCH * switches
-    score = np.array(values)
-    return Evaluation(score, collision, risk, impact, cause)
+    return Evaluation(np.array(values), collision, risk, impact, cause)
+
+
+def _offsets(proposals: list[Proposal], profiles: list[LateralProfile], rolled: Rollout, ego: Body) -> Array:
+    """Return the offsets of the front and the rear axle (2, P, K) [m].
+
+    proposals  in the order of their profiles
+    """
+    found = np.empty((2, *rolled.s.shape))
+    places = np.array([rolled.s + ego.wheelbase, rolled.s])
+    owners = [proposal.profile for proposal in proposals]
+    for number, profile in enumerate(profiles):
+        rows = slice(bisect_left(owners, number), bisect_right(owners, number))
+        found[:, rows] = profile.offset(places[:, rows])
+    return found
 
 
 def _first(found: Bools, times: Array) -> tuple[Array, Array, Array]:
     """Return time, its index and hypothesis of the first entry of `found` (P, N, K) for each proposal."""
     anyone: Bools = np.asarray(found.any(axis=1))
-    step = np.argmax(anyone, axis=1)
-    happens = anyone[np.arange(len(found)), step]
-    cause = np.argmax(found[np.arange(len(found)), :, step], axis=1)
+    step, rows = anyone.argmax(axis=1), np.arange(len(found))
+    happens = anyone[rows, step]
+    cause = found[rows, :, step].argmax(axis=1)
     return np.where(happens, times[step], np.inf), step, np.where(happens, cause, -1)
 
 
-def _near(rolled: Rollout, offsets: tuple[Array, Array], scene: Surroundings, ego: Body) -> Integers:
-    """Return the hypotheses (rows) that any proposal may touch or pass too closely."""
-    aside = max(float(np.abs(part).max(initial=0.0)) for part in offsets) + ego.half_width
+def _near(rolled: Rollout, offsets: Array, scene: Surroundings, ego: Body) -> Integers:
+    """Return the hypotheses (rows) that any proposal may touch or pass too closely.
+
+    offsets  of the front and the rear axle (2, P, K) [m]
+    """
+    aside = float(np.abs(offsets).max(initial=0.0)) + ego.half_width
     low, high = float(rolled.s.min(initial=np.inf)) - ego.rear, float(rolled.s.max(initial=-np.inf)) + ego.front
     margin = np.maximum(scene.margin, CONTACT)[:, None] + ROUNDING
     beside = np.abs(scene.d) - scene.half_width < aside + margin
-    beside &= scene.s - scene.half_length < high + CLEAR_AHEAD + ROUNDING
-    beside &= scene.s + scene.half_length > low - CLEAR_AHEAD - ROUNDING
-    return np.flatnonzero(beside.any(axis=1) & ~scene.behind)
+    beside &= scene.rear < high + CLEAR_AHEAD + ROUNDING
+    beside &= scene.front > low - CLEAR_AHEAD - ROUNDING
+    found: Integers = (np.logical_or.reduce(beside, axis=1) & ~scene.behind).nonzero()[0]
+    return found
 
 
 def _overlaps(
     rolled: Rollout,
-    offsets: tuple[Array, Array],
+    offsets: Array,
     stops: Bools,
     scene: Surroundings,
     times: Array,
@@ -140,51 +157,68 @@ def _overlaps(
 ) -> tuple[Bools, Array]:
     """Return where the bodies touch (P, N, K), and the lack of clearance (P, N, K) in [0, 1].
 
-    offsets  of the front and the rear axle (P, K) [m]; each determines the position of its half of the vehicle
+    offsets  of the front and the rear axle (2, P, K) [m]; each determines the position of its half of the vehicle
     stops    whether a proposal stops as soon as possible (P,)
+    scene    hypotheses of which none follows the ego
     """
-    shape = (len(rolled.s), len(scene), len(times))
-    touching, lack = np.zeros(shape, dtype=bool), np.zeros(shape)
-    margin = np.maximum(scene.margin, CONTACT)[None, :, None]
-    crossing = np.flatnonzero(scene.crosses.any(axis=1))
+    margin = np.maximum(scene.margin, CONTACT)[:, None]
     shift = round(settings.crossing_time / float(times[1] - times[0]))
-    # Traffic with the right of way keeps its speed: no vehicle enters a junction shortly before it.
-    favored = np.flatnonzero(scene.crosses.any(axis=1) & scene.yields)
-    moved = [
-        (rows, [_shifted(part[rows], later) for part in (scene.s, scene.d, scene.half_length, scene.half_width)])
-        for rows, later in ((crossing, shift), (crossing, -shift), (favored, 2 * shift), (favored, 3 * shift))
-        if rows.size and shift
-    ]
     middle = ego.wheelbase / 2.0
-    for d, low, high in ((offsets[0], middle, ego.front), (offsets[1], -ego.rear, middle)):
-        center, half_length = (rolled.s + (low + high) / 2.0)[:, None, :], (high - low) / 2.0
-        beside = d[:, None, :]
-        along = np.abs(scene.s - center) - (scene.half_length + half_length)
-        aside = np.abs(scene.d - beside) - (scene.half_width + ego.half_width)
-        meets = aside < CONTACT
-        touching |= (along < CONTACT) & meets
-        missing = np.where(along < 0.0, (margin - aside) / margin, 0.0)
-        missing = np.maximum(missing, np.where(meets, (CLEAR_AHEAD - along) / CLEAR_AHEAD, 0.0))
-        lack = np.maximum(lack, np.where(missing > 0.0, LEAST_LACK + (1.0 - LEAST_LACK) * missing, 0.0))
-        for rows, (s, place, length, width) in moved:
+    low, high = np.array([middle, -ego.rear]), np.array([ego.front, middle])
+    half_length = ((high - low) / 2.0)[:, None, None, None]
+    center = (rolled.s + ((low + high) / 2.0)[:, None, None])[:, :, None, :]
+    beside = offsets[:, :, None, :]
+    along = np.abs(scene.s - center) - (scene.half_length + half_length)
+    aside = np.abs(scene.d - beside) - (scene.half_width + ego.half_width)
+    meets = aside < CONTACT
+    touching: Bools = np.logical_or.reduce((along < CONTACT) & meets, axis=0)
+    missing = np.maximum(
+        np.where(along < 0.0, (margin - aside) / margin, 0.0),
+        np.where(meets, (CLEAR_AHEAD - along) / CLEAR_AHEAD, 0.0),
+    ).max(axis=0)
+    lack = np.where(missing > 0.0, LEAST_LACK + (1.0 - LEAST_LACK) * missing, 0.0)
+    crosses = np.logical_or.reduce(scene.crosses, axis=1)
+    if shift and crosses.any():
+        crossing = crosses.nonzero()[0]
+        # Traffic with the right of way keeps its speed: no vehicle enters a junction shortly before it.
+        favored = (crosses & scene.yields).nonzero()[0]
+        for rows, later in ((crossing, shift), (crossing, -shift), (favored, 2 * shift), (favored, 3 * shift)):
+            if not rows.size:
+                continue
+            columns = (scene.s, scene.d, scene.half_length, scene.half_width)
+            s, place, length, width = (_shifted(part[rows], later) for part in columns)
             along = np.abs(s - center) - (length + half_length)
             aside = np.abs(place - beside) - (width + ego.half_width)
-            lack[:, rows] = np.maximum(lack[:, rows], (along < CONTACT) & (aside < CONTACT))
-    head_on = (scene.speed < -ONCOMING_SPEED) & ~scene.crosses
-    ignored = scene.behind | (touching[:, :, 0].any(axis=0) & ~head_on[:, 0])
-    keep = ~ignored[None, :, None]
+            found = np.logical_or.reduce((along < CONTACT) & (aside < CONTACT), axis=0)
+            lack[:, rows] = np.maximum(lack[:, rows], found)
     stands = rolled.speed < AT_REST
     at_rest = stands[:, None, :]
-    touching &= keep
-    # Before a head-on collision the vehicle has to stand for some time, instead of a stop in the last moment.
-    before = np.maximum.reduce([_shifted(rolled.speed, -steps) for steps in range(shift + 1)])
-    has_just_stopped = stands & (before >= AT_REST) & ~stops[:, None]
-    late = touching & head_on & has_just_stopped[:, None, :]
-    touching &= ~(at_rest & (np.abs(scene.speed)[None] > 0.0))
-    return touching, np.where(late, 1.0, np.where(keep & ~at_rest, np.minimum(lack, 1.0), 0.0))
+    counts = ~at_rest
+    late: Bools | None = None
+    if touching.any():
+        head_on = (scene.speed < -ONCOMING_SPEED) & ~scene.crosses
+        ignored = np.logical_or.reduce(touching[:, :, 0], axis=0) & ~head_on[:, 0]
+        keep = ~ignored[:, None]
+        counts = counts & keep
+        touching &= keep
+        # Before a head-on collision the vehicle has to stand for some time, instead of a stop in the last moment.
+        has_just_stopped = stands & (_recent_maximum(rolled.speed, shift) >= AT_REST) & ~stops[:, None]
+        late = touching & head_on & has_just_stopped[:, None, :]
+        touching &= ~(at_rest & (scene.speed != 0.0))
+    lack = np.where(counts, np.minimum(lack, 1.0), 0.0)
+    return touching, lack if late is None else np.where(late, 1.0, lack)
 
 
 def _shifted(values: Array, steps: int) -> Array:
     """Return values (N, K) of `steps` later times; the last or first one is repeated."""
-    index = np.clip(np.arange(values.shape[1]) + steps, 0, values.shape[1] - 1)
+    last = values.shape[1] - 1
+    index = np.minimum(np.maximum(np.arange(steps, steps + last + 1), 0), last)
     return np.asarray(values[:, index])
+
+
+def _recent_maximum(values: Array, steps: int) -> Array:
+    """Return the maximum of values (P, K) at each time and the `steps` times before it."""
+    found = values.copy()
+    for step in range(1, min(steps, values.shape[1] - 1) + 1):
+        np.maximum(found[:, step:], values[:, :-step], out=found[:, step:])
+    return found

@@ -71,10 +71,11 @@ class Situation(msgspec.Struct, frozen=True):
     def free_progress(self, horizon: float, acceleration: float) -> float:
         """Return the distance that the vehicle covers without objects [m], by limits, walls and acceleration."""
         speed, s, step = self.speed, self.s, 0.5
+        limits, last, spacing, wanted = self.limits, len(self.limits) - 1, self.line.spacing, self.wanted
         end = math.inf if self.stop is None else self.stop.s
         for _ in range(round(horizon / step)):
-            limit = float(self.limits[min(max(int(s / self.line.spacing), 0), len(self.limits) - 1)])
-            speed = min(speed + acceleration * step, self.wanted, limit)
+            limit = float(limits[min(max(int(s / spacing), 0), last)])
+            speed = min(speed + acceleration * step, wanted, limit)
             s = min(s + speed * step, end)
         return s - self.s
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import msgspec
 import numpy as np
@@ -25,7 +26,23 @@ ACROSS = np.cos(np.radians(40.0))
 """Cosine of the angle between the motion of an object and the line from which on it crosses."""
 
 
-class Surroundings(msgspec.Struct, frozen=True):
+class Present(msgspec.Struct, frozen=True):
+    """One hypothesis at the first time in coordinates of the reference line; fields as those of `Surroundings`."""
+
+    row: int
+    owner: int
+    s: float
+    d: float
+    rear: float
+    front: float
+    half_length: float
+    half_width: float
+    speed: float
+    margin: float
+    crosses: bool
+
+
+class Surroundings(msgspec.Struct, frozen=True, dict=True):
     """N hypotheses at K times in coordinates of the reference line.
 
     s, d, half_length, half_width  (N, K) [m];  speed  (N, K) along the line [m/s];  margin  (N,) to the side [m]
@@ -50,6 +67,29 @@ class Surroundings(msgspec.Struct, frozen=True):
 
     def __len__(self) -> int:
         return len(self.owner)
+
+    @cached_property
+    def rear(self) -> Array:
+        """Least distances along the line that the hypotheses occupy (N, K) [m]."""
+        return self.s - self.half_length
+
+    @cached_property
+    def front(self) -> Array:
+        """Greatest distances along the line that the hypotheses occupy (N, K) [m]."""
+        return self.s + self.half_length
+
+    @cached_property
+    def may_lead(self) -> Bools:
+        """Whether the hypotheses lead the ego where they are in its way (N, K)."""
+        return np.asarray(~(self.crosses | self.behind[:, None]))
+
+    @cached_property
+    def present(self) -> list[Present]:
+        """Hypotheses at the first time as scalars, for the choice of single ones, where arrays are slow."""
+        columns = (self.s, self.d, self.rear, self.front, self.half_length, self.half_width, self.speed)
+        values = np.array([column[:, 0] for column in columns]).tolist()
+        names = (range(len(self)), self.owner, *values, self.margin.tolist(), self.crosses[:, 0].tolist())
+        return list(map(Present, *names))
 
     def rows(self, rows: Integers) -> Surroundings:
         """Return some of the hypotheses."""
@@ -89,9 +129,10 @@ def surroundings(
     owners = [objects[index] for index in prediction.objects]
     half = np.array([(known.length / 2.0, known.width / 2.0) for known in owners]).reshape(-1, 2, 1)
     along, aside = position_errors(owners, heading - (prediction.yaw - prediction.yaw[:, :1]))
-    half_length = np.abs(cos) * half[:, 0] + np.abs(sin) * half[:, 1]
+    ahead, across = np.abs(cos), np.abs(sin)
+    half_length = ahead * half[:, 0] + across * half[:, 1]
     half_length += np.minimum(settings.uncertainty * along, LARGEST_ERROR_ALONG)
-    half_width = np.abs(sin) * half[:, 0] + np.abs(cos) * half[:, 1]
+    half_width = across * half[:, 0] + ahead * half[:, 1]
     widened = half_width + np.minimum(settings.uncertainty * aside, LARGEST_LATERAL_ERROR)
     # A vehicle that follows its lane is within it, whatever the error of its position.
     half_width = np.maximum(half_width, np.minimum(widened, prediction.room[:, None]))
@@ -111,19 +152,23 @@ def surroundings(
         prediction.objects,
         np.array([known.existence >= settings.min_existence for known in owners], dtype=bool),
         np.array([settings.passing_gap if _may_be_passed(known) else 0.0 for known in owners]),
-        moving & (np.abs(cos) < ACROSS),
+        moving & (ahead < ACROSS),
         behind,
         _yields(prediction, gives_way),
     )
 
 
 def position_errors(objects: list[KnownObject], direction: Array) -> tuple[Array, Array]:
-    """Return the standard deviations (N, K) of the positions of objects along directions (N, K) [rad] and across [m].
+    """Return the standard deviations of the positions of objects along directions (N, K) [rad] and across [m].
 
-    The error of an object that turns keeps its direction relative to the object.
+    They have shape (N, K), or (N, 1) if none depends on the direction. The error of an object that turns keeps its
+    direction relative to the object.
     """
     error = np.array([known.error for known in objects])[:, None]
     mean, half, of_both = np.array([known.ellipse for known in objects]).reshape(-1, 3, 1).transpose(1, 0, 2)
+    if not (half.any() or of_both.any()):
+        alike = error * np.sqrt(np.maximum(mean, 0.0))
+        return alike, alike
     shift = half * np.cos(2.0 * direction) + of_both * np.sin(2.0 * direction)
     return error * np.sqrt(np.maximum(mean + shift, 0.0)), error * np.sqrt(np.maximum(mean - shift, 0.0))
 

@@ -9,12 +9,18 @@ import pytest
 
 from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
 from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, OncomingTraffic, first_oncoming, meets_oncoming
+from eidrive_scenario.driving.planning.behavior.proposals import inside_way
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
 BESIDE = LanesBeside(oncoming=3.5)
 TIMES = np.arange(0.0, 8.01, 0.25)
 PASSING = LateralProfile("pass", (0.0, 20.0, 50.0, 70.0), (0.0, 3.0, 3.0, 0.0), side=1, uses_oncoming=True)
+
+
+def first(objects: Surroundings) -> int:
+    """Return the index of the first time at which objects are in the way of a vehicle of 1.8 m width; K if never."""
+    return first_oncoming(inside_way(objects, PASSING, 0.9), 0.0, objects)
 
 
 def scene(*objects: tuple[float, float, float]) -> Surroundings:
@@ -75,15 +81,15 @@ def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
 def test_meeting_before_the_return(start: float, meets: bool) -> None:
     # At 10 m/s the return begins after 5 s at 50 m; at -10 m/s an object from 100 m is there at the same time.
     s = 10.0 * TIMES
-    oncoming = first_oncoming(PASSING, 0.0, scene((start, 3.5, -10.0)), 0.9)
+    oncoming = first(scene((start, 3.5, -10.0)))
     assert meets_oncoming(PASSING, s, TIMES, oncoming, (math.inf, 10.0)) == meets
 
 
 def test_oncoming_traffic_is_in_the_way_once_on_the_lane() -> None:
     # The way is at 3 m to the left up to s = 50 m; the front of the object, 2.5 m ahead of its center, is there at 5 s.
-    assert TIMES[first_oncoming(PASSING, 0.0, scene((102.5, 3.5, -10.0)), 0.9)] == pytest.approx(5.0, abs=1.2)
+    assert TIMES[first(scene((102.5, 3.5, -10.0)))] == pytest.approx(5.0, abs=1.2)
     for harmless in (scene(), scene((100.0, 3.5, 10.0)), scene((-10.0, 3.5, -10.0)), scene((100.0, 9.0, -10.0))):
-        assert first_oncoming(PASSING, 0.0, harmless, 0.9) == len(TIMES)
+        assert first(harmless) == len(TIMES)
 
 
 @pytest.mark.parametrize(("place", "meets"), [(95.0, True), (105.0, False)])

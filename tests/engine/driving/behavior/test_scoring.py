@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile
-from eidrive_scenario.driving.planning.behavior.proposals import Proposal
+from eidrive_scenario.driving.planning.behavior.proposals import Proposal, inside_way
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -39,13 +39,16 @@ def crossing_car(place: float, arrival: float, *, yields: bool) -> Surroundings:
 def risk(arrival: float, *, yields: bool) -> float:
     """Return the risk of a car with 10 m/s that passes the place of crossing after 3 s."""
     rolled = Rollout((SPEED * TIMES)[None], np.full((1, len(TIMES)), SPEED), np.full((1, 4), -1))
+    route, body = LateralProfile("route", (0.0,), (0.0,)), Body(3.8, 1.0, 2.85, 0.9)
+    scene = crossing_car(3.0 * SPEED, arrival, yields=yields)
     found = evaluate(
         [Proposal(0, 1.0, "all", 4.0)],
-        [LateralProfile("route", (0.0,), (0.0,))],
+        [route],
+        [inside_way(scene, route, body.half_width)],
         rolled,
-        crossing_car(3.0 * SPEED, arrival, yields=yields),
+        scene,
         TIMES,
-        Body(3.8, 1.0, 2.85, 0.9),
+        body,
         SETTINGS,
         SPEED,
         frozenset({"route"}),
