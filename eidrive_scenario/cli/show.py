@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.errors import Diagnostic, SettingError
+
+if TYPE_CHECKING:
+    from eidrive_scenario.recording.recording import Recording
 
 
 class Names(StrEnum):
@@ -128,28 +131,68 @@ def view(
         Path | None, typer.Option("--out", "-o", help="File of the page.", show_default="beside the recording")
     ] = None,
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
+    png: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a picture of one instant.")] = None,
+    at: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Instant of --png.", show_default="the decisive one")
+    ] = None,
+    gif: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an animated picture.")] = None,
+    mp4: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a film.")] = None,
+    station: Annotated[
+        str | None, typer.Option(help="Station of pictures and films.", show_default="the first that drives")
+    ] = None,
 ) -> None:
-    """Write a recorded run as an HTML replay.
+    """Write a recorded run as an HTML replay, or its top view as pictures.
 
     Example: eidrive view reports/scenario_1 --browser
     """
     from eidrive_scenario.recording.recording import open_recording
-    from eidrive_scenario.recording.run_files import RESULT, is_partial, recording_in, result_of
-    from eidrive_scenario.reporting.replay.page import make_replay
+    from eidrive_scenario.recording.run_files import is_partial, recording_in
 
     path = recording_in(recording)
-    page = out or path.with_suffix(".html")
-    check_output_paths({"--out": page}, [path])
     complete = not is_partial(path)
-    beside = path.with_name(RESULT)
-    replay = make_replay(open_recording(path), page, result_of(path), result_file=beside, complete=complete)
-    for line in replay.damage:
+    has_pictures = any(path is not None for path in (png, gif, mp4))
+    page = out or (None if has_pictures and not browser else path.with_suffix(".html"))
+    if at is not None and png is None:
+        raise SettingError(Diagnostic("--at without --png has no effect", "add --png FILE"))
+    if station is not None and not has_pictures:
+        raise SettingError(Diagnostic("--station has no effect on the page", "add --png, --gif or --mp4"))
+    check_output_paths({"--out": page, "--png": png, "--gif": gif, "--mp4": mp4}, [path])
+    opened = open_recording(path)
+    if has_pictures:
+        from eidrive_scenario.recording.run_files import RESULT, result_of
+        from eidrive_scenario.reporting.replay import film
+        from eidrive_scenario.reporting.run_report.reported_run import parse_run
+
+        result = result_of(path)
+        metrics = parse_run(result, path.with_name(RESULT)).metrics if result is not None else None
+        recorded = film.RecordedStation(opened, station, metrics=metrics)
+        damage = recorded.damage
+        if png is not None:
+            film.write_png(recorded, png, at)
+        if gif is not None:
+            film.write_gif(recorded, gif)
+        if mp4 is not None:
+            film.write_mp4(recorded, mp4)
+    if page is not None:
+        damage = _write_replay(opened, page, complete)
+    for line in damage:
         typer.secho(f"warning: {path} is damaged: {line}", fg="yellow", err=True)
     if not complete:
         typer.secho(f"warning: {path}: the run did not end, the recording is incomplete", fg="yellow", err=True)
-    typer.echo(str(page))
-    if browser:
+    for written in (png, gif, mp4, page):
+        if written is not None:
+            typer.echo(str(written))
+    if browser and page is not None:
         typer.launch(page.resolve().as_uri())
+
+
+def _write_replay(recording: Recording, page: Path, complete: bool) -> tuple[str, ...]:
+    """Write the page of a recording, and return the damage of the recording."""
+    from eidrive_scenario.recording.run_files import RESULT, result_of
+    from eidrive_scenario.reporting.replay.page import make_replay
+
+    beside = recording.path.with_name(RESULT)
+    return make_replay(recording, page, result_of(recording.path), result_file=beside, complete=complete).damage
 
 
 def report(

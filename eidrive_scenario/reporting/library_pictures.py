@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 
@@ -18,8 +19,9 @@ import typer
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.library import LibraryScenario, describe_scenarios
+from eidrive_scenario.reporting.drawing.canvas import Image
 from eidrive_scenario.reporting.drawing.road_drawing import house_outline, road_drawing
-from eidrive_scenario.reporting.drawing.run_picture import EGO, OTHER, SENDER, WALKER, Image, RunPaths, run_picture
+from eidrive_scenario.reporting.drawing.run_picture import EGO, OTHER, SENDER, WALKER, RunPaths, run_picture
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.world.road_objects import buildings
@@ -51,9 +53,10 @@ def picture(name: str, *, seed: int = 1) -> Image:
         if entity != EGO_NAME
     }
     if roads is None:
-        return run_picture(run, RoadDrawing(), (), {**colors, EGO_NAME: EGO})
-    houses = [house_outline(house) for house in buildings(roads, without=entities)]
-    return run_picture(run, road_drawing(roads.roads.values()), houses, {**colors, EGO_NAME: EGO})
+        return run_picture(run, RoadDrawing(), {**colors, EGO_NAME: EGO})
+    houses = tuple((house_outline(house), house.size[2]) for house in buildings(roads, without=entities))
+    drawing = replace(road_drawing(roads.roads.values()), houses=houses)
+    return run_picture(run, drawing, {**colors, EGO_NAME: EGO})
 
 
 def file_name(scenario: LibraryScenario) -> str:

@@ -18,7 +18,7 @@ from eidrive_scenario.geometry import footprint
 from eidrive_scenario.reporting.snapshot import StationSnapshot
 
 OWN, RECEIVED, LINK, LOST, AREA = "#2563eb", "#ea580c", "#0f9d58", "#dc2626", "#eab308"
-TRUTH, STATION = "#334155", "#0f172a"
+FUSED, TRUTH, STATION = "#7c3aed", "#334155", "#0f172a"
 LANES = {
     "sidewalk": "#e7e1d5",
     "median": "#dbe5d0",

@@ -18,10 +18,11 @@ from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.trace_hash import TraceHash
+from eidrive_scenario.reporting.drawing.canvas import HOUSE
 from eidrive_scenario.reporting.drawing.road_drawing import recorded_roads
-from eidrive_scenario.reporting.drawing.run_picture import HOUSE
 from eidrive_scenario.reporting.drawing.top_view import (
     AREA,
+    FUSED,
     GROUND,
     LANE,
     LANES,
@@ -43,8 +44,6 @@ from eidrive_scenario.reporting.run_report.settings_text import run_facts, short
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
 from eidrive_scenario.simulation.recorded_outcome import CONTEXT
 
-FUSED = "#7c3aed"
-"""Color of fused objects."""
 COLORS = {
     "own": OWN,
     "received": RECEIVED,
@@ -85,9 +84,9 @@ def make_replay(
     for line in recording.damage:
         report.add(line)
     trace = TraceHash()
-    settings = _settings(recording, report)
-    frames, roads = _drawable(recording, report, trace), _recorded_roads(recording, report)
-    data = replay_data(frames, report, _station_settings(settings))
+    settings = run_settings(recording, report)
+    frames, roads = _drawable(recording, report, trace), readable_roads(recording, report)
+    data = replay_data(frames, report, station_settings(settings))
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
         raise InputError(Diagnostic("the recording contains no readable frame", reason, str(recording.path)))
@@ -127,7 +126,8 @@ def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> I
         yield frame
 
 
-def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
+def readable_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
+    """Return the roads of a recording, without those that cannot be read, which are added to the report."""
     try:
         return recorded_roads(recording)
     except (InputError, ArithmeticError, LookupError, TypeError, ValueError, MemoryError, RecursionError) as error:
@@ -135,7 +135,7 @@ def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
         return RoadDrawing()
 
 
-def _settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
+def run_settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
     """Return the resolved settings of the metadata."""
     settings = _object(recording.metadata.get("settings", "{}"))
     if settings is None:
@@ -143,7 +143,7 @@ def _settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
     return settings or {}
 
 
-def _station_settings(settings: Mapping[str, Any]) -> dict[str, AgentSettings]:
+def station_settings(settings: Mapping[str, Any]) -> dict[str, AgentSettings]:
     """Return the settings of stations with a report timeout other than the default."""
     found: dict[str, AgentSettings] = {}
     stations = settings.get("stations")

@@ -30,7 +30,7 @@ def test_picture_has_actors_paths_and_lanes_at_their_places() -> None:
         run.add(("Swarm.0001",), [(30.0, 12.0, 1.0, 4.0, 2.0, 1.5, 0.0)])
     lane = np.array([(-8.0, -2.0), (52.0, -2.0), (52.0, 2.0), (-8.0, 2.0)])
     roads = RoadDrawing((("driving", lane),))
-    image = run_picture(run, roads, [], {"Car": OTHER, "Ego": EGO}, size=(600, 400))
+    image = run_picture(run, roads, {"Car": OTHER, "Ego": EGO}, size=(600, 400))
     assert image.shape == (400, 600, 3)
 
     def at(x: float, y: float) -> list[int]:

@@ -170,15 +170,19 @@ function drawLink(sender, receiver, state, polygon) {
   pen.setLineDash([]);
 }
 
+/* Write the names of the actors, near ones first, without those that would cover another one. */
 function drawNames(camera, flat, area) {
   pen.font = "600 12px system-ui, sans-serif"; pen.textBaseline = "bottom";
-  for (const name of names) {
-    const pose = poseOf(name);
-    if (!pose || name === shown.station || !shown.layers.truth) continue;
-    const point = seen(camera, [pose[0], pose[1], data.actors[name].size[2] + 0.4]);
-    if (point[2] < 2 || point[2] > 120) continue;
-    const [x, y] = flat(point), text = labelOf(name, pose[3]);
-    if (x > -50 && x < area.width + 50) writeLabel(text, x - pen.measureText(text).width / 2, y);
+  const taken = [];
+  const points = names.filter((name) => name !== shown.station && shown.layers.truth && poseOf(name))
+    .map((name) => { const pose = poseOf(name); return [name, pose[3], seen(camera, [pose[0], pose[1], data.actors[name].size[2] + 0.4])]; })
+    .filter(([, , point]) => point[2] > 2 && point[2] < 120).sort((a, b) => a[2][2] - b[2][2]);
+  for (const [name, speed, point] of points) {
+    const [x, y] = flat(point), text = labelOf(name, speed), half = pen.measureText(text).width / 2;
+    const hidden = taken.some(([u, v, other]) => Math.abs(u - x) < half + other + 3 && Math.abs(v - y) < 15);
+    if (hidden || x < -50 || x > area.width + 50) continue;
+    taken.push([x, y, half]);
+    writeLabel(text, x - half, y);
   }
 }
 

@@ -1,0 +1,151 @@
+"""Pictures and films of a recorded run: the top view that follows a station, as PNG, GIF or MP4."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from subprocess import PIPE, Popen
+from tempfile import TemporaryDirectory
+
+import cv2
+
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.files.atomic import create
+from eidrive_scenario.recording.damage import DamageReport
+from eidrive_scenario.recording.recording import Recording
+from eidrive_scenario.reporting.drawing.canvas import Image
+from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
+from eidrive_scenario.reporting.replay.page import readable_roads, run_settings, station_settings
+from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
+from eidrive_scenario.reporting.run_report.settings_text import shorten
+from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
+from eidrive_scenario.tolerances import TIME_TOLERANCE
+
+FILM_SIZE, GIF_SIZE = (1280, 720), (640, 360)
+"""Width and height of films and GIF files [pixels]."""
+FILM_RATE, GIF_RATE = 20.0, 10.0
+"""Pictures per second of a film and of a GIF."""
+_PALETTE = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
+"""Filter of FFmpeg that selects the 256 colors of a GIF by the pictures."""
+
+
+class RecordedStation:
+    """Snapshots of one station of a recording: `name`, or the first one that drives; else the first station.
+
+    Without stations, the snapshots contain the ground truth, and the view follows the first actor. Raise InputError if
+    the recording contains no readable frame, SettingError if it has no such station or actor.
+
+    metrics  of the result of the run, which determine the decisive instant
+    """
+
+    def __init__(
+        self, recording: Recording, name: str | None = None, *, metrics: Mapping[str, float | None] | None = None
+    ) -> None:
+        report = DamageReport()
+        for line in recording.damage:
+            report.add(line)
+        self._recording = recording
+        self._settings = station_settings(run_settings(recording, report))
+        self.roads: RoadDrawing = readable_roads(recording, report)
+        series = SeriesBuilder()
+        self.times: list[float] = []
+        """Times of the frames [s]."""
+        driven: dict[str, None] = {}
+        stations: dict[str, None] = {}
+        actors: dict[str, None] = {}
+        for frame in recording.frames(lambda reason: report.add("frames cannot be decoded", shorten(reason, 200))):
+            self.times.append(frame.view.time)
+            actors.update(dict.fromkeys(frame.view.names))
+            stations.update(dict.fromkeys(frame.steps))
+            driven.update(dict.fromkeys(key for key, step in frame.steps.items() if step.control is not None))
+            series.observe(frame)
+        if not self.times or not actors:
+            reason = "; ".join(report.lines()) or "record the run again"
+            raise InputError(Diagnostic("the recording shows no actor", reason, str(recording.path)))
+        if name is not None and name not in actors:
+            known = ", ".join([*stations, *(actor for actor in actors if actor not in stations)][:12])
+            raise SettingError(Diagnostic(f"--station: the run has no actor {name!r}", f"known: {known}"))
+        self.name = name or next(iter([*driven, *stations, *actors]))
+        decisive = series.contact or closest_approach(metrics or {}) or series.decisive
+        self.decisive: float = decisive["time"] if decisive is not None else self.times[0]
+        """Decisive instant [s]."""
+        self.damage = report.lines()
+
+    def snapshots(self) -> Iterator[StationSnapshot]:
+        """Yield the snapshot of each frame."""
+        builder = SnapshotBuilder(self.name, self._settings.get(self.name, DEFAULT_SETTINGS))
+        for frame in self._recording.frames(lambda reason: None):
+            yield builder.observe(frame)
+
+    def pictures(self, size: tuple[int, int], rate: float | None = None, until: float = math.inf) -> Iterator[Image]:
+        """Yield the pictures of the frames, or of `rate` instants per second, up to a time [s]."""
+        center = (0.0, 0.0)
+        shown = 0
+        for snapshot in self.snapshots():
+            if snapshot.time > until + TIME_TOLERANCE:
+                return
+            if self.name in snapshot.view:
+                x, y = snapshot.view.centers[snapshot.view.row(self.name), :2].tolist()
+                center = (x, y) if math.isfinite(x + y) else center
+            due = 1 if rate is None else math.floor((snapshot.time - self.times[0]) * rate + 1e-6) + 1 - shown
+            if due > 0:
+                picture = snapshot_picture(snapshot, self.roads, center, size=size)
+                for _ in range(due):
+                    yield picture
+                shown += due
+
+
+def write_png(station: RecordedStation, path: Path, time: float | None = None) -> None:
+    """Write the picture of an instant [s], by default the decisive one.
+
+    Raise SettingError for a time out of the run, or if the file cannot be written.
+    """
+    first, last = station.times[0], station.times[-1]
+    wanted = station.decisive if time is None else time
+    if not first - TIME_TOLERANCE <= wanted <= last + TIME_TOLERANCE:
+        raise SettingError(Diagnostic(f"--at {wanted:g} s is not in the run", f"give {first:g} to {last:g} s"))
+    (picture,) = deque(station.pictures(FILM_SIZE, until=wanted), maxlen=1)
+    _, data = cv2.imencode(".png", picture)
+    with create(path) as stream:
+        stream.write(data.tobytes())
+
+
+def write_gif(station: RecordedStation, path: Path) -> None:
+    """Write the run as an animated GIF at its speed, GIF_RATE pictures per second. Raise SettingError."""
+    _encode(station, path, GIF_SIZE, GIF_RATE, ["-c:v", "gif", "-filter_complex", _PALETTE, "-loop", "0"])
+
+
+def write_mp4(station: RecordedStation, path: Path) -> None:
+    """Write the run as a film at its speed, FILM_RATE pictures per second in H.264. Raise SettingError."""
+    quality = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-preset", "veryfast", "-movflags", "+faststart"]
+    _encode(station, path, FILM_SIZE, FILM_RATE, quality)
+
+
+def _encode(station: RecordedStation, path: Path, size: tuple[int, int], rate: float, arguments: Sequence[str]) -> None:
+    """Write the pictures by FFmpeg to a file with the suffix of `path`."""
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        hint = "pip install 'eidrive-scenario[film]'"
+        raise SettingError(Diagnostic("films require imageio-ffmpeg, which is not installed", hint)) from error
+    source = ["-f", "rawvideo", "-pix_fmt", "bgr24", "-s", f"{size[0]}x{size[1]}", "-r", f"{rate:g}", "-i", "-"]
+    with TemporaryDirectory() as folder:
+        made = Path(folder) / f"film{path.suffix.lower() or '.mp4'}"
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-threads", "1", *source, *arguments, str(made)]
+        with Popen(command, stdin=PIPE, stderr=PIPE) as encoder:
+            assert encoder.stdin is not None
+            assert encoder.stderr is not None
+            with suppress(BrokenPipeError):
+                for picture in station.pictures(size, rate):
+                    encoder.stdin.write(picture.tobytes())
+                encoder.stdin.close()
+            message = encoder.stderr.read().decode(errors="replace").strip()
+        if encoder.returncode or not made.is_file():
+            raise SettingError(Diagnostic(f"FFmpeg cannot write the film: {message[:300]}", "", str(path)))
+        with create(path) as stream, made.open("rb") as content:
+            shutil.copyfileobj(content, stream)

@@ -1,0 +1,106 @@
+"""Pictures and films of a recorded run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from eidrive_scenario.errors import InputError, SettingError
+from eidrive_scenario.recording import Recorder
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import open_recording
+from eidrive_scenario.reporting.drawing.canvas import Canvas
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
+from eidrive_scenario.reporting.replay import film
+from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4, write_png
+
+Play = Callable[..., list[Frame]]
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small films, which are written faster."""
+    monkeypatch.setattr(film, "FILM_SIZE", (160, 90))
+    monkeypatch.setattr(film, "GIF_SIZE", (160, 90))
+
+
+def recorded(frames: list[Frame], folder: Path) -> RecordedStation:
+    recorder = Recorder(folder / "run.mcap", metadata={"scenario": "street", "seed": "1"})
+    for frame in frames:
+        recorder.observe(frame)
+    recorder.close()
+    return RecordedStation(open_recording(folder / "run.mcap"))
+
+
+def test_station_is_the_first_that_drives(street: Play, tmp_path: Path) -> None:
+    assert recorded(street(1), tmp_path).name == "Ego"
+
+
+def test_unknown_station_is_refused_with_known_names(street: Play, tmp_path: Path) -> None:
+    recorded(street(1)[:3], tmp_path)
+    with pytest.raises(SettingError, match=r"no actor 'Bus'.*known: Ego, "):
+        RecordedStation(open_recording(tmp_path / "run.mcap"), "Bus")
+
+
+def test_recording_without_frames_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no actor"):
+        recorded([], tmp_path)
+
+
+def test_picture_shows_station_in_its_middle(street: Play, tmp_path: Path) -> None:
+    """The body of the station is dark, the ground is light."""
+    station = recorded(street(1), tmp_path)
+    write_png(station, tmp_path / "a.png", 2.0)
+    picture = cv2.imread(str(tmp_path / "a.png"))
+    assert picture is not None
+    height, width = picture.shape[:2]
+    assert (width, height) == film.FILM_SIZE
+    assert picture[height // 2, width // 2].max() < 60
+    assert picture[height // 2 + 150, width // 2].min() > 200
+
+
+@pytest.mark.parametrize("time", [-1.0, 99.0])
+def test_picture_outside_of_run_is_refused(street: Play, tmp_path: Path, time: float) -> None:
+    with pytest.raises(SettingError, match="not in the run"):
+        write_png(recorded(street(1), tmp_path), tmp_path / "a.png", time)
+    assert not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.usefixtures("small")
+def test_film_plays_at_the_speed_of_the_run(street: Play, tmp_path: Path) -> None:
+    """100 frames of 0.05 s are 100 pictures at 20 per second, and 50 of a GIF at 10 per second."""
+    pytest.importorskip("imageio_ffmpeg")
+    station = recorded(street(1), tmp_path)
+    write_mp4(station, tmp_path / "a.mp4")
+    write_gif(station, tmp_path / "a.gif")
+    for name, count, rate in (("a.mp4", 100, 20.0), ("a.gif", 50, 10.0)):
+        video = cv2.VideoCapture(str(tmp_path / name))
+        assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(rate)
+        pictures = 0
+        while video.read()[0]:
+            pictures += 1
+        assert pictures == count, name
+
+
+def test_film_without_encoder_states_the_extra(street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
+    with pytest.raises(SettingError, match=r"eidrive-scenario\[film\]"):
+        write_mp4(recorded(street(1)[:3], tmp_path), tmp_path / "a.mp4")
+
+
+def test_canvas_fills_polygon_with_opacity() -> None:
+    canvas = Canvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
+    before = canvas.image[50, 50].astype(float)
+    canvas.fill(np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]), "#000000", 0.25)
+    assert canvas.image[50, 50] == pytest.approx(0.75 * before, abs=1.0)
+    assert canvas.image[10, 10] == pytest.approx(before)
+
+
+def test_canvas_draws_far_points_without_overflow() -> None:
+    canvas = Canvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
+    canvas.roads(RoadDrawing(lanes=(("driving", np.array([(-1e9, -1.0), (1e9, -1.0), (1e9, 1.0), (-1e9, 1.0)])),)))
+    assert (canvas.image[50] != canvas.image[5]).any(axis=1).all()
