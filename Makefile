@@ -14,7 +14,7 @@ install: $(STAMP)  ## create .venv and install the project with its development 
 $(STAMP): pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not installed; name another with: make PYTHON=python3 …"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,learned,onnx]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,learned,onnx,openvino]'
 	@touch $@
 
 demo: install   ## run scenarios 1 and 2 of the paper in all arms: reports/demo.html

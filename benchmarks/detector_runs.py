@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import cv2
-import torch
 
 from eidrive_scenario.library import library_path, resolve_scenario
-from eidrive_scenario.perception.learned.detector import LearnedDetector
+from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.lidar.detector import LidarDetector
 from eidrive_scenario.sensing.camera import Camera
@@ -107,8 +106,9 @@ def print_table(seed: int, repeats: int) -> None:
     """Run all cases repeatedly, and print the fastest run of each."""
     cv2.setNumThreads(1)
     run("yolov5", DEFAULT, seed)
+    runtime = ", ".join(f"{name} {version}" for name, version in YoloDetector().library_versions.items())
     print(
-        f"{SCENARIO}, complete runs, equal detectors on ego and roadside unit; torch {torch.get_num_threads()} thread, "
+        f"{SCENARIO}, complete runs, equal detectors on ego and roadside unit; {runtime}, one thread; "
         f"OpenCV {cv2.getNumThreads()} thread; simulated time per processor time, and shares by component"
     )
     print(f"{'':38}" + "".join(f"{part:>10}" for part in (*PARTS, "rest")))

@@ -24,14 +24,16 @@ from torch import nn
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, best_confidence, match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, suppression_groups
 from eidrive_scenario.perception.learned.networks.boxes import centered
-from eidrive_scenario.perception.learned.networks.ssd import default_boxes
+from eidrive_scenario.perception.learned.networks.ssd import Ssd, default_boxes
 from eidrive_scenario.perception.learned.networks.ssd_loss import SsdLoss
 from eidrive_scenario.perception.learned.networks.suppression import suppress
 from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets
-from eidrive_scenario.perception.learned.networks.yolov5 import ANCHORS_PER_SCALE, STRIDES, Anchors, YoloV5
+from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5
 from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss
-from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates
-from eidrive_scenario.perception.learned.weights import Description, save
+from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, STRIDES, Anchors
+from eidrive_scenario.perception.learned.raw_outputs import ssd_candidates, ssd_scales, yolo_candidates, yolo_scales
+from eidrive_scenario.perception.learned.torch_weights import save, untrained
+from eidrive_scenario.perception.learned.weights import Description
 from training.augment import change_colors, transform_images
 from training.dataset import Dataset
 
@@ -104,7 +106,7 @@ def learning_rate(step: int, steps: int, highest: float) -> float:
 class Average:
     """Moving average of the weights of a network, with a faster initial phase."""
 
-    def __init__(self, network: nn.Module) -> None:
+    def __init__(self, network: YoloV5 | Ssd) -> None:
         self.network = copy.deepcopy(network).eval().requires_grad_(False)
         self._values = _float_values(self.network)
         self._steps = 0
@@ -122,27 +124,26 @@ def _float_values(network: nn.Module) -> list[torch.Tensor]:
 
 
 @torch.no_grad()
-def scores(network: nn.Module, samples: Samples, autocast: bool) -> tuple[dict[str, float], float]:
+def scores(network: YoloV5 | Ssd, samples: Samples, autocast: bool) -> tuple[dict[str, float], float]:
     """Return AP at overlap 0.5 of each class, their mean over the classes that occur, and the confidence of the best
     F1."""
-    width, height = INPUT_SIZE
     device = samples.images.device
     groups = suppression_groups(IMAGE_CLASSES)
-    defaults = default_boxes(height, width)
     found: dict[int, list[Matches]] = {number: [] for number in range(len(IMAGE_CLASSES))}
     present = np.zeros(len(IMAGE_CLASSES), dtype=np.int64)
     for start in range(0, len(samples), 64):
         pixels = samples.images[start : start + 64].float().div(255.0)
         with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
-            outputs = network(pixels.contiguous(memory_format=torch.channels_last))
-        outputs = [output.float().cpu() for output in outputs]
+            outputs = network.raw_outputs(pixels.contiguous(memory_format=torch.channels_last))
+        arrays = [output.float().cpu().numpy() for output in outputs]
         for index in range(len(pixels)):
-            single = [output[index : index + 1] for output in outputs]
+            single = [array[index : index + 1] for array in arrays]
             if isinstance(network, YoloV5):
-                boxes, confidence, number = yolo_candidates(network.anchors.cpu(), single, LEAST_CONFIDENCE)
+                anchors = network.anchors.cpu().numpy()
+                candidates = yolo_candidates(anchors, yolo_scales(single), LEAST_CONFIDENCE)
             else:
-                boxes, confidence, number = ssd_candidates((single[0], single[1]), defaults, LEAST_CONFIDENCE)
-            b, s, n = boxes.double().numpy(), confidence.double().numpy(), number.numpy()
+                candidates = ssd_candidates(ssd_scales(single), LEAST_CONFIDENCE)
+            b, s, n = candidates.boxes, candidates.scores, candidates.classes
             best = np.argsort(-s, kind="stable")[:500]
             b, s, n = b[best], s[best], n[best]
             kept = suppress(b, s, groups[n], 0.5)
@@ -177,7 +178,7 @@ def train(options: argparse.Namespace) -> None:
     print(f"{len(samples)} + {len(checks)} images on {device} after {time.perf_counter() - started:.0f} s", flush=True)
     anchors = fit_anchors(dataset, options.seed) if options.network == "yolov5" else None
     description = Description(options.network, IMAGE_CLASSES, INPUT_SIZE, anchors)
-    network = description.build().to(device)
+    network = untrained(description).to(device)
     network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     defaults = default_boxes(INPUT_SIZE[1], INPUT_SIZE[0]).to(device)
     loss_of: Any = YoloLoss(network) if isinstance(network, YoloV5) else SsdLoss(defaults)

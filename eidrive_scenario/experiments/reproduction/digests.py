@@ -23,7 +23,7 @@ NOT_EXECUTED = frozenset({"__pycache__", "checks", "cli", "experiments", "librar
 """Subpackages of the engine that a run does not use, and the library, of which only the used folders count."""
 LIBRARY_FOLDERS = ("catalogs", "channels", "roads")
 """Folders of the library that the scenarios refer to."""
-DEPENDENCIES = ("numpy", "onnxruntime", "pybullet", "scipy", "torch")
+DEPENDENCIES = ("numpy", "onnxruntime", "openvino", "pybullet", "scipy", "torch")
 """Packages of others that affect the result."""
 _LENGTH = 16
 """Number of hexadecimal digits of a digest."""

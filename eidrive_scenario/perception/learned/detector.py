@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,11 +27,21 @@ from eidrive_scenario.perception.learned.external_network import ExternalNetwork
 from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
-from eidrive_scenario.perception.learned.runtimes import runtime_versions
+from eidrive_scenario.perception.learned.own_network import OwnNetwork
+from eidrive_scenario.perception.learned.runtime_selection import (
+    Device,
+    Runtime,
+    is_installed,
+    missing_runtime,
+    runtime_versions,
+    select_runtime,
+)
 from eidrive_scenario.perception.learned.weight_files import (
     DEFAULT_CONFIDENCE,
     MAX_CLASSES,
     MAX_SIDE,
+    ONNX_SUFFIX,
+    OWN_SUFFIX,
     TORCHSCRIPT_SUFFIX,
     check_weights_exist,
     refused_torchscript,
@@ -45,7 +54,7 @@ from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Sen
 from eidrive_scenario.settings import Settings
 
 SHIPPED = Path(__file__).parents[1] / "weights"
-OWN_SUFFIX, EXTERNAL_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)
+EXTERNAL_SUFFIXES = (ONNX_SUFFIX, TORCHSCRIPT_SUFFIX)
 
 Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
 """Width or height of a network input [px]."""
@@ -60,7 +69,9 @@ class LearnedSettings(Settings):
                  layout of its outputs, if the shape does not determine it
     letterbox    of an .onnx or .pt: whether images keep their aspect ratio, with gray margins; otherwise stretched
     confidence   minimum score of a box; None: the optimum of the shipped weights, and 0.35 for others
-    threads      of the computation of the network, in the whole process
+    runtime      library that executes the network; `auto`: the fastest one that is installed
+    device       `cuda` executes .npz and .pt by torch on a GPU
+    threads      of the computation of the network on the CPU, in the whole process
     """
 
     weights: str | None = None
@@ -69,6 +80,8 @@ class LearnedSettings(Settings):
     layout: Layout | None = None
     letterbox: bool = False
     confidence: float | None = Field(default=None, gt=0.0, lt=1.0)
+    runtime: Literal["auto"] | Runtime = "auto"
+    device: Device = "cpu"
     threads: Annotated[int, Field(ge=1, le=256)] = 1
 
     @model_validator(mode="after")
@@ -111,7 +124,7 @@ class LearnedDetector(Detector):
         self._signals: tuple[SignalReading, ...] = ()
         path = weights_path(self.network, self.settings)
         check_weights_exist(path)
-        self.library_versions = runtime_versions(path)
+        self.library_versions = runtime_versions(select_runtime(path, self.settings.runtime, self.settings.device))
         self._network: ImageNetwork | None = None
         self._map_context = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
@@ -226,31 +239,31 @@ def weights_path(name: str, settings: LearnedSettings) -> Path:
 def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
     """Return the network that the settings select.
 
-    Raise SettingError if its weights are missing or not suitable, or are TorchScript without permission of the user.
+    Raise SettingError if its weights are missing or not suitable, or are TorchScript without permission of the user,
+    and if the runtime or the device is not available.
     """
     path = weights_path(name, settings)
     check_weights_exist(path)
     allow_torchscript = torchscript_is_allowed(allow_torchscript)
     if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
         raise refused_torchscript(path)
-    if path.suffix != ".onnx" and importlib.util.find_spec("torch") is None:
-        message = f"detector {name!r} requires torch, which is not installed"
-        raise SettingError(Diagnostic(message, "run: pip install eidrive-scenario[learned]"))
+    runtime = select_runtime(path, settings.runtime, settings.device)
+    if not is_installed(runtime):
+        raise missing_runtime(runtime)
     if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
-        confidence = settings.confidence or DEFAULT_CONFIDENCE
         return ExternalNetwork(
             path,
             settings.classes,
             settings.input_size,
-            confidence,
+            settings.confidence or DEFAULT_CONFIDENCE,
             settings.layout,
             settings.threads,
             settings.letterbox,
+            runtime=runtime,
+            device=settings.device,
             allow_torchscript=allow_torchscript,
         )
-    from eidrive_scenario.perception.learned.torch_network import TorchNetwork
-
-    network = TorchNetwork(path, settings.confidence, settings.threads)
+    network = OwnNetwork(path, runtime, settings.confidence, settings.threads, settings.device)
     if network.name != name:
         message = f"weights {quoted(str(path))} are of another network (got {network.name!r}; expected {name!r})"
         raise SettingError(Diagnostic(message, f"use the detector {network.name!r}"))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
-from eidrive_scenario.perception.learned.runtimes import LAYOUTS, load_network
+from eidrive_scenario.perception.learned.runtime_selection import AUTO, Device, select_runtime
+from eidrive_scenario.perception.learned.runtimes import LAYOUTS, load_onnx, torchscript_network
 from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, refused_torchscript
 
 _ROUNDING = 1e-5
@@ -29,7 +30,8 @@ class ExternalNetwork(ImageNetwork):
     constructor computes the outputs of a black image.
 
     Raise SettingError if the file cannot be read, does not accept this input size, or fits no layout; and for
-    TorchScript, which can execute any code, unless `allow_torchscript` is True.
+    TorchScript, which can execute any code, unless `allow_torchscript` is True. Raise it too if the runtime cannot
+    execute the file on the device, or is not installed.
     """
 
     def __init__(
@@ -42,13 +44,19 @@ class ExternalNetwork(ImageNetwork):
         threads: int = 1,
         letterbox: bool = False,
         *,
+        runtime: str = AUTO,
+        device: Device = "cpu",
         allow_torchscript: bool = False,
     ) -> None:
         super().__init__(classes, input_size, confidence, letterbox)
         self._path = path
         if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
             raise refused_torchscript(path)
-        self._compute = load_network(path, threads)
+        name = select_runtime(path, runtime, device)
+        if name == "torch":
+            self._compute = torchscript_network(path, threads, device)
+        else:
+            self._compute = load_onnx(name, path, threads)
         black = np.zeros((input_size[1], input_size[0], 3), dtype=np.uint8)
         outputs = self._outputs(black)
         self._layout: Layout = layout or self._infer_layout(outputs)

@@ -1,17 +1,17 @@
-"""Runtimes that execute networks of third parties: ONNX Runtime, OpenCV and TorchScript, on the CPU."""
+"""Runtimes that execute networks: OpenVINO, ONNX Runtime, OpenCV and TorchScript."""
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import logging
 import os
 import re
+import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import cv2
@@ -19,7 +19,8 @@ import numpy as np
 
 from eidrive_scenario.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
-from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, read_weights
+from eidrive_scenario.perception.learned.runtime_selection import Runtime
+from eidrive_scenario.perception.learned.weight_files import read_weights
 
 LAYOUTS = (
     "yolov5 (1, N, 5 + C): cx cy w h objectness, probability of each class; "
@@ -30,39 +31,76 @@ LAYOUTS = (
 Compute = Callable[[Floats], list[Floats]]
 """Function from an image (1, 3, H, W) in [0, 1] to all outputs of a network."""
 
-ONNX_SUFFIX = ".onnx"
-_ONNXRUNTIME = "onnxruntime"
 _NO_TELEMETRY = ("ORT_DISABLE_TELEMETRY", "1")
 """Environment variable of ONNX Runtime. Without it, `import onnxruntime` writes an identifier of the device and a
 database below the home directory, and sends events to its manufacturer (its Privacy.md, version 1.29 and later).
 """
+_OPENVINO_TOOLS = "openvino.tools.ovc"
 _LAYER = re.compile(r"Node \[([\w.]{1,60})@")
 _LOG = logging.getLogger(__name__)
 _FATAL_ONLY = 4
 """Log level of ONNX Runtime: its errors are raised as exceptions as well."""
 
 
-def runtime_versions(path: Path) -> Mapping[str, str]:
-    """Return name and version of the library that executes these weights. No library is imported."""
-    if path.suffix != ONNX_SUFFIX:
-        return {"torch": version("torch")} if _is_installed("torch") else {}
-    if _is_installed(_ONNXRUNTIME):
-        return {_ONNXRUNTIME: version(_ONNXRUNTIME)}
-    return {"opencv": cv2.__version__}
+def load_onnx(runtime: Runtime, path: Path, threads: int, content: bytes | None = None) -> Compute:
+    """Return the function of an ONNX model, executed by a runtime other than torch.
 
+    path     of the weights, for messages
+    content  ONNX model of these weights; None: the content of the file
 
-def load_network(path: Path, threads: int) -> Compute:
-    """Return the function of a network in an ONNX or TorchScript file.
-
-    ONNX Runtime executes ONNX models if it is installed, OpenCV otherwise. Raise SettingError if the file is not a
-    readable model.
+    Raise SettingError if the file is not a readable model.
     """
-    if path.suffix == TORCHSCRIPT_SUFFIX:
-        return torchscript_network(path, threads)
-    return onnxruntime_network(path, threads) if _is_installed(_ONNXRUNTIME) else opencv_network(path, threads)
+    if content is None:
+        content = read_weights(path)
+    if runtime == "openvino":
+        return openvino_network(path, threads, content)
+    return (onnxruntime_network if runtime == "onnxruntime" else opencv_network)(path, threads, content)
 
 
-def onnxruntime_network(path: Path, threads: int) -> Compute:
+def openvino_network(path: Path, threads: int, content: bytes) -> Compute:
+    """Return the function of an ONNX model of this project, executed by OpenVINO without telemetry.
+
+    Networks of third parties are not executed, as their models may name further files with tensors.
+    """
+    core = _openvino().Core()
+    settings = {
+        "INFERENCE_NUM_THREADS": threads,
+        "NUM_STREAMS": 1,
+        "ENABLE_CPU_PINNING": False,  # several processes would be pinned to the same core
+        "INFERENCE_PRECISION_HINT": "f32",  # the default is bfloat16 on processors that support it
+    }
+    try:
+        compiled = core.compile_model(core.read_model(model=content), "CPU", settings)
+    except RuntimeError as error:
+        raise _unreadable(path, "an ONNX model", error) from error
+    request, lock = compiled.create_infer_request(), Lock()
+
+    def compute(pixels: Floats) -> list[Floats]:
+        with lock:
+            request.infer([pixels])
+            return [np.array(request.get_output_tensor(number).data) for number in range(len(compiled.outputs))]
+
+    return compute
+
+
+def _openvino() -> Any:
+    """Import OpenVINO without its tools.
+
+    `import openvino` imports its model converter, which sends an event to its manufacturer and writes an identifier
+    below the home directory. It tolerates that the converter is missing.
+    """
+    if "openvino" not in sys.modules:
+        sys.modules[_OPENVINO_TOOLS] = None  # type: ignore[assignment]
+        try:
+            import openvino
+        finally:
+            del sys.modules[_OPENVINO_TOOLS]
+    import openvino
+
+    return openvino
+
+
+def onnxruntime_network(path: Path, threads: int, content: bytes) -> Compute:
     """Return the function of an ONNX model, executed by ONNX Runtime with deterministic kernels, without telemetry."""
     os.environ.setdefault(*_NO_TELEMETRY)
     import onnxruntime
@@ -76,7 +114,6 @@ def onnxruntime_network(path: Path, threads: int) -> Compute:
     options.add_session_config_entry("session.load_model_format", "ONNX")
     # A model may name further files with its tensors. Below a path that is a file there are none.
     options.add_session_config_entry("session.model_external_initializers_file_folder_path", str(path.resolve()))
-    content = read_weights(path)
     try:
         session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # the exceptions of ONNX Runtime have no common base class
@@ -98,22 +135,23 @@ def onnxruntime_network(path: Path, threads: int) -> Compute:
     return compute
 
 
-def opencv_network(path: Path, threads: int) -> Compute:
+def opencv_network(path: Path, threads: int, content: bytes) -> Compute:
     """Return the function of an ONNX model, executed by OpenCV, which supports common layers only."""
     cv2.setNumThreads(threads)
     # From memory: a model that is read by its path may name further files with its tensors.
-    content = np.frombuffer(read_weights(path), dtype=np.uint8)
+    model = np.frombuffer(content, dtype=np.uint8)
     try:
         with _silent_opencv():
-            network = cv2.dnn.readNetFromONNX(content)
+            network = cv2.dnn.readNetFromONNX(model)
         names = network.getUnconnectedOutLayersNames()
     except (cv2.error, MemoryError) as error:
         raise _unreadable(path, "an ONNX model", error) from error
+    lock = Lock()
 
     def compute(pixels: Floats) -> list[Floats]:
-        network.setInput(pixels)
         try:
-            with _silent_opencv():
+            with lock, _silent_opencv():
+                network.setInput(pixels)
                 outputs = network.forward(names)
         except cv2.error as error:
             raise RuntimeError(str(error)) from error
@@ -122,26 +160,28 @@ def opencv_network(path: Path, threads: int) -> Compute:
     return compute
 
 
-def torchscript_network(path: Path, threads: int) -> Compute:
-    """Return the function of a TorchScript model, executed by torch. Loading can execute any code."""
+def torchscript_network(path: Path, threads: int, device: str = "cpu") -> Compute:
+    """Return the function of a TorchScript model, executed by torch on a device. Loading can execute any code."""
     import torch
 
-    torch.set_num_threads(threads)
+    from eidrive_scenario.perception.learned.torch_devices import prepare
+
+    prepare(threads, device)
     content = read_weights(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # torch recommends torch.export
-            network: Any = torch.jit.load(io.BytesIO(content), map_location="cpu").eval()  # type: ignore[no-untyped-call]
+            network: Any = torch.jit.load(io.BytesIO(content), map_location=device).eval()  # type: ignore[no-untyped-call]
     except (RuntimeError, ValueError, OSError) as error:
         raise _unreadable(path, "a TorchScript model", error) from error
 
     def compute(pixels: Floats) -> list[Floats]:
         with torch.inference_mode():
-            returned = network(torch.from_numpy(pixels))
+            returned = network(torch.from_numpy(pixels).to(device))
         outputs = returned if isinstance(returned, (list, tuple)) else [returned]
         if not all(isinstance(output, torch.Tensor) for output in outputs):
             raise _unexpected_outputs(path, outputs)
-        return [np.atleast_1d(output.float().numpy()) for output in outputs]
+        return [np.atleast_1d(output.float().cpu().numpy()) for output in outputs]
 
     return compute
 
@@ -155,10 +195,6 @@ def _silent_opencv() -> Iterator[None]:
         yield
     finally:
         cv2.utils.logging.setLogLevel(before)
-
-
-def _is_installed(module: str) -> bool:
-    return importlib.util.find_spec(module) is not None
 
 
 def _unexpected_outputs(path: Path, outputs: list[Any] | tuple[Any, ...]) -> SettingError:

@@ -26,7 +26,7 @@ DEFAULT_CONFIDENCE = 0.35
 """Minimum score of a detection if neither the settings nor the weights state one."""
 ALLOW_TORCHSCRIPT = "EIDRIVE_ALLOW_TORCHSCRIPT"
 """Environment variable: 1 permits TorchScript weights, as the option --allow-torchscript does."""
-TORCHSCRIPT_SUFFIX = ".pt"
+OWN_SUFFIX, ONNX_SUFFIX, TORCHSCRIPT_SUFFIX = ".npz", ".onnx", ".pt"
 
 
 def torchscript_is_allowed(option: bool) -> bool:

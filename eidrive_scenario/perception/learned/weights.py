@@ -5,17 +5,18 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
-from torch import nn
+from numpy.typing import NDArray
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
-from eidrive_scenario.perception.learned.networks.ssd import Ssd
-from eidrive_scenario.perception.learned.networks.yolov5 import STRIDES, Anchors, YoloV5
+from eidrive_scenario.perception.learned.graphs.ssd_graph import ssd_onnx
+from eidrive_scenario.perception.learned.graphs.yolov5_graph import yolov5_onnx
+from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, STRIDES, Anchors
 from eidrive_scenario.perception.learned.weight_files import (
     DEFAULT_CONFIDENCE,
     MAX_CLASSES,
@@ -24,7 +25,8 @@ from eidrive_scenario.perception.learned.weight_files import (
     read_weights,
 )
 
-_DESCRIPTION = "description"
+DESCRIPTION = "description"
+"""Name of the array with the description."""
 
 
 @dataclass(frozen=True)
@@ -42,48 +44,37 @@ class Description:
     anchors: Anchors | None = None
     confidence: float = DEFAULT_CONFIDENCE
 
-    def build(self) -> YoloV5 | Ssd:
-        """Return the untrained network. Raise ValueError if the description fits no network."""
-        if self.network == "yolov5" and self.anchors is not None:
-            return YoloV5(len(self.classes), self.anchors)
-        if self.network == "ssd":
-            return Ssd(len(self.classes))
-        raise ValueError("its description specifies no known network, or lacks anchors")
+
+@dataclass(frozen=True)
+class Weights:
+    """Content of a weight file: its description, and all arrays by the names of the layers."""
+
+    description: Description
+    arrays: Mapping[str, NDArray[Any]]
+
+    def onnx(self) -> bytes:
+        """Return the ONNX model of the network. Raise ValueError if an array is missing or has another shape."""
+        graph = yolov5_onnx if self.description.network == "yolov5" else ssd_onnx
+        return graph(self.arrays, len(self.description.classes), self.description.input_size)
 
 
-def save(path: Path, network: nn.Module, description: Description, card: dict[str, Any]) -> None:
-    """Write weights and metadata. Convolutions are stored in half precision, other tensors in single precision."""
-    arrays: dict[str, Any] = {}
-    for name, value in network.state_dict().items():
-        array = value.detach().cpu().numpy()
-        arrays[name] = array.astype(np.float16) if array.ndim == 4 else array
-    arrays[_DESCRIPTION] = np.array(json.dumps(asdict(description)))
-    np.savez_compressed(path, **arrays)
-    path.with_suffix(".json").write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
-
-
-def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
-    """Return the network with its weights, trainable. Raise SettingError if the file does not contain weights."""
+def read(path: Path) -> Weights:
+    """Return the content of a weight file. Raise SettingError if the file does not contain weights."""
     content = read_weights(path)
+    with suitable(path):
+        arrays = read_arrays(content)
+        return Weights(_parse_description(json.loads(str(arrays[DESCRIPTION]))), arrays)
+
+
+@contextmanager
+def suitable(path: Path) -> Iterator[None]:
+    """Raise SettingError with this path if the block finds that weights are damaged or do not fit."""
     try:
-        stored = read_arrays(content)
-        description = _parse_description(json.loads(str(stored[_DESCRIPTION])))
-        network = description.build()
-        expected = network.state_dict()
-        missing = [name for name in expected if name not in stored]
-        if missing:
-            raise ValueError(f"{missing[0]} is missing")
-        mismatched = [name for name, value in expected.items() if tuple(value.shape) != stored[name].shape]
-        if mismatched:
-            raise ValueError(f"{mismatched[0]} has another shape than the network")
-        network.load_state_dict(
-            {name: torch.from_numpy(stored[name].copy()).to(value.dtype) for name, value in expected.items()}
-        )
+        yield
     except _DAMAGED as error:
         reason = shortened(str(error), 200) if type(error) is ValueError else type(error).__name__
         hint = "use a file that training/train.py has written, or an ONNX model (.onnx)"
         raise SettingError(Diagnostic(f"weights {quoted(str(path))} do not fit: {reason}", hint)) from error
-    return description, network
 
 
 _DAMAGED = (
@@ -104,6 +95,8 @@ _DAMAGED = (
 
 def _parse_description(data: dict[str, Any]) -> Description:
     anchors = data["anchors"]
+    if anchors is not None:
+        anchors = tuple(tuple((float(w), float(h)) for w, h in scale) for scale in anchors)
     width, height = (int(side) for side in data["input_size"])
     classes = tuple(str(name) for name in data["classes"])
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE and 1 <= len(classes) <= MAX_CLASSES):
@@ -111,6 +104,10 @@ def _parse_description(data: dict[str, Any]) -> Description:
     network, coarsest = str(data["network"]), STRIDES[-1]
     if network == "yolov5" and (width % coarsest or height % coarsest):
         raise ValueError(f"its input size is invalid (got {width} x {height}; expected multiples of {coarsest})")
+    if network not in ("yolov5", "ssd") or (network == "yolov5" and anchors is None):
+        raise ValueError("its description specifies no known network, or lacks anchors")
+    if anchors is not None and [len(scale) for scale in anchors] != [ANCHORS_PER_SCALE] * len(STRIDES):
+        raise ValueError(f"anchors: invalid number (expected {ANCHORS_PER_SCALE} on each of {len(STRIDES)} scales)")
     confidence = float(data.get("confidence", Description.confidence))
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"its confidence is invalid (got {confidence:g}; expected a number between 0 and 1)")
@@ -119,5 +116,5 @@ def _parse_description(data: dict[str, Any]) -> Description:
         classes=classes,
         input_size=(width, height),
         confidence=confidence,
-        anchors=None if anchors is None else tuple(tuple((w, h) for w, h in scale) for scale in anchors),
+        anchors=anchors,
     )

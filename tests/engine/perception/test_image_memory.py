@@ -21,8 +21,6 @@ from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.camera import CameraImage, Radiance
 from eidrive_scenario.world.render.renderer import ImageContent, Renderer
 
-pytest.importorskip("torch", reason="torch is not installed (pip install 'eidrive-scenario[learned]')")
-
 
 @pytest.fixture
 def memory() -> Iterator[ImageMemory]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 from collections.abc import Iterator
@@ -62,7 +61,6 @@ def readings() -> Iterator[Readings]:
 
 
 def create(kind: type[LearnedDetector], **settings: object) -> LearnedDetector:
-    pytest.importorskip("torch", reason="needs the extra 'learned'")
     detector = kind(LearnedSettings(**settings))  # type: ignore[arg-type]
     detector.setup(DetectorContext(car("Ego"), SENSORS))
     return detector
@@ -233,19 +231,12 @@ def test_misspelt_reports_only_similar_class_names() -> None:
 
 
 def test_build_network_with_file_without_weights_raises(tmp_path: Path) -> None:
-    pytest.importorskip("torch", reason="needs the extra 'learned'")
     garbled, other = tmp_path / "garbled.npz", tmp_path / "other.npz"
     garbled.write_bytes(b"not an archive")
     np.savez(other, numbers=np.arange(3))
     for path in (garbled, other):
         with pytest.raises(SettingError, match=r"do not fit: .*; use a file that training/train.py has written"):
             build_network("yolov5", LearnedSettings(weights=str(path)))
-
-
-def test_build_network_without_torch_raises_error_with_hint(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(SettingError, match=r"requires torch.*run: pip install eidrive-scenario\[learned\]"):
-        build_network("ssd", LearnedSettings())
 
 
 @pytest.mark.parametrize(
@@ -260,7 +251,6 @@ def test_build_network_without_torch_raises_error_with_hint(monkeypatch: pytest.
 def test_build_network_with_invalid_description_raises(
     changes: dict[str, object], diagnostic: str, tmp_path: Path
 ) -> None:
-    pytest.importorskip("torch", reason="needs the extra 'learned'")
     with np.load(SHIPPED / "yolov5.npz") as stored:
         arrays = dict(stored)
     arrays["description"] = np.array(json.dumps({**json.loads(str(arrays["description"])), **changes}))

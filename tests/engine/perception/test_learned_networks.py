@@ -6,21 +6,16 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
 
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES  # noqa: E402
+from eidrive_scenario.perception.learned.image_network import Candidates  # noqa: E402
 from eidrive_scenario.perception.learned.networks.blocks import fold  # noqa: E402
 from eidrive_scenario.perception.learned.networks.boxes import centered, complete_iou, corners, pairwise_iou  # noqa: E402
-from eidrive_scenario.perception.learned.networks.ssd import (  # noqa: E402
-    BOXES_PER_CELL,
-    STRIDES,
-    Ssd,
-    decode,
-    default_boxes,
-    encode,
-)
+from eidrive_scenario.perception.learned.networks.ssd import Ssd, decode, default_boxes, encode  # noqa: E402
 from eidrive_scenario.perception.learned.networks.ssd_loss import (  # noqa: E402
     BACKGROUND,
     UNLABELED,
@@ -28,10 +23,16 @@ from eidrive_scenario.perception.learned.networks.ssd_loss import (  # noqa: E40
     hardest,
     match,
 )
+from eidrive_scenario.perception.learned.networks.ssd_sizes import BOXES_PER_CELL, STRIDES  # noqa: E402
 from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets  # noqa: E402
 from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5  # noqa: E402
 from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss, assign  # noqa: E402
-from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates  # noqa: E402
+from eidrive_scenario.perception.learned.raw_outputs import (  # noqa: E402
+    ssd_candidates,
+    ssd_scales,
+    yolo_candidates,
+    yolo_scales,
+)
 
 ANCHORS = (
     ((8.0, 10.0), (18.0, 14.0), (12.0, 30.0)),
@@ -119,10 +120,10 @@ def test_yolo_assigned_cells_can_represent_box() -> None:
             raw[scale][0, anchor, line, column, :4] = torch.logit(shares)
             raw[scale][0, anchor, line, column, 4] = 20.0
             raw[scale][0, anchor, line, column, 5 + 2] = 20.0
-            boxes, scores, classes = yolo_candidates(network.anchors, raw, 0.5)
-            torch.testing.assert_close(boxes, corners(target.boxes[0]), atol=1e-3, rtol=0.0)
-            assert scores.item() == pytest.approx(1.0, abs=1e-6)
-            assert classes.item() == 2
+            candidates = yolo_candidates(network.anchors.numpy(), [output[0].numpy() for output in raw], 0.5)
+            np.testing.assert_allclose(candidates.boxes, corners(target.boxes[0]).numpy(), atol=1e-3)
+            assert candidates.scores.item() == pytest.approx(1.0, abs=1e-6)
+            assert candidates.classes.item() == 2
             decoded = network.decode(raw)[0]
             torch.testing.assert_close(decoded[decoded[:, 4] > 0.5][0, :4], target.boxes[0, 0], atol=1e-3, rtol=0.0)
     # Center 7.625, 5.625 in cells of 8: its cell and those to the right and below, for all anchors of similar size
@@ -202,14 +203,42 @@ def test_network_overfits_single_image_and_fold_preserves_outputs(name: str) -> 
         after = network(image)
         for first, second in zip(before, after, strict=True):
             torch.testing.assert_close(first, second, atol=2e-3, rtol=1e-3)
-        found = (
-            yolo_candidates(network.anchors, after, 0.05)
-            if isinstance(network, YoloV5)
-            else ssd_candidates(after, default_boxes(128, 256), 0.05)
-        )
-    boxes, scores, classes = found
+        arrays = [output[:1].numpy() for output in network.raw_outputs(image)]
+    found = (
+        yolo_candidates(network.anchors.numpy(), yolo_scales(arrays), 0.05)
+        if isinstance(network, YoloV5)
+        else ssd_candidates(ssd_scales(arrays), 0.05)
+    )
     for box, number in zip(corners(targets.boxes[0]), (0, 5), strict=True):
-        of_class = classes == number
+        of_class = found.classes == number
         assert of_class.any()
-        best = boxes[of_class][scores[of_class].argmax()]
+        best = torch.from_numpy(found.boxes[of_class][found.scores[of_class].argmax()]).float()
         assert pairwise_iou(best[None], box[None]).item() > 0.6
+
+
+def test_candidates_equal_boxes_that_networks_decode() -> None:
+    """All boxes from 0.3 on; the networks have random weights with large outputs."""
+    draws = torch.Generator().manual_seed(4)
+    detector = yolo().eval()
+    outputs = [3.0 * torch.randn(1, 48, 128 // s, 256 // s, generator=draws) for s in (8, 16, 32)]
+    shaped = [raw.view(1, 3, 16, *raw.shape[2:]).permute(0, 1, 3, 4, 2) for raw in outputs]
+    decoded = detector.decode(shaped)[0]
+    scores, numbers = (decoded[:, 4:5] * decoded[:, 5:]).max(dim=1)
+    found = yolo_candidates(detector.anchors.numpy(), yolo_scales([raw.numpy() for raw in outputs]), 0.3)
+    assert_candidates_equal(found, corners(decoded[:, :4]), scores, numbers)
+
+    outputs = [3.0 * torch.randn(1, 6 * each, 128 // s, 256 // s, generator=draws) for each in (4, 12) for s in STRIDES]
+    network = ssd().eval()
+    network.raw_outputs = lambda images: outputs  # type: ignore[method-assign]
+    boxes, probabilities = network.decode(network(torch.zeros(1)), default_boxes(128, 256))
+    scores, numbers = probabilities[0].max(dim=1)
+    found = ssd_candidates(ssd_scales([raw.numpy() for raw in outputs]), 0.3)
+    assert_candidates_equal(found, boxes[0], scores, numbers)
+
+
+def assert_candidates_equal(found: Candidates, boxes: Any, scores: Any, numbers: Any) -> None:
+    confident = scores >= 0.3
+    assert 100 < len(found.scores) == int(confident.sum())
+    np.testing.assert_allclose(found.boxes, boxes[confident].numpy(), rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(found.scores, scores[confident].numpy(), rtol=1e-5)
+    np.testing.assert_array_equal(found.classes, numbers[confident].numpy())

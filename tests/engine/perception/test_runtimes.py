@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.perception.learned import runtimes
+from eidrive_scenario.perception.learned import runtime_selection
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
-from eidrive_scenario.perception.learned.runtimes import load_network, runtime_versions
+from eidrive_scenario.perception.learned.runtime_selection import runtime_versions, select_runtime
+from eidrive_scenario.perception.learned.runtimes import Compute, load_onnx
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 RED_BOXES = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
@@ -28,8 +29,13 @@ ROW = [20.0, 30.0, 8.0, 6.0, 1.0, 0.1, 0.9]
 @pytest.fixture
 def without_onnxruntime(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let ONNX Runtime appear not to be installed."""
-    installed = runtimes._is_installed
-    monkeypatch.setattr(runtimes, "_is_installed", lambda module: module != "onnxruntime" and installed(module))
+    installed = runtime_selection.is_installed
+    monkeypatch.setattr(runtime_selection, "is_installed", lambda module: module != "onnxruntime" and installed(module))
+
+
+def load_network(path: Path, threads: int) -> Compute:
+    """Return the function of an ONNX model by the fastest runtime that is installed."""
+    return load_onnx(select_runtime(path), path, threads)
 
 
 def noise() -> NDArray[np.float32]:
@@ -69,8 +75,8 @@ def save_model(path: Path, nodes: list[Any], tensors: list[Any], inputs: tuple[s
 
 def test_onnxruntime_and_opencv_return_equal_outputs() -> None:
     pytest.importorskip("onnxruntime", reason="needs the extra 'onnx'")
-    (first,) = runtimes.onnxruntime_network(RED_BOXES, 1)(noise())
-    (second,) = runtimes.opencv_network(RED_BOXES, 1)(noise())
+    (first,) = load_onnx("onnxruntime", RED_BOXES, 1)(noise())
+    (second,) = load_onnx("opencv", RED_BOXES, 1)(noise())
     assert first.shape == (1, 96, 7)
     assert first.dtype == np.float32
     np.testing.assert_allclose(first, second, atol=1e-5)
@@ -79,7 +85,7 @@ def test_onnxruntime_and_opencv_return_equal_outputs() -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 def test_onnxruntime_same_image_returns_same_bits(threads: int) -> None:
     pytest.importorskip("onnxruntime", reason="needs the extra 'onnx'")
-    outputs = [runtimes.onnxruntime_network(RED_BOXES, threads)(noise())[0].tobytes() for _ in range(3)]
+    outputs = [load_onnx("onnxruntime", RED_BOXES, threads)(noise())[0].tobytes() for _ in range(3)]
     assert len(set(outputs)) == 1
 
 
@@ -157,12 +163,12 @@ def test_onnxruntime_model_with_two_inputs_is_refused(tmp_path: Path) -> None:
 
 def test_runtime_versions_of_onnx_weights_name_installed_runtime() -> None:
     pytest.importorskip("onnxruntime", reason="needs the extra 'onnx'")
-    assert runtime_versions(RED_BOXES) == {"onnxruntime": importlib.metadata.version("onnxruntime")}
+    assert runtime_versions(select_runtime(RED_BOXES)) == {"onnxruntime": importlib.metadata.version("onnxruntime")}
 
 
 @pytest.mark.usefixtures("without_onnxruntime")
 def test_runtime_versions_without_onnxruntime_name_opencv() -> None:
-    assert runtime_versions(RED_BOXES) == {"opencv": cv2.__version__}
+    assert runtime_versions(select_runtime(RED_BOXES)) == {"opencv": cv2.__version__}
 
 
 def test_resolved_settings_with_onnx_weights_state_runtime(tmp_path: Path) -> None:
@@ -174,7 +180,7 @@ def test_resolved_settings_with_onnx_weights_state_runtime(tmp_path: Path) -> No
     external = f'<Property name="detector" value="yolov5"/><Property name="detector_settings" value="{settings}"/>'
     path = tmp_path / "scenario.xosc"
     path.write_text(text.replace(oracle, external, 1))
-    assert resolved_versions(path).items() >= runtime_versions(RED_BOXES).items()
+    assert resolved_versions(path).items() >= runtime_versions(select_runtime(RED_BOXES)).items()
     assert not set(resolved_versions(original)) & {"onnxruntime", "opencv", "torch"}
 
 

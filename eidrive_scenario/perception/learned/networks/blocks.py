@@ -55,10 +55,12 @@ class FastConvolution(nn.Module):
         )
 
 
-def fold(network: nn.Module) -> None:
+def fold(network: nn.Module, *, fast_convolutions: bool = True) -> None:
     """Prepare the network for inference: fold normalizations into convolutions, and use the fastest convolutions.
 
     The network cannot be trained afterwards.
+
+    fast_convolutions  whether to use the fastest convolutions of a CPU, which no GPU supports
     """
     network.eval()
     network.requires_grad_(False)
@@ -66,7 +68,7 @@ def fold(network: nn.Module) -> None:
         if isinstance(module, ConvUnit):
             module.fold()
     network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    if torch.backends.mkldnn.is_available():  # type: ignore[no-untyped-call]
+    if fast_convolutions and torch.backends.mkldnn.is_available():  # type: ignore[no-untyped-call]
         _use_fast_convolutions(network)
 
 

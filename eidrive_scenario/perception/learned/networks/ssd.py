@@ -13,15 +13,17 @@ from torch import Tensor, nn
 
 from eidrive_scenario.perception.learned.networks.blocks import ConvUnit, SeparableUnit
 from eidrive_scenario.perception.learned.networks.boxes import corners
-
-STRIDES = (8, 16, 32, 64, 128)
-SIDES = (14.0, 34.0, 76.0, 150.0, 270.0, 420.0)
-"""Side of the square default box at each stride, and of one beyond the last [px of the network input]."""
-ASPECTS = (1.0, 2.0, 3.0, 0.5, 1.0 / 3.0)
-BOXES_PER_CELL = len(ASPECTS) + 1
-"""One box of each aspect ratio, and a square one between the sides of this and the next stride."""
-VARIANCES = (0.1, 0.2)
-"""Scale of encoded centers and sizes, as in the code of the paper."""
+from eidrive_scenario.perception.learned.networks.ssd_sizes import (
+    ASPECTS,
+    BOXES_PER_CELL,
+    COARSE,
+    FINE,
+    MAX_LOG_SIZE,
+    MIDDLE,
+    SIDES,
+    STRIDES,
+    VARIANCES,
+)
 
 
 class Ssd(nn.Module):
@@ -34,37 +36,45 @@ class Ssd(nn.Module):
     def __init__(self, classes: int) -> None:
         super().__init__()
         self.classes = classes
-        self.fine = nn.Sequential(
-            ConvUnit(3, 16, 3, 2),
-            SeparableUnit(16, 32),
-            SeparableUnit(32, 64, 2),
-            SeparableUnit(64, 64),
-            SeparableUnit(64, 128, 2),
-            *(SeparableUnit(128, 128) for _ in range(3)),
-        )
-        self.middle = nn.Sequential(SeparableUnit(128, 256, 2), *(SeparableUnit(256, 256) for _ in range(3)))
-        self.coarse = nn.Sequential(SeparableUnit(256, 384, 2), *(SeparableUnit(384, 384) for _ in range(2)))
+        self.fine = nn.Sequential(ConvUnit(3, 16, 3, 2), *_separable_units(16, FINE))
+        self.middle = nn.Sequential(*_separable_units(FINE[-1][0], MIDDLE))
+        self.coarse = nn.Sequential(*_separable_units(MIDDLE[-1][0], COARSE))
         self.extra = nn.Sequential(ConvUnit(384, 128), SeparableUnit(128, 256, 2))
         self.last = nn.Sequential(ConvUnit(256, 96), SeparableUnit(96, 192, 2))
-        widths = (128, 256, 384, 256, 192)
+        widths = (FINE[-1][0], MIDDLE[-1][0], COARSE[-1][0], 256, 192)
         self.box_heads = nn.ModuleList(_head(width, 4) for width in widths)
         self.class_heads = nn.ModuleList(_head(width, 1 + classes) for width in widths)
 
-    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
+    def raw_outputs(self, images: Tensor) -> list[Tensor]:
+        """Return the outputs (B, 6 K, H/s, W/s) of the heads of each scale as the ONNX model does, first of boxes."""
         features = [self.fine(images)]
         for stage in (self.middle, self.coarse, self.extra, self.last):
             features.append(stage(features[-1]))
-        encoded, logits = [], []
-        for box_head, class_head, level in zip(self.box_heads, self.class_heads, features, strict=True):
-            batch = level.shape[0]
-            encoded.append(box_head(level).permute(0, 2, 3, 1).reshape(batch, -1, 4))
-            logits.append(class_head(level).permute(0, 2, 3, 1).reshape(batch, -1, 1 + self.classes))
-        return torch.cat(encoded, dim=1), torch.cat(logits, dim=1)
+        heads = (*self.box_heads, *self.class_heads)
+        return [head(level) for head, level in zip(heads, (*features, *features), strict=True)]
+
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        outputs = self.raw_outputs(images)
+        encoded, logits = outputs[: len(STRIDES)], outputs[len(STRIDES) :]
+        return _rows(encoded, 4), _rows(logits, 1 + self.classes)
 
     def decode(self, outputs: tuple[Tensor, Tensor], defaults: Tensor) -> tuple[Tensor, Tensor]:
         """Return boxes (B, N, 4) x1 y1 x2 y2 [px] and class probabilities (B, N, C) without background."""
         encoded, logits = outputs
         return corners(decode(encoded, defaults)), logits.softmax(dim=-1)[..., 1:]
+
+
+def _separable_units(inputs: int, units: tuple[tuple[int, int], ...]) -> list[SeparableUnit]:
+    """Return units with these output channels and strides."""
+    widths = (inputs, *(outputs for outputs, _ in units))
+    return [
+        SeparableUnit(before, outputs, stride) for before, (outputs, stride) in zip(widths[:-1], units, strict=True)
+    ]
+
+
+def _rows(outputs: list[Tensor], each: int) -> Tensor:
+    """Return outputs (B, 6 K, H/s, W/s) of all scales as one table (B, N, K)."""
+    return torch.cat([raw.permute(0, 2, 3, 1).reshape(len(raw), -1, each) for raw in outputs], dim=1)
 
 
 def _head(inputs: int, each: int) -> nn.Module:
@@ -98,5 +108,5 @@ def encode(boxes: Tensor, defaults: Tensor) -> Tensor:
 def decode(encoded: Tensor, defaults: Tensor) -> Tensor:
     """Return boxes (…, N, 4) in center form: the inverse of `encode`."""
     center = encoded[..., :2] * VARIANCES[0] * defaults[..., 2:] + defaults[..., :2]
-    size = torch.exp((encoded[..., 2:] * VARIANCES[1]).clamp(max=8.0)) * defaults[..., 2:]
+    size = torch.exp((encoded[..., 2:] * VARIANCES[1]).clamp(max=MAX_LOG_SIZE)) * defaults[..., 2:]
     return torch.cat([center, size], dim=-1)

@@ -12,15 +12,13 @@ import torch
 from torch import Tensor, nn
 
 from eidrive_scenario.perception.learned.networks.blocks import ConvUnit, CrossStage, PyramidPooling
-
-STRIDES = (8, 16, 32)
-ANCHORS_PER_SCALE = 3
-WIDTHS = (16, 32, 64, 128, 256)
-"""Channels at strides 2, 4, 8, 16, 32: a quarter of the large network."""
-DEPTHS = (1, 2, 3, 1)
-"""Bottlenecks at strides 4, 8, 16, 32: a third of the large network."""
-
-Anchors = tuple[tuple[tuple[float, float], ...], ...]
+from eidrive_scenario.perception.learned.networks.yolov5_sizes import (
+    ANCHORS_PER_SCALE,
+    DEPTHS,
+    STRIDES,
+    WIDTHS,
+    Anchors,
+)
 
 
 class YoloV5(nn.Module):
@@ -61,7 +59,8 @@ class YoloV5(nn.Module):
         self.heads = nn.ModuleList(nn.Conv2d(width, ANCHORS_PER_SCALE * (5 + classes), 1) for width in (w3, w4, w5))
         self._initialize_biases()
 
-    def forward(self, images: Tensor) -> list[Tensor]:
+    def raw_outputs(self, images: Tensor) -> list[Tensor]:
+        """Return the outputs (B, A (5 + C), H/s, W/s) of the heads of each scale, as the ONNX model does."""
         fine = self.fine(images)
         middle = self.middle(fine)
         coarse = self.lateral_coarse(self.coarse(middle))
@@ -69,14 +68,13 @@ class YoloV5(nn.Module):
         fine = self.merge_fine(torch.cat([self.up(middle), fine], dim=1))
         middle = self.out_middle(torch.cat([self.down_fine(fine), middle], dim=1))
         coarse = self.out_coarse(torch.cat([self.down_middle(middle), coarse], dim=1))
-        outputs = []
-        for head, features in zip(self.heads, (fine, middle, coarse), strict=True):
-            raw: Tensor = head(features)
-            batch, _, height, width = raw.shape
-            outputs.append(
-                raw.view(batch, ANCHORS_PER_SCALE, 5 + self.classes, height, width).permute(0, 1, 3, 4, 2).contiguous()
-            )
-        return outputs
+        return [head(features) for head, features in zip(self.heads, (fine, middle, coarse), strict=True)]
+
+    def forward(self, images: Tensor) -> list[Tensor]:
+        return [
+            raw.view(len(raw), ANCHORS_PER_SCALE, 5 + self.classes, *raw.shape[2:]).permute(0, 1, 3, 4, 2).contiguous()
+            for raw in self.raw_outputs(images)
+        ]
 
     def decode(self, outputs: list[Tensor]) -> Tensor:
         """Return (B, N, 5 + C): cx cy w h [px], objectness, probability of each class."""

@@ -10,7 +10,8 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 
 from eidrive_scenario.perception.learned.networks.boxes import complete_iou
 from eidrive_scenario.perception.learned.networks.targets import Targets
-from eidrive_scenario.perception.learned.networks.yolov5 import ANCHORS_PER_SCALE, STRIDES, YoloV5, cell_corners
+from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5, cell_corners
+from eidrive_scenario.perception.learned.networks.yolov5_sizes import ANCHORS_PER_SCALE, STRIDES
 
 LARGEST_RATIO = 4.0
 """Maximum ratio between the sides of an anchor and of its object: decoded sizes are at most (2·1)² = 4 times the

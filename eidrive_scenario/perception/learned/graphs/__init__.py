@@ -1,0 +1,1 @@
+"""ONNX models of the networks `yolov5` and `ssd`, made from their weights without torch."""
