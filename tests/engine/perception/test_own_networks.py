@@ -201,20 +201,6 @@ def test_resolved_settings_of_run_name_runtime_and_version(runtime: Runtime, tmp
     assert json.dumps(runtime) in resolved.canonical
 
 
-def test_runs_by_one_runtime_have_equal_traces(tmp_path: Path) -> None:
-    """Both runs load the network again."""
-    need("onnxruntime")
-    from eidrive_scenario.perception.learned.own_network import _loaded
-
-    hashes = []
-    for _ in range(2):
-        _loaded.cache_clear()
-        source = load_for_seed(resolve_scenario("coop/scenario_1"), 1, {})
-        settings = RunSettings(detector="yolov5", time_limit=0.4)
-        hashes.append(Simulation(source, seed=1, settings=settings).run().trace_hash)
-    assert hashes[0] == hashes[1]
-
-
 def test_openvino_writes_nothing_into_home_directory(tmp_path: Path) -> None:
     """Its model converter writes an identifier there at import, and sends an event."""
     need("openvino")
