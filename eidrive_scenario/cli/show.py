@@ -201,8 +201,11 @@ def report(
         Path | None,
         typer.Option("--out", "-o", help="Folder of report.html, or a file.", show_default="the first folder of runs"),
     ] = None,
+    replays: Annotated[
+        bool, typer.Option("--replays/--no-replays", help="Write the replay of each run with a recording, too.")
+    ] = True,
 ) -> None:
-    """Write an HTML report of many runs.
+    """Write an HTML report of many runs, with a replay of each.
 
     Example: eidrive report reports --out reports/report.html
 
@@ -226,4 +229,10 @@ def report(
         raise SettingError(errors or missing)
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
+    if replays:
+        from eidrive_scenario.reporting.replay.run_replays import write_replays
+
+        results, without = write_replays(results, out.parent if out.suffix == ".html" else out)
+        for line in without:
+            typer.secho(f"warning: {line}, the run has no replay", fg="yellow", err=True)
     typer.echo(str(write_report(results, out, omitted=omitted)))

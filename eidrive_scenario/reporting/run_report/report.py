@@ -14,6 +14,7 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.experiments.statistics.samples import Summary, summarize
 from eidrive_scenario.reporting.page import write_page
+from eidrive_scenario.reporting.run_report.matrix import parameter_matrix, scenario_matrix
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
@@ -60,12 +61,15 @@ def write_report(results: Iterable[Mapping[str, Any] | ReportedRun], out: Path, 
                 "runs": group.runs,
                 "copies": len(group.runs) - len(group.distinct),
                 "varied": _varied(group.runs),
+                "matrix": parameter_matrix(group.distinct, _varied(group.runs)),
                 "share": wilson(sum(run.passed for run in group.distinct), len(group.distinct)),
                 "summaries": [_summary(group.distinct, name) for name in metrics],
             }
             for index, group in enumerate(groups)
         ],
+        matrix=scenario_matrix(groups),
         number=_number,
+        has_replays=any(run.replay for run in runs),
         has_settings=any(run.settings_sha256 for run in runs),
         all_settings=lambda run: json.dumps(run.settings, indent=1, ensure_ascii=False),
         omitted=omitted,

@@ -12,6 +12,9 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.run_files import read_result
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
+_OF_REPORT = ("folder", "replay")
+"""Fields that are no part of a result."""
+
 
 class ReportedCriterion(BaseModel):
     """Verdict in the format of `--json`."""
@@ -45,6 +48,10 @@ class ReportedRun(BaseModel):
     settings: dict[str, Any] = {}
     settings_sha256: str = ""
     command: str = ""
+    folder: Path | None = None
+    """Folder of the run; None if the result was not read from a file."""
+    replay: str = ""
+    """Address of the replay in the report; empty without one."""
 
     @property
     def finished(self) -> bool:
@@ -58,7 +65,7 @@ def read_runs(paths: Iterable[Path]) -> tuple[list[ReportedRun], list[Diagnostic
     errors: list[Diagnostic] = []
     for path in paths:
         try:
-            runs.append(parse_run(read_result(path), path))
+            runs.append(parse_run(read_result(path), path).model_copy(update={"folder": path.parent}))
         except InputError as error:
             errors += error.diagnostics
     return runs, errors
@@ -69,8 +76,10 @@ def parse_run(result: Mapping[str, Any] | ReportedRun, source: str | Path = "") 
 
     A validated run is returned unchanged. Raise InputError if the object is invalid.
     """
+    if isinstance(result, ReportedRun):
+        return result
     try:
-        return ReportedRun.model_validate(result)
+        return ReportedRun.model_validate({key: value for key, value in result.items() if key not in _OF_REPORT})
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"])

@@ -127,4 +127,4 @@ def test_style_defines_all_colors_for_both_schemes() -> None:
     pages = [rest, *(path.read_text(encoding="utf-8") for path in templates.glob("*.jinja"))]
     fixed = re.compile(r"(?:color|background|border)[^;:}]*:[^;}]*#[0-9a-f]{3}")
     assert not [found for page in pages for found in fixed.findall(page)]
-    assert {name for page in pages for name in re.findall(r"var\((--\w+)", page)} <= {*named[0], "--arm"}
+    assert {name for page in pages for name in re.findall(r"var\((--\w+)", page)} <= {*named[0], "--arm", "--share"}

@@ -1,0 +1,118 @@
+"""Matrices of success rates, and replays of the runs of a report."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lxml import html
+
+from eidrive_scenario.recording import Recorder
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.replay.run_replays import write_replays
+from eidrive_scenario.reporting.run_report.matrix import parameter_matrix, scenario_matrix
+from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run, read_runs
+from eidrive_scenario.reporting.run_report.run_groups import group_runs
+
+Play = Callable[..., list[Frame]]
+
+
+def run(scenario: str, channel: str, seed: int, passed: bool, **parameters: str) -> ReportedRun:
+    result: dict[str, Any] = {
+        "scenario": scenario,
+        "seed": seed,
+        "channel": channel,
+        "passed": passed,
+        "end_reason": "stop trigger",
+        "parameters": parameters,
+        "trace_hash": f"{seed}",
+        "run": seed if parameters else None,
+    }
+    return parse_run(result)
+
+
+def stored_run(folder: Path, name: str, frames: list[Frame] | None) -> Path:
+    """Write the files of a run; without frames it has no recording."""
+    (folder / name).mkdir()
+    result = {"scenario": "street", "seed": 1, "channel": "ideal", "passed": True, "end_reason": "stop trigger"}
+    (folder / name / "result.json").write_text(json.dumps({**result, "criteria": [], "trace_hash": "0"}))
+    if frames is not None:
+        recorder = Recorder(folder / name / "recording.mcap", metadata={"scenario": "street", "seed": "1"})
+        for frame in frames:
+            recorder.observe(frame)
+        recorder.close()
+    return folder / name / "result.json"
+
+
+def test_scenario_matrix_has_rate_per_scenario_and_channel() -> None:
+    runs = [run("a", "ideal", seed, True) for seed in range(3)]
+    runs += [run("a", "lossy", seed, seed == 0) for seed in range(4)]
+    runs += [run("b", "ideal", seed, False) for seed in range(2)]
+    matrix = scenario_matrix(group_runs(runs))
+    assert matrix is not None
+    assert matrix.columns == ("ideal", "lossy")
+    rates = {name: [cell and (cell.successes, cell.trials) for cell in cells] for name, cells in matrix.rows}
+    assert rates == {"a": [(3, 3), (1, 4)], "b": [(0, 2), None]}
+
+
+def test_single_scenario_or_channel_has_no_matrix() -> None:
+    assert scenario_matrix(group_runs([run("a", "ideal", 1, True), run("a", "lossy", 1, True)])) is None
+    assert scenario_matrix(group_runs([run("a", "ideal", 1, True), run("b", "ideal", 1, True)])) is None
+
+
+def test_parameter_matrix_sorts_values_as_numbers() -> None:
+    runs = [
+        run("a", "ideal", index, speed == "2", Speed=speed, Gap=gap)
+        for index, (speed, gap) in enumerate(
+            (speed, gap) for speed in ("10", "2") for gap in ("1.5", "0.5") for _ in range(3)
+        )
+    ]
+    matrix = parameter_matrix(runs, ("Speed", "Gap"))
+    assert matrix is not None
+    assert matrix.columns == ("2", "10")
+    assert [name for name, _ in matrix.rows] == ["0.5", "1.5"]
+    assert [[cell and cell.share for cell in cells] for _, cells in matrix.rows] == [[1.0, 0.0], [1.0, 0.0]]
+
+
+def test_drawn_parameters_have_no_matrix() -> None:
+    runs = [run("a", "ideal", index, True, Speed=str(index + 0.5)) for index in range(6)]
+    assert parameter_matrix(runs, ("Speed",)) is None
+    assert parameter_matrix(runs, ("Speed", "Gap", "Mass")) is None
+
+
+def test_report_links_replay_of_each_recorded_run(street: Play, tmp_path: Path) -> None:
+    files = [stored_run(tmp_path, "a run", street(1)[:5]), stored_run(tmp_path, "bare", None)]
+    runs, errors = read_runs(files)
+    assert not errors
+    linked, omitted = write_replays(runs, tmp_path / "out")
+    assert not omitted
+    page = html.fromstring(write_report(linked, tmp_path / "out").read_text(encoding="utf-8"))
+    links = [str(link.get("href")) for link in page.iterfind(".//td/a") if not str(link.get("href")).startswith("#")]
+    assert links == ["replays/a%20run.html"]
+    assert (tmp_path / "out" / "replays" / "a run.html").is_file()
+
+
+def test_runs_of_equal_names_have_replays_of_their_own(street: Play, tmp_path: Path) -> None:
+    (tmp_path / "x").mkdir()
+    (tmp_path / "y").mkdir()
+    files = [stored_run(tmp_path / part, "run", street(1)[:3]) for part in ("x", "y")]
+    linked, _ = write_replays(read_runs(files)[0], tmp_path / "out")
+    assert len({entry.replay for entry in linked}) == 2
+
+
+def test_damaged_recording_is_reported_without_replay(tmp_path: Path) -> None:
+    file = stored_run(tmp_path, "run", [])
+    linked, omitted = write_replays(read_runs([file])[0], tmp_path / "out")
+    assert [entry.replay for entry in linked] == [""]
+    assert len(omitted) == 1
+    assert "no readable frame" in omitted[0]
+
+
+@pytest.mark.parametrize("field", ["folder", "replay"])
+def test_result_cannot_set_fields_of_the_report(field: str) -> None:
+    entry = parse_run({**run("a", "ideal", 1, True).model_dump(), field: "javascript:alert(1)"})
+    assert not getattr(entry, field)
