@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet clean
+.PHONY: help install demo test lint reproduce docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -76,6 +76,12 @@ corner-cases: install  ## run the corner cases with and without messages, 10 see
 
 weather-sheet: install  ## render one street in all weather presets: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet
+
+pages: install  ## open a report and replays in EIDRIVE_BROWSER, with axe-playwright-python: pictures in reports/pages
+	@test -n "$$EIDRIVE_BROWSER" || { echo 'EIDRIVE_BROWSER is not set: the program of Chromium'; exit 2; }
+	$(BIN)/python -m pip install axe-playwright-python
+	mkdir -p reports/pages
+	EIDRIVE_SCREENSHOTS=reports/pages $(BIN)/python -m pytest tests/engine/cli/test_pages_in_browser.py
 
 clean:          ## remove the virtual environment and all generated files
 	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

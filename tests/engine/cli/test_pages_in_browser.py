@@ -1,0 +1,154 @@
+"""Replay and report in Chromium, opened from disk.
+
+EIDRIVE_BROWSER names the program, for example /usr/bin/chromium; axe-playwright-python is required, too.
+EIDRIVE_SCREENSHOTS names a folder for pictures of the pages.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_fixtures import Eidrive
+
+BROWSER = os.environ.get("EIDRIVE_BROWSER")
+SCREENSHOTS = os.environ.get("EIDRIVE_SCREENSHOTS")
+WIDTHS = {"phone": 390, "desktop": 1440}
+SERIOUS = ("serious", "critical")
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="EIDRIVE_BROWSER is not set")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    pytest.importorskip("axe_playwright_python")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def report(eidrive: Eidrive, tmp_path: Path) -> Path:
+    """Report of two runs with an RSU and a lossy channel, beside their replays."""
+    for channel in ("ideal", "error_30pct"):
+        done = eidrive(
+            "run", "coop/scenario_1", "--detector", "oracle", "--channel", channel, "--out", f"{tmp_path}/runs"
+        )
+        assert done.exit_code == 0, done.output
+    done = eidrive("report", f"{tmp_path}/runs", "--out", f"{tmp_path}/report")
+    assert done.exit_code == 0, done.output
+    return tmp_path / "report" / "report.html"
+
+
+class Page:
+    """Page of a browser with the messages of its console and its requests other than to files."""
+
+    def __init__(self, browser: Any, file: Path, width: int, *, dark: bool = False, address: str = "") -> None:
+        scheme = "dark" if dark else "light"
+        self._context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        self.page = self._context.new_page()
+        self.faults: list[str] = []
+        self.page.on("console", lambda message: self._note(message.type in ("error", "warning"), message.text))
+        self.page.on("pageerror", lambda error: self._note(True, str(error)))
+        self.page.on("request", lambda request: self._note(not request.url.startswith(("file:", "data:")), request.url))
+        self.page.goto(file.as_uri() + address)
+
+    def _note(self, is_fault: bool, text: str) -> None:
+        if is_fault:
+            self.faults.append(text)
+
+    def time(self) -> float:
+        """Return the shown instant [s]."""
+        return float(self.page.inner_text("#clock").removesuffix(" s"))
+
+    def wide(self) -> bool:
+        """Return whether the page is wider than its window."""
+        return bool(self.page.evaluate("document.documentElement.scrollWidth > window.innerWidth"))
+
+    def close(self, name: str) -> None:
+        """Check for faults and accessibility, and store a picture."""
+        from axe_playwright_python.sync_playwright import Axe
+
+        found = Axe().run(self.page).response["violations"]
+        assert not [fault["id"] for fault in found if fault["impact"] in SERIOUS]
+        if SCREENSHOTS:
+            self.page.screenshot(path=f"{SCREENSHOTS}/{name}.png", full_page=True)
+        self._context.close()
+        assert not self.faults
+
+
+def replay_of(report: Path, channel: str) -> Path:
+    (found,) = (report.parent / "replays").glob(f"*{channel}*.html")
+    return found
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("size", WIDTHS)
+def test_pages_are_accessible_and_fit_the_window(browser: Any, report: Path, size: str, dark: bool) -> None:
+    scheme = "dark" if dark else "light"
+    for name, file in (("report", report), ("replay", replay_of(report, "error_30pct"))):
+        page = Page(browser, file, WIDTHS[size], dark=dark)
+        assert not page.wide(), name
+        page.close(f"{name}-{size}-{scheme}")
+
+
+def test_replay_opens_at_decisive_instant_and_plays_on(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 1440)
+    decisive = float(page.page.inner_text("#decisive").split()[-2])
+    assert page.time() == decisive
+    page.page.click("#play")
+    page.page.wait_for_function(f"shown.time > {decisive} + 0.5")
+    page.page.keyboard.press("Escape")
+    page.page.click("#play")
+    stopped = page.time()
+    page.page.wait_for_timeout(200)
+    assert page.time() == stopped
+    assert f"#t={stopped:g}" in page.page.url
+    page.close("replay-played")
+
+
+def test_replay_is_controlled_by_keyboard(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 1440, address="#t=3")
+    keys = page.page.keyboard
+    assert page.time() == 3.0
+    keys.press("ArrowRight")
+    assert page.time() == pytest.approx(3.05)
+    keys.press("Shift+ArrowLeft")
+    assert page.time() == pytest.approx(2.05)
+    keys.press("Home")
+    assert page.time() == 0.0
+    for key, view in (("2", "follow"), ("3", "third"), ("4", "driver"), ("1", "top")):
+        keys.press(key)
+        assert page.page.input_value("#view") == view
+    page.close("replay-keyboard")
+
+
+def test_slider_layers_and_links_of_replay_change_the_picture(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 1440, address="#t=3.9")
+    picture = "document.getElementById('street').toDataURL()"
+    before = page.page.evaluate(picture)
+    page.page.get_by_label("received from RSU").uncheck()
+    assert page.page.evaluate(picture) != before
+    page.page.get_by_label("received from RSU").check()
+    assert page.page.evaluate(picture) == before
+    page.page.locator("#slider").fill("20")
+    assert page.time() == pytest.approx(1.0)
+    page.page.evaluate("location.hash = '#t=4.5'")
+    page.page.wait_for_function("shown.time === 4.5")
+    page.page.locator("#changes button").first.click()
+    assert page.time() == 0.0
+    page.close("replay-controls")
+
+
+def test_report_links_to_replay_of_a_run(browser: Any, report: Path) -> None:
+    page = Page(browser, report, 1440)
+    page.page.get_by_role("link", name="replay").first.click()
+    page.page.wait_for_function("typeof shown !== 'undefined'")
+    assert "/replays/" in page.page.url
+    page.close("replay-from-report")
