@@ -234,5 +234,5 @@ def report(
 
         results, without = write_replays(results, out.parent if out.suffix == ".html" else out)
         for line in without:
-            typer.secho(f"warning: {line}, the run has no replay", fg="yellow", err=True)
+            typer.secho(f"warning: {line}", fg="yellow", err=True)
     typer.echo(str(write_report(results, out, omitted=omitted)))

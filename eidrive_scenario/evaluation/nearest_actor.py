@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from eidrive_scenario.arrays import Bools
 from eidrive_scenario.evaluation.swept_boxes import time_to_contact
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.view import WorldView
@@ -15,17 +16,21 @@ from eidrive_scenario.world.view import WorldView
 def nearest_body(view: WorldView, name: str) -> tuple[float, str]:
     """Return the distance between the boxes of an actor and of the nearest other one [m], and its name.
 
-    Infinite and an empty name if the actor is alone.
+    Infinite and an empty name if the actor is alone. Boxes that are not finite are ignored.
     """
     own, boxes = view.row(name), view.boxes
+    finite: Bools = np.logical_and.reduce(np.isfinite(boxes), axis=1)
+    if not finite[own]:
+        return math.inf, ""
+    boxes = np.where(finite[:, None], boxes, boxes[own])
     centers = np.hypot(boxes[:, 0] - boxes[own, 0], boxes[:, 1] - boxes[own, 1])
     least = centers - np.hypot(boxes[:, 3], boxes[:, 4]) / 2.0
-    least[own] = math.inf
+    least[~finite] = least[own] = math.inf
     box, best, nearest = boxes[own], math.inf, ""
     # The circles around boxes give a lower bound of their distance.
     reach = _radius(box)
     for row in np.argsort(least, kind="stable").tolist():
-        if row == own or least[row] - reach >= best:
+        if least[row] - reach >= best:
             break
         gap = box_distance(box, boxes[row])
         if gap < best:

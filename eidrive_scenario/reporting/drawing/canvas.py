@@ -37,6 +37,8 @@ STROKE = 3.0
 """Length of the strokes and gaps of a broken road mark [m]."""
 FAR = 30_000
 """Maximum distance of a drawn point from the image [pixels]; OpenCV overflows beyond."""
+_LONGEST = 200
+"""Maximum number of characters of a label."""
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 Points = Array | Sequence[Sequence[float]]
@@ -122,7 +124,12 @@ class Canvas:
         self.line(points, color, 0.0)
 
     def label(self, text: str, left: int, base: int, size: float = 0.45, color: str = TRUTH) -> None:
-        """Write a text with a light outline at a position [pixels]."""
+        """Write a text with a light outline at a position [pixels]; nothing outside of the image."""
+        height, width = self.image.shape[:2]
+        if not (-width < left < width and 0 <= base < 2 * height):
+            return  # OpenCV crashes far away
+        # The fonts of OpenCV have no other characters.
+        text = "".join([letter if " " <= letter <= "~" else "?" for letter in text[:_LONGEST]])
         cv2.putText(self.image, text, (left, base), FONT, size, _bgr(WHITE), 3, cv2.LINE_AA)
         cv2.putText(self.image, text, (left, base), FONT, size, _bgr(color), 1, cv2.LINE_AA)
 

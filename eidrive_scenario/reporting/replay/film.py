@@ -20,6 +20,7 @@ from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.drawing.canvas import Image
 from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
+from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, describe_error
 from eidrive_scenario.reporting.replay.page import readable_roads, run_settings, station_settings
 from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
 from eidrive_scenario.reporting.run_report.settings_text import shorten
@@ -63,7 +64,10 @@ class RecordedStation:
             actors.update(dict.fromkeys(frame.view.names))
             stations.update(dict.fromkeys(frame.steps))
             driven.update(dict.fromkeys(key for key, step in frame.steps.items() if step.control is not None))
-            series.observe(frame)
+            try:
+                series.observe(frame)
+            except UNDRAWABLE as error:
+                report.add("frames cannot be drawn", f"tick {frame.view.tick}: {describe_error(error)}")
         if not self.times or not actors:
             reason = "; ".join(report.lines()) or "record the run again"
             raise InputError(Diagnostic("the recording shows no actor", reason, str(recording.path)))
@@ -80,11 +84,16 @@ class RecordedStation:
         """Yield the snapshot of each frame."""
         builder = SnapshotBuilder(self.name, self._settings.get(self.name, DEFAULT_SETTINGS))
         for frame in self._recording.frames(lambda reason: None):
-            yield builder.observe(frame)
+            try:
+                snapshot = builder.observe(frame)
+            except UNDRAWABLE:
+                continue
+            yield snapshot
 
     def pictures(self, size: tuple[int, int], rate: float | None = None, until: float = math.inf) -> Iterator[Image]:
         """Yield the pictures of the frames, or of `rate` instants per second, up to a time [s]."""
         center = (0.0, 0.0)
+        picture: Image | None = None
         shown = 0
         for snapshot in self.snapshots():
             if snapshot.time > until + TIME_TOLERANCE:
@@ -94,9 +103,10 @@ class RecordedStation:
                 center = (x, y) if math.isfinite(x + y) else center
             due = 1 if rate is None else math.floor((snapshot.time - self.times[0]) * rate + 1e-6) + 1 - shown
             if due > 0:
-                picture = snapshot_picture(snapshot, self.roads, center, size=size)
-                for _ in range(due):
-                    yield picture
+                with suppress(*UNDRAWABLE):
+                    picture = snapshot_picture(snapshot, self.roads, center, size=size)
+                if picture is not None:
+                    yield from [picture] * due
                 shown += due
 
 
@@ -109,8 +119,10 @@ def write_png(station: RecordedStation, path: Path, time: float | None = None) -
     wanted = station.decisive if time is None else time
     if not first - TIME_TOLERANCE <= wanted <= last + TIME_TOLERANCE:
         raise SettingError(Diagnostic(f"--at {wanted:g} s is not in the run", f"give {first:g} to {last:g} s"))
-    (picture,) = deque(station.pictures(FILM_SIZE, until=wanted), maxlen=1)
-    _, data = cv2.imencode(".png", picture)
+    newest = deque(station.pictures(FILM_SIZE, until=wanted), maxlen=1)
+    if not newest:
+        raise InputError(Diagnostic("no frame of the recording can be drawn", "record the run again"))
+    _, data = cv2.imencode(".png", newest[0])
     with create(path) as stream:
         stream.write(data.tobytes())
 

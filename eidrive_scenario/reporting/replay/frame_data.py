@@ -29,6 +29,9 @@ PATH_POINTS = 12
 COVERED = math.sqrt(-2.0 * math.log(0.05))
 """Semi-axes of the ellipse that contains 95 % of a normal distribution in the plane, in standard deviations."""
 
+UNDRAWABLE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+"""Errors of frames of a damaged recording."""
+
 Data = dict[str, Any]
 
 
@@ -82,7 +85,7 @@ def replay_data(
         try:
             part = _frame_data(frame, builders, settings or {})
             series.observe(frame)
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        except UNDRAWABLE as error:
             if report is None:
                 raise
             report.add("frames cannot be drawn", f"tick {frame.view.tick}: {describe_error(error)}")

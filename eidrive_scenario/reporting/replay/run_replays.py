@@ -14,21 +14,24 @@ from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
 
 FOLDER = "replays"
 """Folder of the replays beside the report."""
+MOST = 200
+"""Maximum number of replays of a report; runs that did not pass come first."""
 
 
 def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[ReportedRun], list[str]]:
     """Write the replay of each run with a recording into a folder `beside` the report.
 
-    Return the runs with the addresses of their replays, and the recordings without a replay with the reason.
+    Return the runs with the addresses of their replays, and the reasons for which recordings have none.
     """
-    linked: list[ReportedRun] = []
+    linked = list(runs)
     omitted: list[str] = []
     taken: set[str] = set()
-    for run in runs:
-        recording = run.folder / RECORDING if run.folder is not None else None
-        if recording is None or not recording.is_file():
-            linked.append(run)
-            continue
+    recordings = [
+        (index, run.folder / RECORDING)
+        for index, run in sorted(enumerate(runs), key=lambda entry: entry[1].passed)
+        if run.folder is not None and (run.folder / RECORDING).is_file()
+    ]
+    for index, recording in recordings[:MOST]:
         name = recording.parent.name
         while name in taken:
             name += "-"
@@ -37,8 +40,9 @@ def write_replays(runs: Sequence[ReportedRun], beside: Path) -> tuple[list[Repor
         try:
             make_replay(open_recording(recording), page, result_of(recording), result_file=recording.with_name(RESULT))
         except InputError as error:
-            omitted.append(f"{recording}: {error.diagnostics[0].message}")
-            linked.append(run)
+            omitted.append(f"{recording}: {error.diagnostics[0].message}; the run has no replay")
             continue
-        linked.append(run.model_copy(update={"replay": f"{FOLDER}/{quote(page.name)}"}))
+        linked[index] = runs[index].model_copy(update={"replay": f"{FOLDER}/{quote(page.name)}"})
+    if len(recordings) > MOST:
+        omitted.append(f"{len(recordings) - MOST} passed or later runs have no replay: `eidrive view` writes it")
     return linked, omitted

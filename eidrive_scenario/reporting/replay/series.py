@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision, nearest_body
 from eidrive_scenario.recording.frame import Frame
 
@@ -42,6 +44,7 @@ class SeriesBuilder:
         view, now = frame.view, frame.view.time
         self._pending = {}
         driven = [name for name, step in frame.steps.items() if step.control is not None and name in view]
+        is_finite = bool(np.isfinite(view.boxes).all() and np.isfinite(view.velocity).all())
         self._note_contact(frame, driven)
         for name, step in frame.steps.items():
             for received in step.inbox:
@@ -57,10 +60,11 @@ class SeriesBuilder:
             if name in driven:
                 gap, other = nearest_body(view, name)
                 self._note_gap(gap, now, f"{name} and {other}")
+                ttc = min_time_to_collision(view, name, TTC_LIMIT) if is_finite else math.inf
                 self._pending[name] |= {
                     "speed": _rounded(float(view.speed[view.row(name)]), 2),
                     "gap": _rounded(gap, 2) if gap <= FAR else None,
-                    "ttc": _rounded(min_time_to_collision(view, name, TTC_LIMIT), 2),
+                    "ttc": _rounded(ttc, 2),
                 }
 
     def keep(self) -> None:

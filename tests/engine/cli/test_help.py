@@ -59,7 +59,7 @@ def test_help_names_every_option(name: str) -> None:
     if RARE in texts[0]:
         texts.append(help_text(name, "--help-all"))
     for text in texts:
-        assert options <= set(re.findall(r"--[a-z][a-z-]*", text))
+        assert options <= set(re.findall(r"--[a-z][a-z0-9-]*", text))
 
 
 def test_options_of_help_all_are_described(eidrive: Eidrive) -> None:

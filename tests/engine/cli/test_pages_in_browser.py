@@ -71,14 +71,14 @@ class Page:
         """Return whether the page is wider than its window."""
         return bool(self.page.evaluate("document.documentElement.scrollWidth > window.innerWidth"))
 
-    def close(self, name: str) -> None:
-        """Check for faults and accessibility, and store a picture."""
+    def close(self, name: str, *, full: bool = True) -> None:
+        """Check for faults and accessibility, and store a picture of the full page or of its window."""
         from axe_playwright_python.sync_playwright import Axe
 
         found = Axe().run(self.page).response["violations"]
         assert not [fault["id"] for fault in found if fault["impact"] in SERIOUS]
         if SCREENSHOTS:
-            self.page.screenshot(path=f"{SCREENSHOTS}/{name}.png", full_page=True)
+            self.page.screenshot(path=f"{SCREENSHOTS}/{name}.png", full_page=full)
         self._context.close()
         assert not self.faults
 
@@ -144,6 +144,16 @@ def test_slider_layers_and_links_of_replay_change_the_picture(browser: Any, repo
     page.page.locator("#changes button").first.click()
     assert page.time() == 0.0
     page.close("replay-controls")
+
+
+def test_views_of_replay_show_different_pictures(browser: Any, report: Path) -> None:
+    page = Page(browser, replay_of(report, "ideal"), 1440, address="#t=3.9")
+    pictures = set()
+    for view in ("top", "driver", "follow", "third"):
+        page.page.select_option("#view", view)
+        pictures.add(page.page.evaluate("document.getElementById('street').toDataURL()"))
+    assert len(pictures) == 4
+    page.close("replay-third-person", full=False)
 
 
 def test_report_links_to_replay_of_a_run(browser: Any, report: Path) -> None:

@@ -104,3 +104,12 @@ def test_canvas_draws_far_points_without_overflow() -> None:
     canvas = Canvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
     canvas.roads(RoadDrawing(lanes=(("driving", np.array([(-1e9, -1.0), (1e9, -1.0), (1e9, 1.0), (-1e9, 1.0)])),)))
     assert (canvas.image[50] != canvas.image[5]).any(axis=1).all()
+
+
+@pytest.mark.parametrize("place", [(30_000, 30_000), (-(10**6), 50), (50, -(10**9)), (50, 50)])
+def test_canvas_writes_labels_at_any_place(place: tuple[int, int]) -> None:
+    canvas = Canvas(Window(-5.0, 5.0, -5.0, 5.0), (100, 100))
+    before = canvas.image.copy()
+    for text in ("name " * 1000, "\x00\n\ud800", "車\U0001f697é"):
+        canvas.label(text, *place)
+    assert (canvas.image != before).any() == (place == (50, 50))

@@ -35,10 +35,10 @@ def run(scenario: str, channel: str, seed: int, passed: bool, **parameters: str)
     return parse_run(result)
 
 
-def stored_run(folder: Path, name: str, frames: list[Frame] | None) -> Path:
+def stored_run(folder: Path, name: str, frames: list[Frame] | None, *, passed: bool = True) -> Path:
     """Write the files of a run; without frames it has no recording."""
     (folder / name).mkdir()
-    result = {"scenario": "street", "seed": 1, "channel": "ideal", "passed": True, "end_reason": "stop trigger"}
+    result = {"scenario": "street", "seed": 1, "channel": "ideal", "passed": passed, "end_reason": "stop trigger"}
     (folder / name / "result.json").write_text(json.dumps({**result, "criteria": [], "trace_hash": "0"}))
     if frames is not None:
         recorder = Recorder(folder / name / "recording.mcap", metadata={"scenario": "street", "seed": "1"})
@@ -110,6 +110,17 @@ def test_damaged_recording_is_reported_without_replay(tmp_path: Path) -> None:
     assert [entry.replay for entry in linked] == [""]
     assert len(omitted) == 1
     assert "no readable frame" in omitted[0]
+
+
+def test_failed_runs_have_replays_before_passed_ones(
+    street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("eidrive_scenario.reporting.replay.run_replays.MOST", 2)
+    outcomes = {"a": True, "b": False, "c": True, "d": False}
+    files = [stored_run(tmp_path, name, street(1)[:3], passed=passed) for name, passed in outcomes.items()]
+    linked, omitted = write_replays(read_runs(files)[0], tmp_path / "out")
+    assert [bool(entry.replay) for entry in linked] == [False, True, False, True]
+    assert omitted == ["2 passed or later runs have no replay: `eidrive view` writes it"]
 
 
 @pytest.mark.parametrize("field", ["folder", "replay"])
