@@ -113,7 +113,8 @@ class SeriesBuilder:
                     self._note_gap(gap, frame.view.time, f"{name} and {other}")
 
     def _note_gap(self, gap: float, time: float, pair: str) -> None:
-        if gap < self._least[0]:
+        # Bodies that touch without a contact are a vehicle and its trailer.
+        if 0.0 < gap < self._least[0]:
             self._least = gap, time, pair
 
 

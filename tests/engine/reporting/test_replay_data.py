@@ -145,6 +145,19 @@ def test_contact_of_others_is_not_decisive_for_driven_vehicle(street: Play) -> N
     assert observe(frames).contact is None
 
 
+def test_trailer_of_a_vehicle_is_not_decisive(street: Play) -> None:
+    """In the first 30 frames the car stands where the ego is, without a contact."""
+    frames = street(1)
+    for tick in range(30):
+        position = frames[tick].view.position.copy()
+        position[1] = position[0]
+        frames[tick] = replace(frames[tick], view=replace(frames[tick].view, position=position))
+    decisive = observe(frames).decisive
+    assert decisive is not None
+    assert decisive["time"] >= 1.5
+    assert "0.00 m" not in decisive["text"]
+
+
 def test_closest_approach_is_read_from_metrics() -> None:
     metrics = {
         "min_distance.Ego.Car.center": 4.5,
