@@ -12,6 +12,9 @@ from eidrive_scenario.evaluation.swept_boxes import time_to_contact
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.view import WorldView
 
+STANDING = 0.1
+"""Maximum speed of a standing actor [m/s]."""
+
 
 def nearest_body(view: WorldView, name: str) -> tuple[float, str]:
     """Return the distance between the boxes of an actor and of the nearest other one [m], and its name.
@@ -36,6 +39,31 @@ def nearest_body(view: WorldView, name: str) -> tuple[float, str]:
         if gap < best:
             best, nearest = gap, view.names[row]
     return best, nearest
+
+
+def nearest_pair(view: WorldView, below: float) -> tuple[float, str, str] | None:
+    """Return the smallest distance between the boxes of a moving actor and another one [m], and their names.
+
+    None if no two boxes are nearer than `below` [m]. Boxes that touch, such as those of a vehicle and its trailer, and
+    boxes that are not finite are ignored.
+    """
+    boxes = view.boxes
+    finite: Bools = np.logical_and.reduce(np.isfinite(boxes), axis=1)
+    rows = finite.nonzero()[0]
+    moving = (finite & (np.abs(view.speed) > STANDING)).nonzero()[0]
+    radius = np.hypot(boxes[:, 3], boxes[:, 4]) / 2.0
+    first, second = (grid.ravel() for grid in np.meshgrid(moving, rows, indexing="ij"))
+    centers = np.hypot(boxes[first, 0] - boxes[second, 0], boxes[first, 1] - boxes[second, 1])
+    least = np.where(first == second, math.inf, centers - radius[first] - radius[second])
+    found: tuple[float, str, str] | None = None
+    near = (least < below).nonzero()[0]
+    for index in near[np.argsort(least[near], kind="stable")].tolist():
+        if least[index] >= below:
+            break
+        gap = box_distance(boxes[first[index]], boxes[second[index]])
+        if 0.0 < gap < below:
+            below, found = gap, (gap, view.names[first[index]], view.names[second[index]])
+    return found
 
 
 def min_time_to_collision(view: WorldView, name: str, limit: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import footprint
 from eidrive_scenario.reporting.drawing.canvas import Canvas, Image
+from eidrive_scenario.reporting.drawing.ellipse import ellipse_of_95_percent
 from eidrive_scenario.reporting.drawing.top_view import (
     FUSED,
     LINK,
@@ -88,12 +89,9 @@ def _draw_boxes(canvas: Canvas, detections: Detections, color: str, width: float
         corners = footprint(box)
         canvas.fill(corners, color, 0.2)
         canvas.line(corners, color, width, closed=True)
-        if color == FUSED and np.isfinite(covariance).all():
-            values, vectors = np.linalg.eigh(covariance)
-            if values[0] >= 0.0:
-                # 95 % of a normal distribution in the plane
-                short, long = (math.sqrt(-2.0 * math.log(0.05)) * np.sqrt(values)).tolist()
-                canvas.ellipse(box, (long, short), math.atan2(vectors[1, 1], vectors[0, 1]), color)
+        axes = ellipse_of_95_percent(covariance) if color == FUSED else None
+        if axes is not None:
+            canvas.ellipse(box, axes[:2], axes[2], color)
 
 
 def _write_labels(canvas: Canvas, snapshot: StationSnapshot) -> None:

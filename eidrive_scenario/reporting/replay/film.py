@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -31,6 +30,8 @@ FILM_SIZE, GIF_SIZE = (1280, 720), (640, 360)
 """Width and height of films and GIF files [pixels]."""
 FILM_RATE, GIF_RATE = 20.0, 10.0
 """Pictures per second of a film and of a GIF."""
+MOST_PICTURES = 100_000
+"""Maximum number of pictures of a film: 83 minutes of an MP4."""
 _PALETTE = "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=none:diff_mode=rectangle"
 """Filter of FFmpeg that selects the 256 colors of a GIF by the pictures."""
 
@@ -60,7 +61,8 @@ class RecordedStation:
         stations: dict[str, None] = {}
         actors: dict[str, None] = {}
         for frame in recording.frames(lambda reason: report.add("frames cannot be decoded", shorten(reason, 200))):
-            self.times.append(frame.view.time)
+            if math.isfinite(frame.view.time):
+                self.times.append(frame.view.time)
             actors.update(dict.fromkeys(frame.view.names))
             stations.update(dict.fromkeys(frame.steps))
             driven.update(dict.fromkeys(key for key, step in frame.steps.items() if step.control is not None))
@@ -90,24 +92,50 @@ class RecordedStation:
                 continue
             yield snapshot
 
-    def pictures(self, size: tuple[int, int], rate: float | None = None, until: float = math.inf) -> Iterator[Image]:
-        """Yield the pictures of the frames, or of `rate` instants per second, up to a time [s]."""
-        center = (0.0, 0.0)
-        picture: Image | None = None
+    def picture(self, time: float) -> Image:
+        """Return the picture of the last frame up to a time [s]. Raise InputError if it cannot be drawn."""
+        newest = None
+        for snapshot, center in self._centered():
+            if snapshot.time > time + TIME_TOLERANCE:
+                break
+            newest = snapshot, center
+        picture = None if newest is None else self._draw(*newest, FILM_SIZE)
+        if picture is None:
+            raise InputError(Diagnostic("this frame of the recording cannot be drawn", "give another --at"))
+        return picture
+
+    def pictures(self, size: tuple[int, int], rate: float) -> Iterator[Image]:
+        """Yield the pictures of `rate` instants per second. Raise InputError for more than MOST_PICTURES."""
         shown = 0
+        for snapshot, center in self._centered():
+            wanted = math.floor((snapshot.time - self.times[0]) * rate + 1e-6) + 1
+            if wanted > MOST_PICTURES:
+                hint = "write pictures with --png, or the page"
+                raise InputError(Diagnostic(f"the film has more than {MOST_PICTURES} pictures", hint))
+            if wanted > shown:
+                picture = self._draw(snapshot, center, size)
+                if picture is not None:
+                    for _ in range(wanted - shown):
+                        yield picture
+                    shown = wanted
+
+    def _centered(self) -> Iterator[tuple[StationSnapshot, tuple[float, float]]]:
+        """Yield the snapshots at finite times, with the last position of the station [m]."""
+        center = (0.0, 0.0)
         for snapshot in self.snapshots():
-            if snapshot.time > until + TIME_TOLERANCE:
-                return
+            if not math.isfinite(snapshot.time):
+                continue
             if self.name in snapshot.view:
                 x, y = snapshot.view.centers[snapshot.view.row(self.name), :2].tolist()
                 center = (x, y) if math.isfinite(x + y) else center
-            due = 1 if rate is None else math.floor((snapshot.time - self.times[0]) * rate + 1e-6) + 1 - shown
-            if due > 0:
-                with suppress(*UNDRAWABLE):
-                    picture = snapshot_picture(snapshot, self.roads, center, size=size)
-                if picture is not None:
-                    yield from [picture] * due
-                shown += due
+            yield snapshot, center
+
+    def _draw(self, snapshot: StationSnapshot, center: tuple[float, float], size: tuple[int, int]) -> Image | None:
+        """Return the picture of a snapshot, or None if it cannot be drawn."""
+        try:
+            return snapshot_picture(snapshot, self.roads, center, size=size)
+        except UNDRAWABLE:
+            return None
 
 
 def write_png(station: RecordedStation, path: Path, time: float | None = None) -> None:
@@ -119,10 +147,7 @@ def write_png(station: RecordedStation, path: Path, time: float | None = None) -
     wanted = station.decisive if time is None else time
     if not first - TIME_TOLERANCE <= wanted <= last + TIME_TOLERANCE:
         raise SettingError(Diagnostic(f"--at {wanted:g} s is not in the run", f"give {first:g} to {last:g} s"))
-    newest = deque(station.pictures(FILM_SIZE, until=wanted), maxlen=1)
-    if not newest:
-        raise InputError(Diagnostic("no frame of the recording can be drawn", "record the run again"))
-    _, data = cv2.imencode(".png", newest[0])
+    _, data = cv2.imencode(".png", station.picture(wanted))
     with create(path) as stream:
         stream.write(data.tobytes())
 

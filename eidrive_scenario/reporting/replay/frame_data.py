@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.drawing.ellipse import ellipse_of_95_percent
 from eidrive_scenario.reporting.replay.messages import MessageList
 from eidrive_scenario.reporting.replay.series import SeriesBuilder
 from eidrive_scenario.reporting.replay.timeline import Timeline
@@ -24,11 +24,10 @@ _LARGEST_PAGE = 64 * 2**20
 """Approximate maximum size of the frames in a page [bytes]."""
 _ABSENT = len("null, ")
 """Size of the entry of a station for a frame before its first one [bytes]."""
+_VALUE = len("12.34, ")
+"""Size of a value of a series [bytes]."""
 PATH_POINTS = 12
 """Maximum number of points of a planned path in the page."""
-COVERED = math.sqrt(-2.0 * math.log(0.05))
-"""Semi-axes of the ellipse that contains 95 % of a normal distribution in the plane, in standard deviations."""
-
 UNDRAWABLE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 """Errors of frames of a damaged recording."""
 
@@ -80,7 +79,7 @@ def replay_data(
     data: Data = {"times": [], "ticks": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
     builders: dict[str, SnapshotBuilder] = {}
     series, messages, timeline = SeriesBuilder(), MessageList(), Timeline()
-    budget = _Budget(report)
+    budget, width = _Budget(report), 0
     for frame in frames:
         try:
             part = _frame_data(frame, builders, settings or {})
@@ -90,8 +89,9 @@ def replay_data(
                 raise
             report.add("frames cannot be drawn", f"tick {frame.view.tick}: {describe_error(error)}")
             continue
-        added = len(part["stations"].keys() - data["stations"].keys())
-        if not budget.take(_size(part) + _ABSENT * added * len(data["times"]), frame.view.time):
+        added = len(part["stations"].keys() - data["stations"].keys()) + series.width - width
+        width = series.width
+        if not budget.take(_size(part) + _VALUE * width + _ABSENT * added * len(data["times"]), frame.view.time):
             break
         _append(data, part)
         series.keep()
@@ -224,18 +224,7 @@ def _boxes(detections: Detections, *, ellipses: bool = False) -> list[list[float
             continue
         share = None if exists is None or not math.isfinite(exists) else round(exists, 2)
         box = [round(x, 2), round(y, 2), round(length, 2), round(width, 2), round(yaw, 3), round(height, 2)]
-        ellipse = _ellipse(detections.covariance[row]) if ellipses else []
+        axes = ellipse_of_95_percent(detections.covariance[row]) if ellipses else None
+        ellipse = [] if axes is None else [round(axes[0], 2), round(axes[1], 2), round(axes[2], 3)]
         found.append([*box, *([share] if share is not None or ellipse else []), *ellipse])
     return found
-
-
-def _ellipse(covariance: Array) -> list[float]:
-    """Return the semi-axes [m] and the direction [rad] of the ellipse that contains 95 %; empty if it is unknown."""
-    if not np.isfinite(covariance).all():
-        return []
-    (xx, xy), (_, yy) = covariance.tolist()
-    middle, spread = (xx + yy) / 2.0, math.hypot((xx - yy) / 2.0, xy)
-    if middle - spread < 0.0:
-        return []
-    long, short = COVERED * math.sqrt(middle + spread), COVERED * math.sqrt(middle - spread)
-    return [round(long, 2), round(short, 2), round(math.atan2(2.0 * xy, xx - yy) / 2.0, 3)]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision, nearest_body
+from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision, nearest_body, nearest_pair
 from eidrive_scenario.recording.frame import Frame
 
 TTC_LIMIT = 10.0
@@ -33,7 +33,8 @@ class SeriesBuilder:
     def __init__(self) -> None:
         self._frames = 0
         self._columns: dict[str, dict[str, Any]] = {}
-        self._generated: dict[tuple[str, str], float] = {}
+        self._generated: dict[str, dict[str, float]] = {}
+        """Time of generation of the newest message by receiver and sender [s]."""
         self._pending: dict[str, Values] = {}
         self._driven = False
         self._contact: tuple[float, str] | None = None
@@ -47,15 +48,12 @@ class SeriesBuilder:
         is_finite = bool(np.isfinite(view.boxes).all() and np.isfinite(view.velocity).all())
         self._note_contact(frame, driven)
         for name, step in frame.steps.items():
+            newest = self._generated.setdefault(name, {})
             for received in step.inbox:
-                key = name, received.message.sender
-                if key[0] != key[1]:
-                    self._generated[key] = max(self._generated.get(key, -math.inf), received.message.generated)
-            ages = {
-                sender: _rounded(now - generated, 3)
-                for (receiver, sender), generated in self._generated.items()
-                if receiver == name
-            }
+                sender = received.message.sender
+                if sender != name:
+                    newest[sender] = max(newest.get(sender, -math.inf), received.message.generated)
+            ages = {sender: _rounded(now - generated, 3) for sender, generated in newest.items()}
             self._pending[name] = {"age": ages}
             if name in driven:
                 gap, other = nearest_body(view, name)
@@ -66,6 +64,11 @@ class SeriesBuilder:
                     "gap": _rounded(gap, 2) if gap <= FAR else None,
                     "ttc": _rounded(ttc, 2),
                 }
+
+    @property
+    def width(self) -> int:
+        """Number of columns including the last frame."""
+        return sum(3 + len(senders) for senders in self._generated.values())
 
     def keep(self) -> None:
         """Add the values of the last frame."""
@@ -106,11 +109,9 @@ class SeriesBuilder:
             if not self._driven or contact.first in driven or contact.second in driven:
                 self._contact = frame.view.time, f"contact of {contact.first} and {contact.second}"
                 return
-        if not self._driven and len(frame.view.names) > 1:
-            for name, speed in zip(frame.view.names, frame.view.speed.tolist(), strict=True):
-                if abs(speed) > 0.1:
-                    gap, other = nearest_body(frame.view, name)
-                    self._note_gap(gap, frame.view.time, f"{name} and {other}")
+        if not self._driven and (pair := nearest_pair(frame.view, self._least[0])) is not None:
+            gap, name, other = pair
+            self._note_gap(gap, frame.view.time, f"{name} and {other}")
 
     def _note_gap(self, gap: float, time: float, pair: str) -> None:
         # Bodies that touch without a contact are a vehicle and its trailer.

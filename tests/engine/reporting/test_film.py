@@ -8,15 +8,17 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import open_recording
-from eidrive_scenario.reporting.drawing.canvas import Canvas
+from eidrive_scenario.reporting.drawing.canvas import Canvas, Image
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.reporting.replay import film
 from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4, write_png
+from eidrive_scenario.reporting.snapshot import StationSnapshot
 
 Play = Callable[..., list[Frame]]
 
@@ -84,6 +86,28 @@ def test_film_plays_at_the_speed_of_the_run(street: Play, tmp_path: Path) -> Non
         while video.read()[0]:
             pictures += 1
         assert pictures == count, name
+
+
+def test_film_of_run_with_far_time_is_refused(street: Play, tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    frames = street(1)[:3]
+    frames[2] = replace(frames[2], view=replace(frames[2].view, time=1e8))
+    with pytest.raises(InputError, match="more than 100000 pictures"):
+        write_gif(recorded(frames, tmp_path), tmp_path / "a.gif")
+    assert not (tmp_path / "a.gif").exists()
+
+
+def test_picture_draws_one_frame_only(street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    station = recorded(street(1), tmp_path)
+    drawn: list[float] = []
+
+    def note(snapshot: StationSnapshot, *_: object, **__: object) -> Image:
+        drawn.append(snapshot.time)
+        return np.zeros((9, 16, 3), dtype=np.uint8)
+
+    monkeypatch.setattr(film, "snapshot_picture", note)
+    write_png(station, tmp_path / "a.png", 2.0)
+    assert drawn == [pytest.approx(2.0)]
 
 
 def test_film_without_encoder_states_the_extra(street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from eidrive_scenario.evaluation.nearest_actor import nearest_body
+from eidrive_scenario.evaluation.nearest_actor import nearest_body, nearest_pair
 from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.replay.camera_files import camera_files
 from eidrive_scenario.reporting.replay.frame_data import packed, replay_data
@@ -92,6 +94,31 @@ def test_nearest_body_equals_smallest_of_all_distances(street: Play) -> None:
             gap, nearest = nearest_body(view, name)
             assert gap == min(every.values())
             assert every[nearest] == gap
+
+
+def test_nearest_pair_equals_smallest_gap_of_moving_actors(street: Play) -> None:
+    """The ego and the crossing car move; the truck and the RSU stand."""
+    for frame in street(1)[::7]:
+        view = frame.view
+        moving = [name for name, speed in zip(view.names, view.speed.tolist(), strict=True) if speed > 0.1]
+        gaps = [nearest_body(view, name)[0] for name in moving]
+        found = nearest_pair(view, math.inf)
+        assert found is not None
+        assert found[0] == min(gap for gap in gaps if gap > 0.0)
+        assert found[1] in moving
+        assert nearest_pair(view, found[0]) is None
+
+
+def test_ages_of_many_links_count_for_the_size_of_a_page(street: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    """300 stations receive the message of one sender in the last of 100 frames: 30 000 values of ages."""
+    frames = street(1)
+    step = frames[40].steps["Ego"]
+    crowd = {f"S{number}": replace(step, detections=step.detections.subset([])) for number in range(300)}
+    frames[-1] = replace(frames[-1], steps=crowd)
+    monkeypatch.setattr("eidrive_scenario.reporting.replay.frame_data._LARGEST_PAGE", 2**18)
+    data = replay_data(frames, report=DamageReport())
+    assert len(json.dumps(data)) < 2**18
+    assert len(data["times"]) == 99
 
 
 def test_series_contain_speed_gap_and_age_of_information(street: Play) -> None:
