@@ -80,7 +80,7 @@ class LearnedSettings(Settings):
     layout: Layout | None = None
     letterbox: bool = False
     confidence: float | None = Field(default=None, gt=0.0, lt=1.0)
-    runtime: Literal["auto"] | Runtime = "auto"
+    runtime: Literal["auto", Runtime] = "auto"
     device: Device = "cpu"
     threads: Annotated[int, Field(ge=1, le=256)] = 1
 
