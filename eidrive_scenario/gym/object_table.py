@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,6 +25,8 @@ COLUMNS = (
     "deviation_x", "deviation_y", "covariance_known", "age", *CLASSES,
 )  # fmt: skip
 """Columns of the table. Positions [m], velocities over ground [m/s] and headings are in the axes of the vehicle."""
+FEW = 12
+"""Maximum number of objects for which scalar arithmetic is faster than arrays."""
 _SIGNED = ("x", "y", "velocity_x", "velocity_y", "cos", "sin")
 _CLASS = {name: COLUMNS.index(name) for name in CLASSES}
 
@@ -51,8 +54,11 @@ def nearest_rows(objects: Detections, ego: EgoState, reach: float = math.inf) ->
     """Return the rows of the objects within `reach` [m], nearest first; equal distances in the order of the rows."""
     if not len(objects):
         return []
-    away = objects.boxes[:, :2] - ego.position[:2]
-    distance = np.hypot(away[:, 0], away[:, 1])
+    x, y, _ = ego.position.tolist()
+    if len(objects) <= FEW:
+        places = [math.hypot(box[0] - x, box[1] - y) for box in objects.boxes.tolist()]
+        return sorted([row for row, away in enumerate(places) if away <= reach], key=places.__getitem__)
+    distance = np.hypot(objects.boxes[:, 0] - x, objects.boxes[:, 1] - y)
     order = np.argsort(distance, kind="stable")
     return [row for row in order.tolist() if distance[row] <= reach]
 
@@ -61,12 +67,63 @@ def object_table(objects: Detections, ego: EgoState, now: float, *, count: int, 
     """Return the table (count, C) of the nearest objects in SI units; rows without an object are 0."""
     table = np.zeros((count, len(COLUMNS)))
     rows = nearest_rows(objects, ego, reach)[:count]
-    if not rows:
-        return table
+    if rows:
+        fill = few_object_rows if len(rows) <= FEW else object_rows
+        table[: len(rows)] = fill(objects, rows, ego, max(now - objects.time, 0.0))
+    return table
+
+
+def few_object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: float) -> list[list[float]]:
+    """Return the same as `object_rows` in scalar arithmetic. Adding 0 replaces -0 at rest."""
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    own_x, own_y, _ = ego.position.tolist()
+    boxes, velocities = objects.boxes.tolist(), objects.velocity.tolist()
+    covariances, confidence = objects.covariance.tolist(), objects.confidence.tolist()
+    filled = []
+    for row in rows:
+        x, y, _, length, width, _, yaw = boxes[row]
+        dx, dy = x - own_x, y - own_y
+        vx, vy = velocities[row]
+        moves = math.isfinite(vx) and math.isfinite(vy)
+        if not moves:
+            vx = vy = 0.0
+        (xx, xy), (yx, yy) = covariances[row]
+        certain = math.isfinite(xx + xy + yx + yy)
+        ahead = aside = 0.0
+        if certain:
+            ahead = cos * cos * xx + cos * sin * (xy + yx) + sin * sin * yy
+            aside = sin * sin * xx - sin * cos * (xy + yx) + cos * cos * yy
+        heading = yaw - ego.yaw
+        known_class = objects.classes[row]
+        filled.append(
+            [
+                1.0,
+                dx * cos + dy * sin,
+                dy * cos - dx * sin,
+                vx * cos + vy * sin + 0.0,
+                vy * cos - vx * sin + 0.0,
+                float(moves),
+                length,
+                width,
+                math.cos(heading),
+                math.sin(heading),
+                confidence[row],
+                math.sqrt(max(ahead, 0.0)),
+                math.sqrt(max(aside, 0.0)),
+                float(certain),
+                age,
+                *[float(name == known_class) for name in CLASSES],
+            ]
+        )
+    return filled
+
+
+def object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: float) -> Array:
+    """Return the rows (N, C) of these objects in SI units."""
+    filled = np.zeros((len(rows), len(COLUMNS)))
     cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
     axes = np.array([[cos, -sin], [sin, cos]])
     boxes = objects.boxes[rows]
-    filled = table[: len(rows)]
     filled[:, 0] = 1.0
     filled[:, 1:3] = (boxes[:, :2] - ego.position[:2]) @ axes
     velocity = objects.velocity[rows] @ axes
@@ -82,7 +139,7 @@ def object_table(objects: Detections, ego: EgoState, now: float, *, count: int, 
     variance = np.einsum("ji,njk,ki->ni", axes, np.where(np.reshape(certain, (-1, 1, 1)), covariance, 0.0), axes)
     filled[:, 11:13] = np.sqrt(np.maximum(variance, 0.0))
     filled[:, 13] = certain
-    filled[:, 14] = max(now - objects.time, 0.0)
+    filled[:, 14] = age
     for index, row in enumerate(rows):
         filled[index, _CLASS[objects.classes[row]]] = 1.0
-    return table
+    return filled

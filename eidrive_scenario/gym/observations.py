@@ -102,7 +102,7 @@ class ObservationEncoder:
         found: dict[str, NDArray[Any]] = {}
         for name, (encode, scale, low, high) in self._parts.items():
             values = (encode(perceived) / scale).astype(np.float32)
-            found[name] = np.clip(values, low, high, out=values)
+            found[name] = values.clip(low, high, out=values)
         return spaces.flatten(self._space, found) if self.settings.flat else found
 
     def zeros(self) -> Any:
@@ -150,13 +150,14 @@ def _points_ahead(route: Array, settings: RouteSettings) -> Array:
     rows = np.zeros((settings.points, 3))
     if len(route) < 2:
         return rows
-    step = np.diff(route, axis=0)
-    length = np.hypot(step[:, 0], step[:, 1])
-    along = np.concatenate([[0.0], np.cumsum(length)])
-    share = float(-(route[0] @ step[0]) / max(length[0] ** 2, 1e-12))
-    wanted = min(max(share, 0.0), 1.0) * length[0] + settings.spacing * np.arange(1, settings.points + 1)
-    known = wanted <= along[-1]
-    rows[:, 0] = known
-    rows[:, 1] = np.where(known, np.interp(wanted, along, route[:, 0]), 0.0)
-    rows[:, 2] = np.where(known, np.interp(wanted, along, route[:, 1]), 0.0)
+    step = route[1:] - route[:-1]
+    along = np.zeros(len(route))
+    np.hypot(step[:, 0], step[:, 1]).cumsum(out=along[1:])
+    (x, y), (dx, dy), length = route[0].tolist(), step[0].tolist(), float(along[1])
+    share = -(x * dx + y * dy) / max(length**2, 1e-12)
+    wanted = min(max(share, 0.0), 1.0) * length + settings.spacing * np.arange(1, settings.points + 1)
+    known = int(wanted.searchsorted(along[-1], side="right"))
+    rows[:known, 0] = 1.0
+    rows[:known, 1] = np.interp(wanted[:known], along, route[:, 0])
+    rows[:known, 2] = np.interp(wanted[:known], along, route[:, 1])
     return rows

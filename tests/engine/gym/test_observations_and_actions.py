@@ -12,7 +12,7 @@ from lone_car import lone_car
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.gym import EidriveEnv, GridSettings, RewardSettings
-from eidrive_scenario.gym.object_table import COLUMNS, object_table
+from eidrive_scenario.gym.object_table import COLUMNS, few_object_rows, nearest_rows, object_rows, object_table
 from eidrive_scenario.gym.occupancy_grid import occupancy_grid
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
@@ -174,3 +174,29 @@ def test_time_to_collision_concerns_the_actor_on_the_own_course_only() -> None:
     assert min_time_to_collision(view, "Ego", 60.0) == pytest.approx(expected, rel=1e-9)
     assert min_time_to_collision(view, "Ego", expected - 0.1) == math.inf
     env.close()
+
+
+@pytest.mark.parametrize("count", [1, 3, 30])
+def test_rows_of_few_objects_equal_rows_of_many(count: int) -> None:
+    draws = np.random.default_rng(count)
+    roots = draws.normal(size=(count, 2, 2))
+    covariance, velocity = roots @ roots.transpose(0, 2, 1), draws.normal(0.0, 9.0, (count, 2))
+    covariance[::3], velocity[1::3] = np.nan, np.nan
+    classes = tuple(draws.choice(CLASSES, count).tolist())
+    boxes = draws.normal(0.0, 20.0, (count, 7))
+    objects = Detections(1.0, boxes, draws.random(count), classes, velocity, covariance)
+    ego = EgoState(1.5, np.array([3.0, -2.0, 0.0]), 2.5, 0.0, 0.0, 4.0, 0.0, 0.0)
+    rows = draws.permutation(count).tolist()
+    few = np.array(few_object_rows(objects, rows, ego, 0.5))
+    assert few == pytest.approx(object_rows(objects, rows, ego, 0.5), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [5, 40])
+def test_nearest_rows_are_ordered_by_distance_then_row(count: int) -> None:
+    draws = np.random.default_rng(count)
+    boxes = np.zeros((count, 7))
+    boxes[:, 0] = draws.integers(-5, 6, count)
+    objects = Detections(0.0, boxes, np.ones(count), ("car",) * count, np.zeros((count, 2)), np.zeros((count, 2, 2)))
+    ego = EgoState(0.0, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    expected = sorted((abs(x), row) for row, x in enumerate(boxes[:, 0].tolist()) if abs(x) <= 4.0)
+    assert nearest_rows(objects, ego, 4.0) == [row for _, row in expected]
