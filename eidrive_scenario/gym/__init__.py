@@ -24,6 +24,7 @@ from eidrive_scenario.gym.observation_settings import (
     RouteSettings,
     TableSettings,
 )
+from eidrive_scenario.gym.render_settings import RenderSettings
 from eidrive_scenario.gym.rewards import RewardSettings
 from eidrive_scenario.lazy_exports import lazy_exports
 
@@ -39,6 +40,7 @@ __all__ = [
     "MetaSpeed",
     "ObservationSettings",
     "Pedals",
+    "RenderSettings",
     "RewardSettings",
     "RouteSettings",
     "SendMessages",

@@ -12,6 +12,8 @@ from eidrive_scenario.gym.action_settings import ActionSettings
 from eidrive_scenario.gym.episode import Episode
 from eidrive_scenario.gym.libraries import gymnasium
 from eidrive_scenario.gym.observation_settings import ObservationSettings
+from eidrive_scenario.gym.render_mode import build_renderer, frames_per_second
+from eidrive_scenario.gym.render_settings import METADATA, RenderSettings
 from eidrive_scenario.gym.rewards import RewardSettings
 from eidrive_scenario.gym.runs import MAX_SEED, Runs
 from eidrive_scenario.gym.station_interface import InterfaceSettings, sum_terms
@@ -32,13 +34,15 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
     max_steps     maximum number of steps; the episode is then truncated
     ticks_per_step          number of ticks for which an action applies
     terminate_on_collision  whether the first contact of a driving station ends the episode
+    render_mode             `rgb_array` for pictures by `render`; None for none
+    render                  RenderSettings, or a mapping of its fields
 
     `reset` draws the seed of the run from the generator of the environment, or takes it from `options["seed"]`;
     `options["parameters"]` sets parameters of the scenario. Raise InputError if the scenario or a setting is invalid,
     or if the scenario has no station.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = METADATA  # type: ignore[misc]
 
     def __init__(
         self,
@@ -52,10 +56,9 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
         max_steps: int | None = None,
         ticks_per_step: int = 1,
         terminate_on_collision: bool = True,
-        render_mode: None = None,
+        render_mode: str | None = None,
+        render: RenderSettings | Mapping[str, Any] | None = None,
     ) -> None:
-        if render_mode is not None:
-            raise SettingError(Diagnostic(f"render_mode is {render_mode!r}", "the environment renders nothing"))
         self._runs = Runs(
             scenario,
             None if station is None else (station,),
@@ -69,6 +72,10 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
         ((self.station, self._interface),) = self._runs.interfaces.items()
         self.observation_space = self._interface.encoder.space
         self.action_space = self._interface.decoder.space
+        self.render_mode = render_mode
+        self._renderer = build_renderer(render_mode, render, self.station)
+        frame_rate = frames_per_second(self._runs.settings, ticks_per_step)
+        self.metadata = {**self.metadata, "render_fps": frame_rate}  # type: ignore[misc]
         self._episode: Episode | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -85,6 +92,8 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
         if self.station not in episode.perceived:
             raise SettingError(Diagnostic(f"station {self.station!r} never enters the world", "select another one"))
         self._interface.begin(episode)
+        if self._renderer is not None:
+            self._renderer.begin(episode)
         simulation = episode.simulation
         info = {"seed": simulation.seed, "time": episode.start.view.time}
         return self._interface.observe(episode), {**info, "parameters": dict(simulation.scenario.parameters)}
@@ -128,6 +137,19 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
         ended = episode.result is not None
         truncated = episode.is_truncated
         return observation, sum(summed.values()), ended and not truncated, truncated, info
+
+    def render(self) -> Any:
+        """Return the picture (height, width, 3) of the current instant, uint8 in the order red, green, blue.
+
+        It is that of `eidrive view --png`. Return None with a warning without a render mode. Raise SimulationError
+        before `reset`.
+        """
+        if self._renderer is None:
+            gymnasium.logger.warn("the environment has no render mode; create it with render_mode='rgb_array'")
+            return None
+        if self._episode is None:
+            raise SimulationError("the environment has no episode; call reset")
+        return self._renderer.picture()
 
     def _running_episode(self) -> Episode:
         if self._episode is None or self._episode.result is not None:

@@ -12,6 +12,7 @@ from eidrive_scenario.driving.station_action import StationAction
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import AgentStep, StationPerception
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
+from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
 from eidrive_scenario.simulation.added_settings import criteria_sources
 from eidrive_scenario.simulation.planner_option import select_planner
@@ -59,6 +60,10 @@ class Episode:
         )
         self.result: RunResult | None = None
         """Result of the run; None before its end."""
+        self.last_frame: Frame | None = None
+        """Frame of the last complete tick; None before the first one."""
+        self.observers: list[Callable[[Episode], None]] = []
+        """Functions that are called after each tick."""
 
     def begin(self) -> None:
         """Begin the first tick."""
@@ -94,12 +99,15 @@ class Episode:
         if end is not None:
             self.result = self.simulation.result()
             self.simulation.close()
+        for observe in self.observers:
+            observe(self)
         return Transition(before, self.start.view, steps)
 
     def _tick(self, decide: Decide) -> tuple[Mapping[str, AgentStep], str | None]:
         for name, action in decide(self.start.perceived).items():
             self.simulation.set_action(name, action)
         frame, end = self.simulation.tick()
+        self.last_frame = frame
         return frame.steps, end
 
     def _has_collided(self, view: WorldView) -> bool:

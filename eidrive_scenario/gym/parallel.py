@@ -13,6 +13,8 @@ from eidrive_scenario.gym.environment import final_info
 from eidrive_scenario.gym.episode import Episode
 from eidrive_scenario.gym.libraries import INSTALL, gymnasium, spaces
 from eidrive_scenario.gym.observation_settings import ObservationSettings
+from eidrive_scenario.gym.render_mode import build_renderer, frames_per_second
+from eidrive_scenario.gym.render_settings import METADATA, RenderSettings
 from eidrive_scenario.gym.rewards import RewardSettings
 from eidrive_scenario.gym.runs import MAX_SEED, OPTIONS, Runs
 from eidrive_scenario.gym.station_interface import InterfaceSettings, sum_terms
@@ -35,11 +37,12 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
 
     The other arguments are those of `EidriveEnv`, and apply to each station. An agent exists while its station is in
     the world. All agents end with the run: at the first contact of any of them unless `terminate_on_collision` is off.
+    Pictures follow the first station.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
+        **METADATA,
         "name": "eidrive_scenario_v0",
-        "render_modes": [],
         "is_parallelizable": True,
     }
 
@@ -55,6 +58,8 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         max_steps: int | None = None,
         ticks_per_step: int = 1,
         terminate_on_collision: bool = True,
+        render_mode: str | None = None,
+        render: RenderSettings | Mapping[str, Any] | None = None,
     ) -> None:
         self._runs = Runs(
             scenario,
@@ -69,7 +74,10 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         self._interfaces = self._runs.interfaces
         self.possible_agents = list(self._interfaces)
         self.agents: list[str] = []
-        self.render_mode = None
+        self.render_mode = render_mode
+        self._renderer = build_renderer(render_mode, render, self.possible_agents[0])
+        frame_rate = frames_per_second(self._runs.settings, ticks_per_step)
+        self.metadata = {**self.metadata, "render_fps": frame_rate}  # type: ignore[misc]
         self._generator, _ = gymnasium.utils.seeding.np_random()
         self._episode: Episode | None = None
 
@@ -101,6 +109,8 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             raise SettingError(Diagnostic("no controlled station enters the world", "select other stations"))
         for name in self.agents:
             self._interfaces[name].begin(episode)
+        if self._renderer is not None:
+            self._renderer.begin(episode)
         simulation = episode.simulation
         info: dict[str, Any] = {"seed": simulation.seed, "time": episode.start.view.time}
         info["parameters"] = dict(simulation.scenario.parameters)
@@ -169,6 +179,18 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         unknown = next((name for name in actions if name not in self.agents), None)
         if unknown is not None:
             raise SettingError(Diagnostic(f"{unknown!r} is not an agent", suggestion(str(unknown), self.agents)))
+
+    def render(self) -> Any:
+        """Return the picture (height, width, 3) of the current instant as `EidriveEnv.render`, around the first agent.
+
+        Return None without a render mode. Raise SimulationError before `reset`.
+        """
+        if self._renderer is None:
+            gymnasium.logger.warn("the environment has no render mode; create it with render_mode='rgb_array'")
+            return None
+        if self._episode is None:
+            raise SimulationError("the environment has no episode; call reset")
+        return self._renderer.picture()
 
     def _present(self, episode: Episode) -> list[str]:
         return [name for name in self.possible_agents if name in episode.perceived]

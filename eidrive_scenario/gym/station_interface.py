@@ -43,9 +43,9 @@ class InterfaceSettings:
     def parse(cls, observation: Any, action: Any, reward: Any) -> InterfaceSettings:
         """Return the settings from mappings or settings; None selects the defaults. Raise SettingError."""
         return cls(
-            _parse(ObservationSettings, observation, "observation"),
+            parse_mapping(ObservationSettings, observation, "observation"),
             None if action is None else parse_actions(action),
-            _parse(RewardSettings, reward, "reward"),
+            parse_mapping(RewardSettings, reward, "reward"),
         )
 
     def actions_of(self, *, drives: bool) -> tuple[ActionSettings, ...]:
@@ -55,7 +55,8 @@ class InterfaceSettings:
         return self.actions
 
 
-def _parse(model: type[S], given: Any, source: str) -> S:
+def parse_mapping(model: type[S], given: Any, source: str) -> S:
+    """Return settings from a mapping, settings or None, which selects the defaults. Raise SettingError."""
     if isinstance(given, model):
         return given
     if given is not None and not isinstance(given, Mapping):

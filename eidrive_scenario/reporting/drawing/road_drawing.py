@@ -67,7 +67,13 @@ def recorded_roads(recording: Recording) -> RoadDrawing:
         return RoadDrawing()
     if len(text) > _LARGEST_ROAD_FILE:
         raise _too_large(f"{recording.path}/{ROAD_FILE}")
-    network = RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}")
+    return network_drawing(RoadNetwork.parse(text, f"{recording.path}/{ROAD_FILE}"))
+
+
+def network_drawing(network: RoadNetwork | None) -> RoadDrawing:
+    """Return the roads of a network with houses; an empty drawing without a network. Errors as for `road_drawing`."""
+    if network is None:
+        return RoadDrawing()
     houses = tuple((house_outline(house), house.size[2]) for house in buildings(network))
     return replace(road_drawing(network.roads.values()), houses=houses)
 

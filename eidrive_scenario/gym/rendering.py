@@ -1,0 +1,67 @@
+"""Pictures of an episode: the top view that follows a station."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.gym.episode import Episode
+from eidrive_scenario.gym.render_settings import RenderSettings
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
+from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
+from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
+from eidrive_scenario.roads import RoadNetwork
+
+
+class Renderer:
+    """Pictures of the current instant of an episode, with what one station perceives and receives."""
+
+    def __init__(self, station: str, settings: RenderSettings) -> None:
+        self._station = station
+        self._settings = settings
+        self._roads: tuple[RoadNetwork | None, RoadDrawing] = None, RoadDrawing()
+        self._builder = SnapshotBuilder(station)
+        self._snapshot: StationSnapshot | None = None
+        self._center = 0.0, 0.0
+
+    def begin(self, episode: Episode) -> None:
+        """Begin an episode at its current instant, and observe its ticks."""
+        simulation = episode.simulation
+        known = getattr(simulation.stack, "settings", {})
+        self._builder = SnapshotBuilder(self._station, known.get(self._station, DEFAULT_SETTINGS))
+        if simulation.roads is not self._roads[0]:
+            self._roads = simulation.roads, network_drawing(simulation.roads)
+        episode.observers.append(self._observe)
+        self._observe(episode)
+
+    def _observe(self, episode: Episode) -> None:
+        """Register the current instant."""
+        view, perceived, last = episode.start.view, episode.perceived.get(self._station), episode.last_frame
+        steps: dict[str, AgentStep] = {}
+        if perceived is not None:
+            before = None if last is None else last.steps.get(self._station)
+            steps[self._station] = AgentStep(
+                detections=perceived.detections,
+                inbox=perceived.inbox,
+                fused=perceived.fused,
+                plan=None if before is None else before.plan,
+                control=None if before is None else before.control,
+                outbox=(),
+            )
+        self._snapshot = self._builder.observe(Frame(view, steps, links=() if last is None else last.links))
+        if self._station in view:
+            x, y, _ = view.centers[view.row(self._station)].tolist()
+            self._center = x, y
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the picture (height, width, 3) in the order red, green, blue."""
+        settings = self._settings
+        snapshot = self._snapshot
+        assert snapshot is not None
+        image = snapshot_picture(
+            snapshot, self._roads[1], self._center, size=(settings.width, settings.height), extent=settings.extent
+        )
+        return np.ascontiguousarray(image[..., ::-1])
