@@ -1,7 +1,8 @@
-"""Options that `eidrive run` and `eidrive check` share: driving stacks, planner and criteria."""
+"""Options of several commands: driving stacks, planner, criteria, and the runs whose recording is kept."""
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -18,3 +19,11 @@ Criteria = Annotated[
     list[str] | None,
     typer.Option(metavar="YAML|FILE", help="Add criteria, such as '{collision: {of: Ego}}'; repeatable."),
 ]
+
+
+class Keep(StrEnum):
+    """Values of --record."""
+
+    always = "always"
+    on_failure = "on-failure"
+    never = "never"

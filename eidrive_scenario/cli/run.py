@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import Criteria, Drive, Planner
+from eidrive_scenario.cli.added_options import Criteria, Drive, Keep, Planner
 from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
 from eidrive_scenario.cli.output_paths import check_output_paths
@@ -23,14 +22,6 @@ from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.recording import Explanation
-
-
-class Keep(StrEnum):
-    """Values of --record."""
-
-    always = "always"
-    on_failure = "on-failure"
-    never = "never"
 
 
 def run(

@@ -196,7 +196,10 @@ def _write_replay(recording: Recording, page: Path, complete: bool) -> tuple[str
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(help="Folders written by run --out, or their parents.")],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(help="Folders written by run --out, or their parents; stores of sweeps."),
+    ],
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="Folder of report.html, or a file.", show_default="the first folder of runs"),
@@ -205,34 +208,18 @@ def report(
         bool, typer.Option("--replays/--no-replays", help="Write the replay of each run with a recording, too.")
     ] = True,
 ) -> None:
-    """Write an HTML report of many runs, with a replay of each.
+    """Write an HTML report of many runs or of sweeps, with a replay of each recorded run.
 
     Example: eidrive report reports --out reports/report.html
 
     Below folders, damaged results and runs that did not end are omitted with a warning; the page lists them.
     """
-    from eidrive_scenario.recording.run_files import RESULT, result_paths, unfinished_runs
-    from eidrive_scenario.reporting.run_report.report import write_report
-    from eidrive_scenario.reporting.run_report.reported_run import read_runs
+    from eidrive_scenario.reporting.report_files import report_files
 
-    results, errors = read_runs(result_paths(runs))
-    omitted = [f"{path}: the run did not end" for path in unfinished_runs(runs)]
-    given = {str(path) for path in runs}
-    invalid = not results or any(error.source in given for error in errors)
-    if not invalid:
-        omitted += [f"{error.source}: {error.message}" for error in errors]
-    for line in omitted:
-        typer.secho(f"warning: {line}, the report omits it", fg="yellow", err=True)
-    if invalid:
-        folders = ", ".join(map(str, runs))
-        missing = Diagnostic(f"no {RESULT} in {folders}", "give folders written by eidrive run --out")
-        raise SettingError(errors or missing)
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
-    if replays:
-        from eidrive_scenario.reporting.replay.run_replays import write_replays
 
-        results, without = write_replays(results, out.parent if out.suffix == ".html" else out)
-        for line in without:
-            typer.secho(f"warning: {line}", fg="yellow", err=True)
-    typer.echo(str(write_report(results, out, omitted=omitted)))
+    def warn(text: str) -> None:
+        typer.secho(f"warning: {text}", fg="yellow", err=True)
+
+    typer.echo(str(report_files(runs, out, replays=replays, warn=warn)))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from eidrive_scenario.cli.added_options import Keep
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
 from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
@@ -48,6 +49,12 @@ def sweep(
     param: Annotated[list[str] | None, typer.Option(metavar="K=V", help="Parameter of all runs; repeatable.")] = None,
     criterion: Annotated[list[str] | None, rare(metavar="YAML|FILE", help="Add criteria; repeatable.")] = None,
     time_limit: Annotated[float, rare(help="Maximum simulated time in seconds.")] = 120.0,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of a subfolder per run: recording, result.json.", show_default="none")
+    ] = None,
+    record: Annotated[
+        Keep | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")
+    ] = None,
     wall_limit: Annotated[float, rare(help="Maximum wall time of each run in seconds.")] = USUAL_LIMIT,
     workers: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Processes.", show_default="number of cores")
@@ -95,6 +102,7 @@ def sweep(
     from eidrive_scenario.experiments.sweeps.axes import parse_axes
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
     from eidrive_scenario.experiments.sweeps.designs import points_of
+    from eidrive_scenario.experiments.sweeps.execution import KeptFiles
     from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
     from eidrive_scenario.experiments.sweeps.searches import BATCH
     from eidrive_scenario.experiments.sweeps.store import ResultStore
@@ -105,6 +113,9 @@ def sweep(
 
     for option, value in (("--time-limit", time_limit), ("--wall-limit", wall_limit)):
         check_seconds(option, value)
+    if record is not None and out is None:
+        raise SettingError(Diagnostic("--record without --out has no effect", "add --out DIR"))
+    files = None if out is None else KeptFiles(out.absolute(), (record or Keep.always).value, store.absolute())
     path = resolve_scenario(scenario)
     settings = RunSettings(
         channel=channel,
@@ -138,10 +149,12 @@ def sweep(
             crew = DaskWorkers.connect(scheduler, workers)
         try:
             if search is not None:
-                search.run(plan, opened, crew, wall_limit=wall_limit, retry=retry)
+                search.run(plan, opened, crew, wall_limit=wall_limit, retry=retry, files=files)
                 raise typer.Exit
             with ProgressDisplay(len(jobs)) as display:
-                progress = run_sweep(jobs, opened, crew, wall_limit=wall_limit, retry=retry, shown=display.show)
+                progress = run_sweep(
+                    jobs, opened, crew, wall_limit=wall_limit, retry=retry, files=files, shown=display.show
+                )
         finally:
             crew.close()
     _print_summary(progress, store)

@@ -12,6 +12,7 @@ import typer
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis
 from eidrive_scenario.experiments.sweeps.boundary import Boundary
+from eidrive_scenario.experiments.sweeps.execution import KeptFiles
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.searches import Execute, falsify, find_boundary
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
@@ -72,12 +73,19 @@ class Search:
         return cls(axis, bound, least, (), fixed, objective, most)
 
     def run(
-        self, plan: SweepPlan, store: ResultStore, workers: Workers, *, wall_limit: float | None, retry: bool
+        self,
+        plan: SweepPlan,
+        store: ResultStore,
+        workers: Workers,
+        *,
+        wall_limit: float | None,
+        retry: bool,
+        files: KeptFiles | None = None,
     ) -> None:
         """Search, and print the result."""
 
         def execute(jobs: Sequence[SweepJob]) -> list[StoredRun]:
-            run_sweep(jobs, store, workers, wall_limit=wall_limit, retry=retry)
+            run_sweep(jobs, store, workers, wall_limit=wall_limit, retry=retry, files=files)
             return store.rows([job.key for job in jobs])
 
         if self.boundary is None:

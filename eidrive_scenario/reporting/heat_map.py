@@ -18,11 +18,11 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.outcome_grid import GridCell, OutcomeGrid, run_outcome_grid
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.library import from_library
+from eidrive_scenario.reporting.drawing.heat_cells import heat_cells
 
 DISTRIBUTIONS = ("ncap/crossing_car_grid", "ncap/crossing_child_grid")
 """Distributions of the library that are drawn by default."""
@@ -59,18 +59,9 @@ def _draw(axes: Axes, cells: Sequence[GridCell], scale: Normalize) -> None:
         if cell.impact_speed is not None:
             speeds[row, column] = KMH * cell.impact_speed
         others[row, column] = float(not cell.passed)
-    edges = _edges(xs), _edges(ys)
     base = matplotlib.colors.ListedColormap([AVOIDED, UNFINISHED])
-    axes.pcolormesh(*edges, others, cmap=base, vmin=0, vmax=1, edgecolors="white", linewidth=0.5)
-    axes.pcolormesh(*edges, speeds, cmap=COLLISION, norm=scale, edgecolors="white", linewidth=0.5)
-
-
-def _edges(values: Sequence[float]) -> Array:
-    """Return the edges of cells around sorted values."""
-    if len(values) == 1:
-        return np.array([values[0] - 0.5, values[0] + 0.5])
-    inner = (np.array(values[1:]) + np.array(values[:-1])) / 2.0
-    return np.concatenate([[2 * values[0] - inner[0]], inner, [2 * values[-1] - inner[-1]]])
+    heat_cells(axes, xs, ys, others, colors=base, scale=Normalize(0.0, 1.0))
+    heat_cells(axes, xs, ys, speeds, colors=COLLISION, scale=scale)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

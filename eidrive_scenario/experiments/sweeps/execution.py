@@ -6,6 +6,8 @@ import os
 import threading
 import time
 import traceback
+from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 
 from eidrive_scenario.errors import ConstraintError, InputError, WallLimitError
@@ -13,7 +15,16 @@ from eidrive_scenario.exit_codes import ABORTED as ABORTED_CODE
 from eidrive_scenario.experiments.commands import command_of
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
-from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, EXCLUDED, FAILED, INVALID, PASSED, StoredRun
+from eidrive_scenario.experiments.sweeps.store import (
+    ABORTED,
+    CRASHED,
+    EXCLUDED,
+    FAILED,
+    FOLDER,
+    INVALID,
+    PASSED,
+    StoredRun,
+)
 from eidrive_scenario.library import name_of
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
@@ -32,15 +43,37 @@ def _end_process(limit: Limit, frame: FrameType | None) -> None:
     os._exit(ABORTED_CODE)
 
 
-def execute(job: SweepJob, wall_limit: float | None) -> StoredRun:
+@dataclass(frozen=True)
+class KeptFiles:
+    """Files of the runs of a sweep.
+
+    below   folder of a subfolder per run, with `result.json` and, by `record`, its recording
+    record  `always`, `on-failure` or `never`
+    store   file of the store; rows name folders relative to its folder
+    """
+
+    below: Path
+    record: str
+    store: Path
+
+
+def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = None) -> StoredRun:
     """Run a job and return its row; errors are rows, too.
 
     wall_limit  limit of the wall time of loading and run [s]
+    files       files that are kept; None for none
     """
     with _one_run:
         start = time.perf_counter()
         try:
-            result = run_and_save(source_of(job), seed=job.seed, settings=job.settings, wall_limit=wall_limit)
+            result = run_and_save(
+                source_of(job),
+                seed=job.seed,
+                settings=job.settings,
+                below=None if files is None else files.below,
+                record=False if files is None else files.record,
+                wall_limit=wall_limit,
+            )
         except ConstraintError as error:
             return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
         except InputError as error:
@@ -55,12 +88,19 @@ def execute(job: SweepJob, wall_limit: float | None) -> StoredRun:
             seed=job.seed,
             status=PASSED if result.passed else FAILED,
             point=dict(job.point),
-            result=result.to_dict(),
+            result={**result.to_dict(), **_folder(result.folder, files)},
             error="",
             command=result.command,
             wall_s=round(time.perf_counter() - start, 4),
             settings=result.settings.canonical,
         )
+
+
+def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
+    """Return the column of the folder of a run, if its files are kept."""
+    if folder is None or files is None:
+        return {}
+    return {FOLDER: os.path.relpath(folder.resolve(), files.store.resolve().parent)}
 
 
 def crashed(job: SweepJob, message: str) -> StoredRun:

@@ -14,16 +14,20 @@ import msgspec
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, SimulationError
 from eidrive_scenario.files.atomic import exclusive
+from eidrive_scenario.files.bounded import is_regular_file
 
 T = TypeVar("T")
 FORMAT = 1
 """Version of the tables."""
+_HEADER = b"SQLite format 3\0"
 APPLICATION = 0x65694452
 """Application id in the header of the file, `eiDR`."""
 PASSED, FAILED, ABORTED, CRASHED, INVALID, EXCLUDED = "passed", "failed", "aborted", "crashed", "invalid", "excluded"
 STATUSES = (PASSED, FAILED, ABORTED, CRASHED, INVALID, EXCLUDED)
 """Outcomes of a run: verdict of its criteria; aborted by an error or its wall limit; end of its worker process; invalid
 input; excluded by constraints of parameters."""
+FOLDER = "folder"
+"""Column of a result with the folder of the files of the run, relative to that of the store."""
 REPEATABLE = (ABORTED, CRASHED)
 """Outcomes that need not be those of a repetition."""
 
@@ -178,6 +182,14 @@ class ResultStore:
                 raise KeyError(key)
             found.append(_stored_run(row))
         return found
+
+
+def is_store(path: Path) -> bool:
+    """Whether a file is an SQLite file, as all stores are."""
+    if not is_regular_file(path):
+        return False
+    with path.open("rb") as stream:
+        return stream.read(len(_HEADER)) == _HEADER
 
 
 def _row(run: StoredRun) -> tuple[Any, ...]:

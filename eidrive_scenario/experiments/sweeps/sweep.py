@@ -9,7 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from eidrive_scenario.experiments.sweeps.execution import crashed, execute
+from eidrive_scenario.experiments.sweeps.execution import KeptFiles, crashed, execute
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import EXCLUDED, FAILED, PASSED, REPEATABLE, ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.workers import Workers
@@ -93,12 +93,14 @@ def run_sweep(
     *,
     wall_limit: float | None = None,
     retry: bool = False,
+    files: KeptFiles | None = None,
     shown: Callable[[SweepProgress, StoredRun | None], None] = lambda progress, run: None,
 ) -> SweepProgress:
     """Run all jobs without a result in the store, and return the progress.
 
     wall_limit  limit of the wall time of each run [s]
     retry       repeat runs that were aborted or whose worker ended
+    files       files of the runs that are kept; None for none
     shown       function that gets the progress at the start, at the end, and each run once it is stored
 
     Raise SimulationError if the store cannot be written; the results of all earlier runs are stored.
@@ -108,7 +110,7 @@ def run_sweep(
     running: dict[Future[StoredRun], tuple[SweepJob, int]] = {}
 
     def start(job: SweepJob, tries: int) -> None:
-        running[workers.submit(execute, job, wall_limit)] = job, tries
+        running[workers.submit(execute, job, wall_limit, files)] = job, tries
 
     def left() -> Iterator[SweepJob]:
         for job in jobs:

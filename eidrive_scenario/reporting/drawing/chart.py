@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
-from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -16,36 +12,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from eidrive_scenario.reporting.drawing.inline_svg import PAGE_STYLE, PAPER, inline_svg
+
 WIDTH, HEIGHT = 11.0, 3.0
 """Size of the chart [in]; a page scales it to its own width."""
 LEFT, RIGHT, TOP, BOTTOM = 0.047, 0.873, 0.95, 0.14
 """Edges of the axes as fractions of the size. The names of the series are to the right of them."""
+WIDE = 0.99
+"""Right edge of the axes without names."""
 NAME_SPACING = 11.5
 """Minimum vertical distance between names [pt]."""
-PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}
-"""CSS variables of the page, whose values depend on its light or dark scheme, by the color that matplotlib draws."""
-_AXIS, _GRID, _TEXT, _PAPER = PAGE_COLORS
-_STYLE: dict[Any, Any] = {
-    "axes.edgecolor": _AXIS,
-    "axes.labelcolor": _TEXT,
-    "axes.spines.left": False,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "font.size": 9.0,
-    "grid.color": _GRID,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "eidrive",
-    "text.parse_math": False,
-    "xtick.color": _AXIS,
-    "xtick.labelcolor": _TEXT,
-    "ytick.labelcolor": _TEXT,
-    "ytick.left": False,
-}
 
 
 @dataclass(frozen=True)
 class ChartSeries:
-    """Series of a chart: points (x, y), and the index of an optional marked point."""
+    """Series of a chart: points (x, y), and the index of an optional marked point.
+
+    low, high  limits of the interval of each y, drawn as a band; () without intervals
+    """
 
     name: str
     color: str
@@ -53,6 +37,8 @@ class ChartSeries:
     y: tuple[float, ...]
     dashed: bool = False
     mark: int | None = None
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
 
 
 def line_chart(
@@ -62,11 +48,17 @@ def line_chart(
     y_title: str,
     x_range: tuple[float, float] | None = None,
     y_range: tuple[float, float] | None = None,
+    named: bool = True,
+    points: bool = False,
 ) -> str:
-    """Return the series as an SVG element. A line is interrupted at points outside the ranges."""
-    with rc_context(_STYLE):
+    """Return the series as an SVG element. A line is interrupted at points outside the ranges.
+
+    named   whether the names of the series are written beside their ends; without them the page needs a legend
+    points  whether each point is marked
+    """
+    with rc_context(PAGE_STYLE):
         figure = Figure(figsize=(WIDTH, HEIGHT))
-        axes = figure.add_axes((LEFT, BOTTOM, RIGHT - LEFT, TOP - BOTTOM))
+        axes = figure.add_axes((LEFT, BOTTOM, (RIGHT if named else WIDE) - LEFT, TOP - BOTTOM))
         axes.set_xlim(x_range or _extent([value for line in lines for value in line.x]))
         axes.set_ylim(y_range or (0.0, _extent([value for line in lines for value in line.y])[1]))
         axes.set_xlabel(x_title)
@@ -76,8 +68,11 @@ def line_chart(
         axes.grid(axis="y")
         axes.set_axisbelow(True)
         ends = [end for line in sorted(lines, key=lambda line: line.dashed) if (end := _draw(axes, line)) is not None]
-        _draw_names(axes, ends)
-        return _inline_svg(figure, f"{y_title} over {x_title}")
+        for line in lines if points else ():
+            axes.plot(line.x, line.y, "o", color=line.color, ms=4.0, clip_on=False, zorder=3.0, gid="mark")
+        if named:
+            _draw_names(axes, ends)
+        return inline_svg(figure, f"{y_title} over {x_title}")
 
 
 def _draw(axes: Axes, line: ChartSeries) -> tuple[float, float, ChartSeries] | None:
@@ -87,11 +82,13 @@ def _draw(axes: Axes, line: ChartSeries) -> tuple[float, float, ChartSeries] | N
     inside = (left <= x) & (x <= right) & (bottom <= y) & (y <= top)
     if not inside.any():
         return None
+    if line.low:
+        axes.fill_between(x, line.low, line.high, color=line.color, alpha=0.16, lw=0.0)
     style = (0.0, (3.6, 3.6)) if line.dashed else "-"
     axes.plot(x, np.where(inside, y, np.nan), color=line.color, lw=1.6, ls=style, gid="series")
     if line.mark is not None:
         point = [x[line.mark]], [y[line.mark]]
-        axes.plot(*point, "o", color=line.color, ms=6.5, mec=_PAPER, mew=1.1, clip_on=False, zorder=3.0, gid="mark")
+        axes.plot(*point, "o", color=line.color, ms=6.5, mec=PAPER, mew=1.1, clip_on=False, zorder=3.0, gid="mark")
     last = int(np.flatnonzero(inside)[-1])
     return float(x[last]), float(y[last]), line
 
@@ -115,26 +112,6 @@ def _draw_names(axes: Axes, ends: Sequence[tuple[float, float, ChartSeries]]) ->
             annotation_clip=False,
             gid="name",
         )
-
-
-def _inline_svg(figure: Figure, title: str) -> str:
-    """Return a figure as an SVG element with the colors and fonts of the page, and without ids of its groups."""
-    buffer = io.StringIO()
-    without_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(buffer, format="svg", transparent=True, metadata=without_metadata)
-    svg = buffer.getvalue()
-    svg = svg[svg.index("<defs>") : svg.rindex("</svg>")]
-    svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # applies to all elements of a page
-    svg = re.sub(r'<g id="(series|mark|name)">', r'<g class="\1">', svg)
-    svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
-    svg = re.sub(r"font: (?:bold |700 )([\d.]+px)[^;\"]*", r"font-weight: 700; font-size: \1", svg)
-    svg = re.sub(r" ?font(?:-family)?: [^;\"]*;", "", svg)
-    svg = svg.replace("xlink:href", "href")
-    for color, variable in PAGE_COLORS.items():
-        svg = svg.replace(color, f"var({variable}, {color})")
-    size = f"{72.0 * WIDTH:g} {72.0 * HEIGHT:g}"
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" class="chart" viewBox="0 0 {size}" role="img">'
-    return f"{head}<title>{escape(title)}</title>{svg}</svg>"
 
 
 def _extent(values: Sequence[float]) -> tuple[float, float]:

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from eidrive_scenario.experiments.reproduction.layout import Row
 from eidrive_scenario.experiments.reproduction.rows import number, scenario_title
 from eidrive_scenario.experiments.reproduction.sensitivity_text import LIBRARY, ORIGINAL
+from eidrive_scenario.reporting.drawing.heat_cells import heat_cells
 
 COLORS = "YlOrBr"
 """Color map of the probability of a collision, from 0 (light) to 1 (dark); color-blind readers can distinguish it."""
@@ -54,7 +56,7 @@ def _map(axes: Axes, rows: Sequence[Row]) -> QuadMesh:
     for row in rows:
         place = speeds.index(number(row, "speed")), starts.index(number(row, "start"))
         shares[place] = number(row, "collisions") / number(row, "episodes")
-    return axes.pcolormesh(starts, speeds, shares, cmap=COLORS, vmin=0.0, vmax=1.0, shading="nearest")
+    return heat_cells(axes, starts, speeds, shares, colors=COLORS, scale=Normalize(0.0, 1.0), line=0.0)
 
 
 def _marks(axes: Axes, scenario: str) -> None:

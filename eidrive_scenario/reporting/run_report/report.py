@@ -15,22 +15,37 @@ from eidrive_scenario.experiments.statistics.proportions import wilson
 from eidrive_scenario.experiments.statistics.samples import Summary, summarize
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.run_report.matrix import parameter_matrix, scenario_matrix
+from eidrive_scenario.reporting.run_report.rate_pictures import rate_curves, rate_maps
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
 
 PREFERRED = ("min_distance", "time_to_collision", "collision.count", "messages.lost")
 """Prefixes of metrics with priority in the overview."""
+MOST_LISTED = 1000
+"""Maximum number of runs whose verdicts are listed; those that did not pass come first."""
+MOST_SETTINGS = 200
+"""Maximum number of runs of a page with all settings of each; other runs have their command."""
 SHOWN = 4
 """Maximum number of metrics in the overview."""
 _UNITS = {"count": "", "impact_speed": "m/s"}
 """Units that differ from the unit of the criterion, by the last part of the name of the metric."""
 
 
-def write_report(results: Iterable[Mapping[str, Any] | ReportedRun], out: Path, *, omitted: Sequence[str] = ()) -> Path:
+def write_report(
+    results: Iterable[Mapping[str, Any] | ReportedRun],
+    out: Path,
+    *,
+    omitted: Sequence[str] = (),
+    unjudged: Sequence[str] = (),
+    template: str = "report.html.jinja",
+    **values: Any,
+) -> Path:
     """Write a page about results in the format of `--json`, and return its path.
 
     out      file of the page if it ends in `.html`, else the folder of `report.html`
     omitted  files of runs that `results` do not contain, each with the reason; the page lists them
+    unjudged  runs of sweeps without a verdict: one line for each reason
+    template, values  template that extends the one of the report by a text above it, and its values
 
     Runs are grouped by the settings in which those of a scenario differ. A run in several folders is listed each time
     and counts once. Raise InputError without results, or for an invalid result.
@@ -42,10 +57,12 @@ def write_report(results: Iterable[Mapping[str, Any] | ReportedRun], out: Path, 
     groups = group_runs(runs)
     counted = [run for group in groups for run in group.distinct]
     metrics = _common_metrics(runs)
+    listed = _listed(counted, runs)
+    common: dict[str, Any] = {"title": "Scenario report", "footer": f"eidrive-scenario {version('eidrive-scenario')}"}
     return write_page(
         page,
-        "report.html.jinja",
-        title="Scenario report",
+        template,
+        **{**common, **values},
         total=len(counted),
         passed=sum(run.passed for run in counted),
         failed=sum(not run.passed and run.finished for run in counted),
@@ -58,23 +75,37 @@ def write_report(results: Iterable[Mapping[str, Any] | ReportedRun], out: Path, 
                 "content": group.content,
                 "differing": group.differing,
                 "anchor": f"group-{index}",
-                "runs": group.runs,
+                "runs": [run for run in group.runs if id(run) in listed],
+                "unlisted": sum(id(run) not in listed for run in group.runs),
+                "numbered": any(run.run is not None for run in group.runs),
                 "copies": len(group.runs) - len(group.distinct),
-                "varied": _varied(group.runs),
-                "matrix": parameter_matrix(group.distinct, _varied(group.runs)),
+                "varied": group.varied,
+                "matrix": None if group.numbers == group.varied else parameter_matrix(group.distinct, group.varied),
+                "maps": list(rate_maps(group)),
                 "share": wilson(sum(run.passed for run in group.distinct), len(group.distinct)),
                 "summaries": [_summary(group.distinct, name) for name in metrics],
             }
             for index, group in enumerate(groups)
         ],
         matrix=scenario_matrix(groups),
+        curves=list(rate_curves(groups)),
         number=_number,
+        value_text=_value_text,
         has_replays=any(run.replay for run in runs),
         has_settings=any(run.settings_sha256 for run in runs),
-        all_settings=lambda run: json.dumps(run.settings, indent=1, ensure_ascii=False),
+        all_settings=lambda run: (
+            json.dumps(run.settings, indent=1, ensure_ascii=False) if len(runs) <= MOST_SETTINGS else ""
+        ),
         omitted=omitted,
-        footer=f"eidrive-scenario {version('eidrive-scenario')}",
+        unjudged=unjudged,
     )
+
+
+def _listed(counted: Sequence[ReportedRun], runs: Sequence[ReportedRun]) -> set[int]:
+    """Return the identities of the runs that a page lists: at first those that did not pass, each once."""
+    if len(runs) <= MOST_LISTED:
+        return {id(run) for run in runs}
+    return {id(run) for run in sorted(counted, key=lambda run: run.passed)[:MOST_LISTED]}
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
@@ -96,18 +127,16 @@ def _title(metric: str, runs: Sequence[ReportedRun]) -> str:
     return f"{metric.replace('.', ' ')} [{unit}]" if unit else metric.replace(".", " ")
 
 
-def _varied(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
-    """Return the parameters in which runs of a distribution differ; empty for runs that differ in their seeds."""
-    if all(run.run is None for run in runs):
-        return ()
-    names = dict.fromkeys(name for run in runs for name in run.parameters)
-    return tuple(name for name in names if len({run.parameters.get(name) for run in runs}) > 1)
-
-
 def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:
     given = [run.metrics.get(metric) for run in runs]
     values = [value for value in given if value is not None and math.isfinite(value)]
     return summarize(values) if values else None
+
+
+def _value_text(run: ReportedRun, name: str) -> str:
+    """Return the value of an axis, or a parameter as its file specifies it."""
+    value = run.axes.get(name, run.parameters.get(name, ""))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _number(value: float | None, unit: str) -> str:

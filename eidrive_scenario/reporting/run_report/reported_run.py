@@ -10,9 +10,10 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.run_files import read_result
+from eidrive_scenario.simulation.result_views import typed
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
-_OF_REPORT = ("folder", "replay")
+_OF_REPORT = ("folder", "replay", "axes")
 """Fields that are no part of a result."""
 
 
@@ -48,10 +49,19 @@ class ReportedRun(BaseModel):
     settings: dict[str, Any] = {}
     settings_sha256: str = ""
     command: str = ""
+    axes: dict[str, int | float | str] = {}
+    """Values of the axes of a sweep; empty for other runs."""
     folder: Path | None = None
     """Folder of the run; None if the result was not read from a file."""
     replay: str = ""
     """Address of the replay in the report; empty without one."""
+
+    def value_of(self, name: str) -> int | float | str | None:
+        """Return the value of an axis of a sweep or of a parameter, as a number if it is one; None without it."""
+        if name in self.axes:
+            return self.axes[name]
+        found = typed(self.parameters[name]) if name in self.parameters else None
+        return found if found is None or isinstance(found, int | float) else str(found)
 
     @property
     def finished(self) -> bool:

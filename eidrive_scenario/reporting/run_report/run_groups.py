@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from eidrive_scenario.experiments.sweeps.axes import PARAMETER, is_setting
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
-from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, shorten
+from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, flow_text, shorten
 
 _LEFT_OUT = ("seed", "run", "drawn", "varied", "scenario", "channel", "detector", "planner", "cooperate")
 """Settings that differ within a group, and options that the settings of channel and stations contain."""
 _NAMES = ("channel_profile.name", "channel_profile.description")
+_OPTIONS = ("detector", "planner", "weather", "cooperate")
+"""Options of a run that change many settings of its stations."""
 _SHOWN = 200
 """Maximum number of characters of a value in a heading."""
 
@@ -20,8 +23,10 @@ _SHOWN = 200
 class RunGroup:
     """Runs with equal settings, except for the seed and values derived from it.
 
-    differing  values of the settings in which the groups of this scenario differ
+    differing  values of the settings in which the groups of this scenario differ; only those of options and of axes
+               of a sweep if they distinguish the groups
     content    content of the channel
+    axes       axes of a sweep with numbers, whose values differ within the group
     """
 
     scenario: str
@@ -29,6 +34,22 @@ class RunGroup:
     differing: Mapping[str, str]
     content: str
     runs: tuple[ReportedRun, ...]
+    axes: tuple[str, ...] = ()
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Axes of a sweep with numbers, or parameters of a distribution, whose values differ."""
+        names = dict.fromkeys(self.axes)
+        if any(run.run is not None for run in self.runs):
+            names.update(dict.fromkeys(name for run in self.runs for name in run.parameters))
+        return tuple(name for name in names if len({run.value_of(name) for run in self.runs}) > 1)
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Those of `varied` whose values are numbers."""
+        return tuple(
+            name for name in self.varied if all(isinstance(run.value_of(name), int | float) for run in self.runs)
+        )
 
     @property
     def distinct(self) -> tuple[ReportedRun, ...]:
@@ -51,37 +72,73 @@ def group_runs(runs: Sequence[ReportedRun]) -> list[RunGroup]:
 
 
 def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
-    settings = [_comparable(run) for run in runs]
+    axes = _numeric_axes(runs)
+    settings = [_comparable(run, axes) for run in runs]
     names = dict.fromkeys(name for one in settings for name in one)
     differing = [name for name in names if len({one.get(name, "") for one in settings}) > 1]
     found: dict[tuple[str, ...], list[ReportedRun]] = {}
     for run, one in zip(runs, settings, strict=True):
         found.setdefault((run.channel, *(one.get(name, "") for name in differing)), []).append(run)
+    chosen = _differing_options([(channel, members[0]) for (channel, *_), members in found.items()])
+    short = len({(key[0], *options.values()) for key, options in zip(found, chosen, strict=True)}) == len(found)
     return [
         RunGroup(
             scenario,
             channel,
-            {
-                name.replace("channel_profile.", "channel."): shorten(value, _SHOWN)
-                for name, value in zip(differing, values, strict=True)
-                if value and name not in _NAMES
+            options
+            if short
+            else {
+                **options,
+                **{
+                    name.replace("channel_profile.", "channel."): shorten(value, _SHOWN)
+                    for name, value in zip(differing, values, strict=True)
+                    if value and name not in _NAMES
+                },
             },
-            channel_text(members[0].settings),
+            channel_text(members[0].settings) if not any(name.startswith("channel.") for name in axes) else "",
             tuple(members),
+            axes,
         )
-        for (channel, *values), members in found.items()
+        for ((channel, *values), members), options in zip(found.items(), chosen, strict=True)
     ]
 
 
-def _comparable(run: ReportedRun) -> dict[str, str]:
-    """Return the settings of a run that its group shares, by path."""
+def _differing_options(first: Sequence[tuple[str, ReportedRun]]) -> list[dict[str, str]]:
+    """Return the options and text axes in which groups differ, by the channel and the first run of each."""
+    options = []
+    for channel, run in first:
+        given = {name: flow_text(run.settings[name]) for name in _OPTIONS if name in run.settings}
+        swept = {name: value for name, value in run.axes.items() if isinstance(value, str) and value != channel}
+        options.append({**given, **swept})
+    names = dict.fromkeys(name for one in options for name in one)
+    differing = [name for name in names if len({one.get(name, "") for one in options}) > 1]
+    return [{name: shorten(one[name], _SHOWN) for name in differing if name in one} for one in options]
+
+
+def _numeric_axes(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
+    """Return the axes of sweeps over several numbers."""
+    values: dict[str, set[object]] = {}
+    for run in runs:
+        for name, value in run.axes.items():
+            values.setdefault(name, set()).add(value)
+    return tuple(
+        name
+        for name, found in values.items()
+        if len(found) > 1 and all(isinstance(value, int | float) for value in found)
+    )
+
+
+def _comparable(run: ReportedRun, axes: Sequence[str] = ()) -> dict[str, str]:
+    """Return the settings of a run that its group shares, by path: without those of its axes with numbers."""
     settings: dict[str, Any] = {key: value for key, value in run.settings.items() if key not in _LEFT_OUT}
-    own = {name for key in ("drawn", "varied") for name in _names(run.settings.get(key))}
+    swept = {name.removeprefix(PARAMETER) for name in axes if name in run.axes}
+    own = {name for key in ("drawn", "varied") for name in _names(run.settings.get(key))} | swept
     if isinstance(settings.get("parameters"), Mapping):
         settings["parameters"] = {name: value for name, value in settings["parameters"].items() if name not in own}
     if isinstance(settings.get("files"), list):
         settings["files"] = _files(settings["files"])
-    return flatten(settings)
+    paths = {name.replace("channel.", "channel_profile.", 1) for name in axes if name in run.axes and is_setting(name)}
+    return {name: value for name, value in flatten(settings).items() if name not in paths}
 
 
 def _files(files: Sequence[Any]) -> dict[str, Any]:

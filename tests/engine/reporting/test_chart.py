@@ -13,13 +13,13 @@ from eidrive_scenario.reporting.drawing.chart import (
     HEIGHT,
     LEFT,
     NAME_SPACING,
-    PAGE_COLORS,
     RIGHT,
     TOP,
     WIDTH,
     ChartSeries,
     line_chart,
 )
+from eidrive_scenario.reporting.drawing.inline_svg import PAGE_COLORS
 
 SVG = "{http://www.w3.org/2000/svg}"
 

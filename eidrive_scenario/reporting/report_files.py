@@ -1,0 +1,52 @@
+"""Report about files of runs: the input of `eidrive report` and of the pytest plugin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.sweeps.store import is_store
+from eidrive_scenario.recording.run_files import RESULT, result_paths, unfinished_runs
+from eidrive_scenario.reporting.replay.run_replays import write_replays
+from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.reported_run import read_runs
+
+
+def report_files(
+    locations: Sequence[Path], out: Path, *, replays: bool = True, warn: Callable[[str], None] = lambda text: None
+) -> Path:
+    """Write the report about results, folders of runs and stores of sweeps, and return the path of its page.
+
+    out      file of the page if it ends in `.html`, else the folder of `report.html`
+    replays  whether the replay of each run with a recording is written beside the page
+    warn     function that gets a line for each run or recording that the report omits
+
+    Raise InputError without any result, and for a damaged file that `locations` names. Damaged files below folders are
+    omitted.
+    """
+    stores = [path for path in locations if is_store(path)]
+    results, errors = read_runs(result_paths([path for path in locations if path not in stores]))
+    omitted = [f"{path}: the run did not end" for path in unfinished_runs(locations)]
+    unjudged: list[str] = []
+    if stores:
+        from eidrive_scenario.reporting.run_report.sweep_runs import read_sweeps
+
+        swept, unjudged = read_sweeps(stores)
+        results += swept
+    given = {str(path) for path in locations}
+    invalid = not results or any(error.source in given for error in errors)
+    if not invalid:
+        omitted += [f"{error.source}: {error.message}" for error in errors]
+    for line in (*unjudged, *(f"{line}, the report omits it" for line in omitted)):
+        warn(line)
+    if invalid:
+        folders = ", ".join(map(str, locations))
+        hint = "give folders written by eidrive run --out, or stores of sweeps"
+        missing = "no run has a verdict" if unjudged else f"no {RESULT} in {folders}"
+        raise SettingError(errors or Diagnostic(missing, hint))
+    if replays:
+        results, without = write_replays(results, out.parent if out.suffix == ".html" else out)
+        for line in without:
+            warn(line)
+    return write_report(results, out, omitted=omitted, unjudged=unjudged)

@@ -1,0 +1,113 @@
+"""Runs in the stores of sweeps, as input of a report."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.experiments.sweeps.results import stored_runs
+from eidrive_scenario.experiments.sweeps.store import FAILED, FOLDER, PASSED, StoredRun
+from eidrive_scenario.recording.run_files import RESULT, read_result
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
+
+MOST_RUNS = 20_000
+"""Maximum number of runs of stores in a report."""
+_FIXED = frozenset({"dt", "simulated_s", "wall_s", "warnings", "exit_code", "seed", "run", "passed", "end_reason"})
+"""Columns of a result that are no metrics."""
+_PREFIXES = ("parameter.", "channel.")
+_ENDINGS = (".passed", ".value", ".limit")
+
+
+def read_sweeps(stores: Sequence[Path]) -> tuple[list[ReportedRun], list[str]]:
+    """Return the runs with a verdict in these stores, and a line for each reason of runs without one.
+
+    A run whose files were kept has the folder of its recording, and the criteria with the reasons of its result.
+    Raise SettingError if a file is not a store, or if the stores have too many runs.
+    """
+    runs: list[ReportedRun] = []
+    without: Counter[tuple[str, str]] = Counter()
+    commands: dict[tuple[str, str], str] = {}
+    for run, store in _rows(stores):
+        if run.status not in (PASSED, FAILED):
+            reason = run.status, run.error.partition("\n")[0]
+            without[reason] += 1
+            commands.setdefault(reason, run.command)
+            continue
+        if len(runs) == MOST_RUNS:
+            message = f"the stores have more than {MOST_RUNS} runs with a verdict"
+            raise SettingError(Diagnostic(message, "eidrive results prints and exports larger sweeps", str(store)))
+        runs.append(_reported(run, store))
+    places = ", ".join(map(str, stores))
+    lines = [
+        f"{places}: {count} {status}: {message}"
+        + (f" (such as {commands[status, message]})" * bool(commands[status, message]))
+        for (status, message), count in without.most_common()
+    ]
+    return runs, lines
+
+
+def _rows(stores: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
+    """Yield the runs of the stores, each with the last store that has it."""
+    found: dict[str, tuple[StoredRun, Path]] = {}
+    for store in stores:
+        found.update((run.key, (run, store)) for run in stored_runs([store]))
+    yield from found.values()
+
+
+def _reported(run: StoredRun, store: Path) -> ReportedRun:
+    kept = _kept_result(run, store)
+    if kept is None:
+        reported = parse_run(_as_result(run), store)
+    else:
+        reported = parse_run(kept[1], kept[0]).model_copy(update={"folder": kept[0].parent})
+    return reported.model_copy(update={"axes": {name: value for name, value in run.point.items() if name != "run"}})
+
+
+def _kept_result(run: StoredRun, store: Path) -> tuple[Path, Mapping[str, Any]] | None:
+    """Return file and content of the result in the folder of the run; None without that of this run."""
+    folder = run.result.get(FOLDER)
+    if not isinstance(folder, str):
+        return None
+    path = store.parent / folder / RESULT
+    try:
+        result = read_result(path)
+    except InputError:
+        return None
+    return (path, {**result, "run": run.run}) if result["trace_hash"] == run.result.get("trace_hash") else None
+
+
+def _as_result(run: StoredRun) -> dict[str, Any]:
+    """Return a row in the format of `--json`, which has neither the reasons nor the units of criteria."""
+    row = run.result
+    settings = json.loads(run.settings) if run.settings else {}
+    names = [name.removesuffix(".passed") for name in row if name.endswith(".passed")]
+    criteria = [
+        {"name": name, **{end[1:]: row.get(name + end) for end in _ENDINGS}}
+        for name in names
+        if row.get(f"{name}.passed") is not None
+    ]
+    return {
+        "scenario": run.scenario,
+        "run": run.run,
+        "seed": run.seed,
+        "channel": str(row.get("channel", "")),
+        "passed": row.get("passed"),
+        "end_reason": row.get("end_reason"),
+        "criteria": criteria,
+        "metrics": {name: value for name, value in row.items() if _is_metric(name, value)},
+        "parameters": settings.get("parameters", {}),
+        "settings": settings,
+        "settings_sha256": row.get("settings_sha256", ""),
+        "trace_hash": row.get("trace_hash", ""),
+        "simulated_s": row.get("simulated_s", 0.0),
+        "command": run.command,
+    }
+
+
+def _is_metric(name: str, value: Any) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and name not in _FIXED and not name.startswith(_PREFIXES) and not name.endswith(_ENDINGS)
