@@ -35,6 +35,7 @@ _SHOWN = (
     "time_limit",
     "out",
     "record",
+    "report",
 )
 """Options that the header of a report lists."""
 _COMBINED = ("drive", "criterion")
@@ -115,6 +116,12 @@ OPTIONS = (
         "always|on-failure|never",
         "runs whose recording and camera images --eidrive-out keeps (default: always)",
         parse_record,
+    ),
+    Option(
+        "report",
+        "FILE|DIR",
+        "write the page of `eidrive report` about the runs of the session, with a replay of each recorded run; without "
+        "--eidrive-out their files are kept in the folder `runs` beside it",
     ),
     Option(
         "time_limit", "SECONDS", "maximum simulated time of each run; an error if reached (default: 120)", parse_seconds

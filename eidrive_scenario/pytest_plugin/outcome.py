@@ -15,7 +15,8 @@ from eidrive_scenario.pytest_plugin.hung_runs import wall_limit_of
 from eidrive_scenario.pytest_plugin.option_values import split_channels
 from eidrive_scenario.pytest_plugin.options import OPTIONS, command_line_value, listed_value, option_value
 from eidrive_scenario.pytest_plugin.relative_paths import path_beside
-from eidrive_scenario.pytest_plugin.run_records import add_properties
+from eidrive_scenario.pytest_plugin.run_records import add_properties, record_of
+from eidrive_scenario.pytest_plugin.session_report import runs_folder
 from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
@@ -28,7 +29,7 @@ Properties = list[tuple[str, object]]
 
 WARNING = "warning"
 """Name of the properties with the warnings of a run."""
-_NOT_REPEATED = ("out", "record", "max_runs")
+_NOT_REPEATED = ("out", "record", "report", "max_runs")
 """Options that the command of a test omits, as they do not change its run."""
 
 
@@ -41,13 +42,13 @@ def run_file_and_report(
     """
     result: RunResult | RateVerdict
     if variant.rate is None:
-        result = _run_and_report(item.config, source, run or source, variant, {})
+        result = _run_and_report(item, source, run or source, variant, {})
         add_properties(item, properties(result))
     else:
         from eidrive_scenario.experiments.success_rate import decide_rate
 
         result = decide_rate(
-            lambda seed: _run_and_report(item.config, source, run or source, replace(variant, seed=seed), {}),
+            lambda seed: _run_and_report(item, source, run or source, replace(variant, seed=seed), {}),
             variant.rate,
         )
         add_properties(item, rate_properties(result))
@@ -62,7 +63,7 @@ def run_variant(item: pytest.Item, source: Source, variant: RunVariant, **overri
     The output folder follows the path of the scenario, or without a file the path of the test. Raise InputError.
     """
     file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
-    return _run_and_report(item.config, file, source, variant, overrides, command=pytest_command(item))
+    return _run_and_report(item, file, source, variant, overrides, command=pytest_command(item))
 
 
 def pytest_command(item: pytest.Item) -> str:
@@ -90,7 +91,7 @@ def _absolute(value: str) -> str:
 
 
 def _run_and_report(
-    config: pytest.Config,
+    item: pytest.Item,
     file: Path,
     source: Source | ConcreteRun,
     variant: RunVariant,
@@ -101,7 +102,7 @@ def _run_and_report(
     from eidrive_scenario.experiments.single_run import run_and_save
     from eidrive_scenario.simulation import RunSettings
 
-    overrides = dict(overrides)
+    config, overrides = item.config, dict(overrides)
     wall_limit = overrides.pop("wall_limit", wall_limit_of(config))
     known = [field.name for field in fields(RunSettings)]
     for keyword in overrides:
@@ -116,12 +117,9 @@ def _run_and_report(
     if (time_limit := option_value(config, "time_limit")) is not None:
         settings["time_limit"] = time_limit
     settings.update(overrides)
-    folder = command_line_value(config, "out")
-    below = None if folder is None else Path(config.invocation_params.dir, folder)
-    if below is None and (listed := option_value(config, "out")) is not None:
-        below = config.rootpath / listed
+    below = runs_folder(config)
     below = below and below.joinpath(*_subfolders(config, file))
-    return run_and_save(
+    result = run_and_save(
         source,
         seed=variant.seed,
         settings=RunSettings(**settings),
@@ -130,6 +128,9 @@ def _run_and_report(
         wall_limit=wall_limit,
         command=command,
     )
+    if result.folder is not None:
+        record_of(item).folders.append(str(result.folder))
+    return result
 
 
 def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, Any]:

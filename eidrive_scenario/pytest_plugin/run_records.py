@@ -23,12 +23,13 @@ _records = pytest.StashKey["RunRecord"]()
 
 @dataclass
 class RunRecord:
-    """Facts about the runs of a test that did not pass.
+    """Facts about the runs of a test, most of them about those that did not pass.
 
     properties   entries of `user_properties` that the plugin has added
     reasons      one line for each reason
     commands     command lines that reproduce the runs
     attachments  recordings and results
+    folders      folders of the files of all runs
     file, line   place of the first reason; line 0 if it is unknown
     """
 
@@ -36,6 +37,7 @@ class RunRecord:
     reasons: list[str] = field(default_factory=list)
     commands: list[str] = field(default_factory=list)
     attachments: list[str] = field(default_factory=list)
+    folders: list[str] = field(default_factory=list)
     file: str = ""
     line: int = 0
 
@@ -45,6 +47,7 @@ class RunRecord:
             "reasons": self.reasons,
             "commands": self.commands,
             "attachments": self.attachments,
+            "folders": self.folders,
             "file": self.file,
             "line": self.line,
         }
