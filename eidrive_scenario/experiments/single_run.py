@@ -21,7 +21,7 @@ from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
-from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
+from eidrive_scenario.simulation import DEFAULT_SEED, Observer, RunResult, RunSettings, Simulation
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.run import checked_seed
 from eidrive_scenario.wall_limit import limit_wall_time
@@ -61,6 +61,7 @@ def run_and_save(
     csv: str | Path | None = None,
     log: str | Path | None = None,
     explanations: Sequence[Explanation] = (),
+    observers: Sequence[Observer] = (),
     wall_limit: float | None = None,
     command: str = "",
 ) -> RunResult:
@@ -73,6 +74,7 @@ def run_and_save(
     csv           file for one row per actor and tick
     log           file for one line per storyboard transition with its reason; `-` is standard output
     explanations  explanations that observe the run
+    observers     further observers of the run
     command       command line that repeats the run of a scenario without a file
     wall_limit    limit of the wall time of loading and run [s]
 
@@ -93,7 +95,7 @@ def run_and_save(
             if limit is not None and command:
                 limit.add_note(f"reproduce: {command}")
             simulation = stack.enter_context(
-                Simulation(source, seed=seed, settings=settings, observers=tuple(explanations))
+                Simulation(source, seed=seed, settings=settings, observers=(*explanations, *observers))
             )
             for explanation in explanations:
                 explanation.watch(simulation.storyboard)

@@ -6,12 +6,14 @@ python -m eidrive_scenario.reporting.demo --out reports/demo.html
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from rich.console import Console
@@ -33,7 +35,7 @@ from eidrive_scenario.experiments.paper import (
     tabulate,
 )
 from eidrive_scenario.experiments.repetitions import Job, jobs_of, run_jobs
-from eidrive_scenario.experiments.single_run import as_json_text
+from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
 from eidrive_scenario.experiments.tables import render
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.library import resolve_scenario
@@ -43,20 +45,22 @@ from eidrive_scenario.reporting.demo_page import DemoSite, PageImage, write_demo
 from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing
 from eidrive_scenario.reporting.drawing.street_view import driver_view, helper_view, street_image
+from eidrive_scenario.reporting.replay.run_replays import write_replays
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed, run_file
+from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed
 from eidrive_scenario.world.specs import actor_spec
 
 StoryResult = tuple[RunResult, Story | None]
 
 
-def run_story(job: Job, watched: int) -> StoryResult:
-    """Run a job; runs of the seed `watched` also return their story."""
+def run_story(job: Job, watched: int, below: Path) -> StoryResult:
+    """Run a job; runs of the seed `watched` also return their story and are recorded below a folder."""
     path = resolve_scenario(job.scenario)
     if job.seed != watched:
-        return run_file(path, seed=job.seed, settings=job.settings), None
+        return run_and_save(path, seed=job.seed, settings=job.settings), None
     observer = KeyFrames(EGO, HIDDEN, conflict_areas(load_for_seed(path, job.seed, job.settings.parameters)))
-    result = run_file(path, seed=job.seed, settings=job.settings, observers=(observer,))
+    result = run_and_save(path, seed=job.seed, settings=job.settings, below=below, observers=(observer,))
     return result, observer.story()
 
 
@@ -108,13 +112,28 @@ def write_results(out: Path, runs: Sequence[tuple[Job, RunResult]]) -> Path:
     return out
 
 
+def reported_runs(runs: Sequence[tuple[Job, RunResult]]) -> list[ReportedRun]:
+    """Return the runs as input of a report, with the folders of recorded ones."""
+    return [
+        parse_run(json.loads(as_json_text(replace(result, scenario=job.scenario)))).model_copy(
+            update={"folder": result.folder}
+        )
+        for job, result in runs
+    ]
+
+
 def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console) -> tuple[Table, Table]:
-    """Execute all runs, print the tables, and write the page and its numbers (`.json` in the same folder)."""
+    """Execute all runs, print the tables, and write page, replays and numbers (`.json` in the same folder)."""
     settings = run_settings(detector="oracle")
     jobs = [job for scenario in SCENARIOS for job in jobs_of(scenario, settings, seeds)]
     console.print(f"{len(SCENARIOS)} scenarios, {len(settings)} channels, {len(seeds)} seeds: {len(jobs)} runs")
-    results = run_jobs(jobs, partial(run_story, watched=seeds[0]), workers=workers, console=console, title="demo")
-    runs = [(job, result) for job, (result, _) in zip(jobs, results, strict=True)]
+    with TemporaryDirectory() as recordings:
+        task = partial(run_story, watched=seeds[0], below=Path(recordings))
+        results = run_jobs(jobs, task, workers=workers, console=console, title="demo")
+        runs = [(job, result) for job, (result, _) in zip(jobs, results, strict=True)]
+        reported, without = write_replays(reported_runs(runs), out.parent)
+    for line in without:
+        console.print(Text(line, style="yellow"))
     stories: Mapping[tuple[str, str], Story] = {
         (job.scenario, job.arm): story for job, (_, story) in zip(jobs, results, strict=True) if story is not None
     }
@@ -125,7 +144,7 @@ def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console)
     console.print(Text(difference(links, own)))
     sites = {name: demo_site(name, seeds[0], stories[name, "ideal"]) for name in SCENARIOS}
     footer = f"eidrive-scenario {version('eidrive-scenario')}, seeds {seeds[0]} to {seeds[-1]}"
-    page = write_demo(out, links, own, stories, sites, watched=seeds[0], footer=footer)
+    page = write_demo(out, reported, links, own, stories, sites, watched=seeds[0], footer=footer)
     numbers = write_results(out.with_suffix(".json"), runs)
     console.print(f"\nwritten: {page}, {numbers}")
     return links, own

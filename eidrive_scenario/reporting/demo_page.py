@@ -24,7 +24,9 @@ from eidrive_scenario.experiments.paper import (
 from eidrive_scenario.reporting.drawing.chart import ChartSeries, line_chart
 from eidrive_scenario.reporting.drawing.key_frames import Moment, Story
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
-from eidrive_scenario.reporting.page import png_address, write_page
+from eidrive_scenario.reporting.page import png_address
+from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
 
 COLORS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
 DASHED = {"none", "error"}
@@ -52,6 +54,7 @@ class DemoSite:
 
 def write_demo(
     out: Path,
+    runs: Sequence[ReportedRun],
     links: Table,
     own: Table,
     stories: Mapping[tuple[str, str], Story],
@@ -60,7 +63,10 @@ def write_demo(
     watched: int,
     footer: str = "",
 ) -> Path:
-    """Write the page. `stories` are those of the seed `watched`, by scenario and channel. Return `out`."""
+    """Write the report about `runs` with tables and figures above it, and return `out`.
+
+    `stories` are those of the seed `watched`, by scenario and channel.
+    """
     windows = {scenario: _window(scenario, stories) for scenario in links.scenarios}
     symbols = "".join(roads_symbol(sites[name].roads, _identifier(name)) for name in links.scenarios)
     values = {
@@ -72,9 +78,10 @@ def write_demo(
         }
         for table in (links, own)
     }
-    return write_page(
+    return write_report(
+        runs,
         out,
-        "demo.html.jinja",
+        template="demo.html.jinja",
         title="Cooperative perception of an occluded car",
         symbols=Markup(
             f'<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>{symbols}</defs></svg>'

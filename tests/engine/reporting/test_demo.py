@@ -5,8 +5,10 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
+from lxml import html
 from rich.console import Console
 
 from eidrive_scenario.experiments.paper import SCENARIOS, evaluate_claims, run_settings
@@ -46,6 +48,18 @@ def test_demo_page_contains_camera_images_of_ego_and_helper(done: tuple[Path, st
     assert page.count("data:image/png;base64,") == 4
     assert "View of RSU" in page
     assert "View of Spectator" in page
+
+
+def test_demo_page_ends_in_the_report_with_replays(done: tuple[Path, str, tuple[bool, ...]]) -> None:
+    page: Any = html.parse(str(done[0])).getroot()
+    assert page.find_class("lead")[1].text_content().startswith("14 runs: ")
+    links = [link.get("href") for link in page.iterfind(".//td/a") if link.text == "replay"]
+    assert len(links) == len(SCENARIOS) * len(run_settings())
+    assert all((done[0].parent / str(link)).is_file() for link in links)
+    (matrix,) = page.find_class("matrix")
+    assert [str(cell.text_content()) for cell in matrix.iterfind("tbody/tr/th")] == list(SCENARIOS)
+    commands = [set(str(text.text_content()).split()) for text in page.iterfind(".//details/pre")]
+    assert {"eidrive", "run", "coop/scenario_1", "--detector", "oracle", "--channel", "none", "--seed", "1"} in commands
 
 
 @pytest.mark.parametrize("arguments", [["--seeds", "0"], ["--workers", "0"], ["--sedes", "3"], ["--out", "demo.json"]])
