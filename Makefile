@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
+.PHONY: help install demo test lint reproduce docs check-docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -32,6 +32,9 @@ lint: install   ## check style, types and import contracts
 docs: install   ## update the coverage table of docs/openscenario.md, and build the site: build/site/index.html
 	$(BIN)/python tests/coverage_table.py
 	$(BIN)/sphinx-build -W --keep-going --quiet docs build/site
+
+check-docs: install  ## execute the commands of the documentation in a new environment with a wheel of the project
+	$(BIN)/python tests/document_commands.py
 
 reproduce: install  ## repeat the experiments of the paper, and compare trends with expected ones: reports/paper, reports/trends
 	OPENBLAS_NUM_THREADS=1 $(BIN)/eidrive reproduce all --out reports/paper

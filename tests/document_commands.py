@@ -151,7 +151,7 @@ def _add_block(check: PageCheck, page: str, block: Block, entry: Mapping[str, An
     elif block.kind in _COMMANDS:
         commands = [(line, ()) for line in block.text.splitlines() if line.strip()]
         for line, shown in _console(block.text) if "$ " in block.text else commands:
-            rest = next((given for start, given in lines.items() if line.startswith(start)), {})
+            rest: dict[str, Any] = next((given for start, given in lines.items() if line.startswith(start)), {})
             if "skip" in rest:
                 check.skipped.append(f"{page}: {line}: {rest['skip']}")
             else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from argparse import ArgumentTypeError
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -249,7 +250,8 @@ def _given(config: pytest.Config) -> tuple[Path, ...]:
         return tuple(map(Path, config.workerinput[_WORKER_KEY]))
     if config.args_source is not pytest.Config.ArgsSource.ARGS:
         return ()
-    return tuple(Path(config.invocation_params.dir, argument.split("::")[0]).resolve() for argument in config.args)
+    paths = (Path(config.invocation_params.dir, argument.split("::")[0]) for argument in config.args)
+    return tuple(Path(os.path.abspath(path)) for path in paths)  # as pytest, which does not resolve links
 
 
 @pytest.hookimpl(optionalhook=True)

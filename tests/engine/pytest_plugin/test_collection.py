@@ -38,6 +38,11 @@ def test_collection_without_arguments_ignores_scenarios(project: pytest.Pytester
     assert collected(project) == ["test_own.py::test_own"]
 
 
+def test_collection_of_link_to_folder_finds_its_scenarios(project: pytest.Pytester) -> None:
+    (project.path / "link").symlink_to(project.path / "data")
+    assert len(collected(project, "link")) == 2
+
+
 def test_collection_of_folder_finds_its_scenarios(project: pytest.Pytester) -> None:
     assert collected(project, "data") == [FIRST, SECOND]
 
