@@ -270,7 +270,14 @@ def _installed_wheel(folder: Path) -> Path:
         [sys.executable, "-m", "build", "--wheel", "-o", folder / "dist", ROOT], check=True, stdout=subprocess.DEVNULL
     )
     (wheel,) = (folder / "dist").glob("*.whl")
-    return install(wheel, Path(sysconfig.get_path("purelib")), folder / "environment")
+    python = install(wheel, Path(sysconfig.get_path("purelib")), folder / "environment")
+    site = next((folder / "environment" / "lib").glob("python*/site-packages"))
+    others = [path for path in sys.path if Path(path).name == "site-packages"]  # of the environments that this one uses
+    (site / "zz_other_dependencies.pth").write_text("\n".join(others), encoding="utf-8")
+    script = python.with_name("pytest")
+    script.write_text(f"#!{python}\nimport sys\nimport pytest\nsys.exit(pytest.console_main())\n", encoding="utf-8")
+    script.chmod(0o755)
+    return python
 
 
 if __name__ == "__main__":
