@@ -6,10 +6,12 @@ import json
 import os
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.library import library_path, name_of
+from eidrive_scenario.library import library_path, name_of, resolve_scenario
+from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.run import RunResult, RunSettings
@@ -50,6 +52,19 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
         words += [] if number == default else [option, repr(float(number))]
     words += ["--allow-torchscript"] if settings.allow_torchscript else []
     return shlex.join(words)
+
+
+def command_of_source(source: Scenario | Source | ConcreteRun, seed: int, settings: RunSettings) -> str:
+    """Return the command line that repeats the run; empty for a scenario without a file."""
+    given: Mapping[str, str | Assignment] = {}
+    path: Any = source
+    if isinstance(source, ConcreteRun):
+        path, given = source.scenario, source.assignments
+    elif isinstance(source, Scenario):
+        path, given = source.path, source.assigned
+    if not isinstance(path, str | Path):
+        return ""
+    return command_of(resolve_scenario(path), seed, replace(settings, parameters={**given, **settings.parameters}))
 
 
 def reproduction_lines(result: RunResult) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
 from enum import StrEnum
@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
-from eidrive_scenario.experiments.commands import command_of
+from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
-from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
@@ -87,7 +86,7 @@ def run_and_save(
     settings = settings or RunSettings()
     seed = checked_seed(seed)
     kept = record_mode(record)
-    command = _command(source, seed, settings) or command
+    command = command_of_source(source, seed, settings) or command
     recording: Path | None = None
     simulation: Simulation | None = None
     try:
@@ -131,19 +130,6 @@ def run_and_save(
         if recording is not None and recording.exists():
             error.add_note(f"recording: {recording}")
         raise
-
-
-def _command(source: Scenario | Source | ConcreteRun, seed: int, settings: RunSettings) -> str:
-    """Return the command line that repeats the run; empty for a scenario without a file."""
-    given: Mapping[str, str | Assignment] = {}
-    path: Any = source
-    if isinstance(source, ConcreteRun):
-        path, given = source.scenario, source.assignments
-    elif isinstance(source, Scenario):
-        path, given = source.path, source.assigned
-    if not isinstance(path, str | Path):
-        return ""
-    return command_of(resolve_scenario(path), seed, replace(settings, parameters={**given, **settings.parameters}))
 
 
 def _record(

@@ -18,16 +18,25 @@ class Observers:
     def __init__(self, observers: Iterable[Observer] = ()) -> None:
         self._observers: tuple[Observer, ...] = ()
         self._unclosed: list[Observer] = []
-        for observer in observers:
-            self.add(observer)
+        self._waiting: list[Observer] = []
+        self.add(*observers)
 
     def __iter__(self) -> Iterator[Observer]:
         return iter(self._observers)
 
-    def add(self, observer: Observer) -> None:
-        """Add an observer of all frames from now on. Raise SettingError if it lacks a method."""
-        self._observers = (*self._observers, checked_observer(observer))
-        self._unclosed.append(observer)
+    def add(self, *observers: Observer) -> None:
+        """Add observers of all frames from now on. Raise SettingError if one lacks a method."""
+        for observer in observers:
+            self._observers = (*self._observers, checked_observer(observer))
+            self._unclosed.append(observer)
+            self._waiting.append(observer)
+
+    def begin(self, simulation: object) -> None:
+        """Pass the simulation to the observers that have a method for it, each once, before their first frame."""
+        while self._waiting:
+            begin = getattr(self._waiting.pop(0), "begin", None)
+            if callable(begin):
+                begin(simulation)
 
     def observe(self, frame: Frame) -> None:
         """Pass a frame to all observers, in the order in which they were added."""

@@ -237,7 +237,8 @@ class RunResult:
 class Observer(Protocol):
     """Observer of a run that does not change it, such as a recorder, a CSV writer or a collector of images.
 
-    It may have a method `conclude(result)`, which `Simulation.run` calls with the result of a completed run.
+    It may have the methods `begin(simulation)`, called before its first frame, and `conclude(result)`, which
+    `Simulation.run` calls with the result of a completed run.
     """
 
     def observe(self, frame: Frame) -> None:

@@ -75,8 +75,7 @@ class Simulation:
         self._is_closed = False
         self.seed = seed = checked_seed(seed)
         self.settings = settings or RunSettings()
-        for observer in observers:
-            self._observers.add(observer)
+        self._observers.add(*observers)
         setup = set_up_run(source, seed, self.settings, load_weights=load_weights, stack=stack)
         self.scenario, self.roads = setup.scenario, setup.roads
         self.storyboard, self.stack, self.world = setup.storyboard, setup.stack, setup.world
@@ -202,6 +201,7 @@ class Simulation:
         if self._ended is not None or self._is_closed:
             what = "the simulation is closed" if self._ended is None else "the run has ended"
             raise SimulationError(f"{what}; a second run needs a second Simulation")
+        self._observers.begin(self)
 
     @attributed
     def begin_tick(self) -> TickStart:

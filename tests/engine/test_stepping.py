@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.errors import ExtensionError, SimulationError
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
@@ -55,6 +55,42 @@ def test_observer_of_run_within_with_is_closed_once() -> None:
         simulation.add_observer(late)
         simulation.run()
     assert (early.count, late.count) == (1, 1)
+
+
+class Beginnings(Closings):
+    """Records the simulations that it begins to observe, and the ticks of its frames."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.calls: list[object] = []
+
+    def begin(self, simulation: Simulation) -> None:
+        self.calls.append(simulation)
+
+    def observe(self, frame: Frame) -> None:
+        self.calls.append(frame.view.tick)
+
+
+def test_observer_begins_once_before_its_first_frame() -> None:
+    early, late = Beginnings(), Beginnings()
+    with Simulation(ONE, settings=RunSettings(time_limit=0.15), observers=[early]) as simulation:
+        simulation.tick()
+        simulation.add_observer(late)
+        simulation.begin_tick()
+        simulation.run()
+    assert early.calls == [simulation, 0, 1, 2, 3]
+    assert late.calls == [simulation, 1, 2, 3]
+
+
+def test_error_in_begin_of_observer_names_the_observer() -> None:
+    class Breaks(Beginnings):
+        def begin(self, simulation: Simulation) -> None:
+            raise RuntimeError("full disk")
+
+    watch = Breaks()
+    with pytest.raises(ExtensionError, match=r"observer 'Breaks' at t = 0\.000 s: RuntimeError: full disk"):
+        run_file(ONE, observers=[watch])
+    assert watch.count == 1
 
 
 def test_tick_of_closed_simulation_is_an_error() -> None:
