@@ -55,6 +55,84 @@ class _Budget:
         return self._left >= 0
 
 
+class ReplayBuilder:
+    """Builder of the data of a replay from the frames of a run, which can be taken in parts.
+
+    report    a frame that cannot be drawn is skipped and reported; without a report its error is raised
+    settings  of stations, by name; they define the lifetime of reports
+    """
+
+    def __init__(self, report: DamageReport | None = None, settings: Mapping[str, AgentSettings] | None = None) -> None:
+        self._report = report
+        self._settings = settings or {}
+        self._builders: dict[str, SnapshotBuilder] = {}
+        self._series, self._messages, self._timeline = SeriesBuilder(), MessageList(), Timeline()
+        self._budget, self._width = _Budget(report), 0
+        self._actors: set[str] = set()
+        self._stations: set[str] = set()
+        self._frames = 0
+        self._part = _empty_part()
+        self.is_full = False
+        """Whether the limit of the size of a page is exceeded; later frames have no effect."""
+
+    def observe(self, frame: Frame) -> None:
+        """Add a frame."""
+        if self.is_full:
+            return
+        try:
+            part = _frame_data(frame, self._builders, self._settings)
+            self._series.observe(frame)
+        except UNDRAWABLE as error:
+            if self._report is None:
+                raise
+            self._report.add("frames cannot be drawn", f"tick {frame.view.tick}: {describe_error(error)}")
+            return
+        added = len(part["stations"].keys() - self._stations) + self._series.width - self._width
+        self._width = self._series.width
+        if not self._budget.take(_size(part) + _VALUE * self._width + _ABSENT * added * self._frames, frame.view.time):
+            self.is_full = True
+            return
+        self._append(part)
+        self._series.keep()
+        complete = not self._messages.omitted
+        self._messages.observe(frame.links)
+        if complete and self._messages.omitted and self._report is not None:
+            shown = f"the first {self._messages.count} are shown"
+            self._report.add("the page does not show all messages", shown)
+        self._timeline.observe(frame.changes)
+
+    def take(self) -> Data:
+        """Return the data of the frames since the last call, in the format of `replay_data`.
+
+        `actors` contains those that are new, `timeline` the elements whose intervals have changed, with all intervals.
+        """
+        part, self._part = self._part, _empty_part()
+        return {
+            **part,
+            "messages": self._messages.take(),
+            "timeline": self._timeline.take(),
+            "series": self._series.take(),
+            "contact": self._series.contact,
+            "decisive": self._series.decisive,
+        }
+
+    def _append(self, added: Mapping[str, Any]) -> None:
+        part = self._part
+        before = len(part["times"])
+        part["times"].append(added["time"])
+        part["ticks"].append(added["tick"])
+        part["poses"].append(added["pose"])
+        part["changes"].extend(added["changes"])
+        for name, actor in added["actors"].items():
+            if name not in self._actors:
+                self._actors.add(name)
+                part["actors"][name] = actor
+        for name, station in added["stations"].items():
+            self._stations.add(name)
+            part["stations"].setdefault(name, [None] * before).append(station)
+        self._frames += 1
+
+
 def replay_data(
     frames: Iterable[Frame],
     report: DamageReport | None = None,
@@ -73,40 +151,14 @@ def replay_data(
     messages   see `MessageList`; timeline  see `Timeline`; series, contact, decisive  see `SeriesBuilder`
     changes    [time, path, after, why] of the storyboard transitions
 
-    With a `report`, a frame that cannot be drawn is skipped and reported. `settings` of stations, by name, define the
-    lifetime of reports.
+    For `report` and `settings` see `ReplayBuilder`.
     """
-    data: Data = {"times": [], "ticks": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
-    builders: dict[str, SnapshotBuilder] = {}
-    series, messages, timeline = SeriesBuilder(), MessageList(), Timeline()
-    budget, width = _Budget(report), 0
+    builder = ReplayBuilder(report, settings)
     for frame in frames:
-        try:
-            part = _frame_data(frame, builders, settings or {})
-            series.observe(frame)
-        except UNDRAWABLE as error:
-            if report is None:
-                raise
-            report.add("frames cannot be drawn", f"tick {frame.view.tick}: {describe_error(error)}")
-            continue
-        added = len(part["stations"].keys() - data["stations"].keys()) + series.width - width
-        width = series.width
-        if not budget.take(_size(part) + _VALUE * width + _ABSENT * added * len(data["times"]), frame.view.time):
+        builder.observe(frame)
+        if builder.is_full:
             break
-        _append(data, part)
-        series.keep()
-        messages.observe(frame.links)
-        timeline.observe(frame.changes)
-    if messages.omitted and report is not None:
-        report.add("the page does not show all messages", f"the first {len(messages.rows)} are shown")
-    return {
-        **data,
-        "messages": messages.rows,
-        "timeline": timeline.rows(),
-        "series": series.columns(),
-        "contact": series.contact,
-        "decisive": series.decisive,
-    }
+    return builder.take()
 
 
 def packed(data: Data) -> Data:
@@ -114,12 +166,17 @@ def packed(data: Data) -> Data:
 
     A station has one column for each of its parts.
     """
-    poses = {name: _column([pose.get(name) for pose in data["poses"]]) for name in data["actors"]}
+    names = dict.fromkeys(name for pose in data["poses"] for name in pose)
+    poses = {name: _column([pose.get(name) for pose in data["poses"]]) for name in names}
     stations = {}
     for name, steps in data["stations"].items():
         parts = dict.fromkeys(key for step in steps if step is not None for key in step)
         stations[name] = {key: _column([None if step is None else step[key] for step in steps]) for key in parts}
     return {**data, "poses": poses, "stations": stations}
+
+
+def _empty_part() -> Data:
+    return {"times": [], "ticks": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
 
 
 def _column(entries: list[Any]) -> list[Any]:
@@ -158,18 +215,6 @@ def _frame_data(frame: Frame, builders: dict[str, SnapshotBuilder], settings: Ma
             if change.transition is not None and math.isfinite(change.time)
         ],
     }
-
-
-def _append(data: Data, part: Mapping[str, Any]) -> None:
-    before = len(data["times"])
-    data["times"].append(part["time"])
-    data["ticks"].append(part["tick"])
-    data["poses"].append(part["pose"])
-    data["changes"].extend(part["changes"])
-    for name, actor in part["actors"].items():
-        data["actors"].setdefault(name, actor)
-    for name, station in part["stations"].items():
-        data["stations"].setdefault(name, [None] * before).append(station)
 
 
 def _size(part: Mapping[str, Any]) -> int:

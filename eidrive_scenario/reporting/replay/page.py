@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,42 +17,16 @@ from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.trace_hash import TraceHash
-from eidrive_scenario.reporting.drawing.canvas import HOUSE
 from eidrive_scenario.reporting.drawing.road_drawing import recorded_roads
-from eidrive_scenario.reporting.drawing.top_view import (
-    AREA,
-    FUSED,
-    GROUND,
-    LANE,
-    LANES,
-    LINK,
-    LOST,
-    OWN,
-    PAINT,
-    RECEIVED,
-    WHITE,
-    RoadDrawing,
-    is_broken,
-)
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.replay.camera_files import camera_files
-from eidrive_scenario.reporting.replay.frame_data import describe_error, packed, replay_data
-from eidrive_scenario.reporting.replay.series import closest_approach
+from eidrive_scenario.reporting.replay.frame_data import describe_error, replay_data
+from eidrive_scenario.reporting.replay.page_values import TEMPLATE, decisive_instant, page_values
 from eidrive_scenario.reporting.run_report.reported_run import parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
 from eidrive_scenario.simulation.recorded_outcome import CONTEXT
-
-COLORS = {
-    "own": OWN,
-    "received": RECEIVED,
-    "link": LINK,
-    "lost": LOST,
-    "area": AREA,
-    "fused": FUSED,
-    "house": HOUSE,
-    "ground": GROUND,
-}
 
 
 @dataclass(frozen=True)
@@ -93,26 +66,21 @@ def make_replay(
     if result is not None and result.get("trace_hash") != trace.hexdigest():
         report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
     verdicts = None if result is None else parse_run(result, result_file)
-    if verdicts is not None and data["contact"] is None:
-        data["decisive"] = closest_approach(verdicts.metrics) or data["decisive"]
-    name = shorten(recording.scenario or recording.path.stem, 200)
-    page = write_page(
-        out,
-        "replay/page.html.jinja",
-        title=f"{name}, seed {recording.seed}",
-        result=verdicts,
+    data["decisive"] = decisive_instant(data, verdicts)
+    values = page_values(
+        recording.scenario or recording.path.stem,
+        recording.seed,
+        settings,
         facts=_facts(recording, settings),
-        settings=json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
         command=recording.metadata.get("command", ""),
-        damage=report.lines(),
+        result=verdicts,
+        notices=report.lines(),
         complete=complete,
-        data={
-            **packed(data),
-            "roads": _roads(roads),
-            "colors": COLORS,
-            "images": camera_files(recording.path.parent, out.parent),
-        },
+        roads=roads,
+        data=data,
+        images=camera_files(recording.path.parent, out.parent),
     )
+    page = write_page(out, TEMPLATE, **values)
     return Replay(page, report.lines())
 
 
@@ -171,13 +139,3 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
     hidden = ("format", "parameters", "settings", "command", CONTEXT)
     facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
-
-
-def _roads(roads: RoadDrawing) -> dict[str, Any]:
-    return {
-        "lanes": [[LANES.get(kind, LANE), polygon.round(2).tolist()] for kind, polygon in roads.lanes],
-        "lines": [
-            [is_broken(kind), PAINT.get(color, WHITE), line.round(2).tolist()] for kind, color, line in roads.markings
-        ],
-        "houses": [[round(height, 2), outline.round(2).tolist()] for outline, height in roads.houses],
-    }

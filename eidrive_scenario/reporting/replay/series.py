@@ -80,14 +80,15 @@ class SeriesBuilder:
                 _pad(columns["age"].setdefault(sender, []), self._frames).append(age)
         self._frames += 1
 
-    def columns(self) -> dict[str, Values]:
-        """Return the columns by station, without those that have no value."""
+    def take(self) -> dict[str, Values]:
+        """Return the columns by station since the last call, without those that have no value."""
         found: dict[str, Values] = {}
         for name, columns in self._columns.items():
             lists = {key: _pad(columns[key], self._frames) for key in ("speed", "gap", "ttc")}
             found[name] = {key: values for key, values in lists.items() if any(value is not None for value in values)}
             if columns["age"]:
                 found[name]["age"] = {sender: _pad(ages, self._frames) for sender, ages in columns["age"].items()}
+        self._columns, self._frames = {}, 0
         return found
 
     @property

@@ -23,6 +23,7 @@ class Timeline:
 
     def __init__(self) -> None:
         self._elements: dict[str, _Element] = {}
+        self._changed: set[str] = set()
 
     def observe(self, changes: Iterable[StateChange]) -> None:
         """Add the changes of one frame."""
@@ -35,10 +36,18 @@ class Timeline:
             if starts:
                 element = self._elements.setdefault(change.path, _Element(change.kind))
                 element.intervals.append([time, None, change.why, ""])
+                self._changed.add(change.path)
             elif ends and change.path in self._elements:
                 interval = self._elements[change.path].intervals[-1]
                 interval[1], interval[3] = time, change.why
+                self._changed.add(change.path)
 
-    def rows(self) -> list[list[Any]]:
-        """Return [path, kind, intervals]; an interval is [start, end or None, reason of the start, of the end]."""
-        return [[path, element.kind, element.intervals] for path, element in self._elements.items()]
+    def take(self) -> list[list[Any]]:
+        """Return [path, kind, intervals] of each element with a change since the last call.
+
+        An interval is [start, end or None, reason of the start, of the end].
+        """
+        changed, self._changed = self._changed, set()
+        if not changed:
+            return []
+        return [[path, found.kind, found.intervals] for path, found in self._elements.items() if path in changed]

@@ -124,7 +124,7 @@ def test_ages_of_many_links_count_for_the_size_of_a_page(street: Play, monkeypat
 def test_series_contain_speed_gap_and_age_of_information(street: Play) -> None:
     """Messages take 4 ticks of 0.05 s: the first is received in tick 4, and the age is 0.2 s from then on."""
     frames = street(4)
-    columns = observe(frames).columns()["Ego"]
+    columns = observe(frames).take()["Ego"]
     assert columns["speed"][0] == 8.0
     view = frames[0].view
     gap = min(box_distance(view.boxes[0], view.boxes[row]) for row in (1, 2, 3))
@@ -135,14 +135,14 @@ def test_series_contain_speed_gap_and_age_of_information(street: Play) -> None:
 
 def test_age_of_information_grows_while_messages_are_lost(street: Play) -> None:
     """The delay is 1 tick. The messages of ticks 30 to 39 are lost, so that of tick 29 is the newest in tick 40."""
-    ages = observe(street(1, frozenset(range(30, 40)))).columns()["Ego"]["age"]["RSU"]
+    ages = observe(street(1, frozenset(range(30, 40)))).take()["Ego"]["age"]["RSU"]
     assert ages[30] == pytest.approx(0.05)
     assert ages[40] == pytest.approx(0.55)
     assert ages[41] == pytest.approx(0.05)
 
 
 def test_station_that_does_not_drive_has_no_speed(street: Play) -> None:
-    columns = observe(street(1)).columns()
+    columns = observe(street(1)).take()
     assert "speed" not in columns.get("RSU", {})
 
 
@@ -206,7 +206,7 @@ def test_messages_have_arrival_or_reason_of_loss() -> None:
         LinkEvent("RSU", "Ego", 2, 0.2, "lost", None, "shadowing", 200),
         LinkEvent("Ego", "Ego", 1, 0.2, "delivered", 0.3, "", 200),
     ])  # fmt: skip
-    assert messages.rows == [[0.1, "RSU", "Ego", 0.4, ""], [0.2, "RSU", "Ego", None, "shadowing"]]
+    assert messages.take() == [[0.1, "RSU", "Ego", 0.4, ""], [0.2, "RSU", "Ego", None, "shadowing"]]
 
 
 def test_number_of_messages_in_page_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -214,7 +214,7 @@ def test_number_of_messages_in_page_is_limited(monkeypatch: pytest.MonkeyPatch) 
     messages = MessageList()
     for number in range(5):
         messages.observe([LinkEvent("RSU", "Ego", number, 0.1 * number, "delivered", 1.0, "", 200)])
-    assert len(messages.rows) == 3
+    assert len(messages.take()) == messages.count == 3
     assert messages.omitted == 2
 
 
@@ -224,7 +224,7 @@ def test_timeline_has_interval_per_execution_with_reasons() -> None:
     timeline.observe([change(2.0, ElementState.RUNNING, ElementState.STANDBY)])
     timeline.observe([change(3.0, ElementState.STANDBY, ElementState.RUNNING, "again")])
     timeline.observe([change(4.0, ElementState.STANDBY, ElementState.RUNNING, "first", path="S/Late")])
-    assert timeline.rows() == [
+    assert timeline.take() == [
         ["S/Go", "event", [[1.0, 2.0, "time > 1 s", ""], [3.0, None, "again", ""]]],
         ["S/Late", "event", [[4.0, None, "first", ""]]],
     ]

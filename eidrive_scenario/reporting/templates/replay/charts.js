@@ -1,7 +1,8 @@
-/* Charts over time and the timeline of the storyboard, with a common cursor. */
+/* Charts over time, with a common cursor. */
 const SVG = "http://www.w3.org/2000/svg";
 const LEFT = 44, RIGHT = 10, TALL = 74;
-let cursors = [];
+/* Functions that move the cursors and draw the lines; the charts as they are laid out, and the length of their axis [s]. */
+let cursors = [], redraws = [], laidCharts = "", axis = 0;
 
 function draws(tag, attributes, parent) {
   const made = document.createElementNS(SVG, tag);
@@ -10,9 +11,16 @@ function draws(tag, attributes, parent) {
   return made;
 }
 
-const shareOf = (time) => duration > 0 ? (time - data.times[0]) / duration : 0;
+const shareOf = (time) => axis > 0 ? Math.min(1, (time - data.times[0]) / axis) : 0;
 
-/* Return the charts of the shown station: title, unit, and lines with name, color and values by frame. */
+/* Return the length of the time axis [s]: the duration, while the run is in progress rounded up. */
+function axisLength() {
+  const round = duration < 60 ? 10 : duration < 600 ? 60 : 600;
+  return running ? round * Math.max(1, Math.ceil(duration / round)) : duration;
+}
+
+/* Return the charts of the shown station: title, unit, lower and upper limit, and lines with name, color and values by
+   frame. */
 function chartsOf(station) {
   const columns = data.series[station] || {}, found = [];
   const add = (key, title, unit) => {
@@ -24,6 +32,12 @@ function chartsOf(station) {
   const ages = Object.entries(columns.age || {});
   if (ages.length) found.push({ title: "age of information", unit: "s",
     lines: ages.map(([name, values]) => ({ name, color: senderColor(name), values })) });
+  for (const chart of found) {
+    let lowest = 0, highest = 0;
+    for (const { values } of chart.lines) for (const v of values) { lowest = Math.min(lowest, v); highest = Math.max(highest, v); }
+    chart.limit = limitOf(highest);
+    chart.floor = lowest < -0.05 ? -limitOf(-lowest) : 0;
+  }
   return found;
 }
 
@@ -33,32 +47,33 @@ function limitOf(largest) {
   return [1, 2, 5, 10].map((k) => k * power).find((value) => value >= largest * 0.999);
 }
 
-function drawChart({ title, unit, lines }, parent) {
+function drawChart({ title, unit, lines, limit, floor }, parent) {
   const figure = make("div", "", parent, { className: "chart" }), head = make("div", "", figure, { className: "head" });
   make("span", `${title} [${unit}]`, head);
   const value = make("span", "", head, { className: "value" });
   const width = Math.max(figure.clientWidth, 200), height = TALL;
   const picture = draws("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${title} over time` }, figure);
-  const all = lines.flatMap((line) => line.values.filter((v) => v !== null));
-  const limit = limitOf(Math.max(...all)), floor = Math.min(0, ...all) < -0.05 ? -limitOf(-Math.min(...all)) : 0;
   const x = (i) => LEFT + (width - LEFT - RIGHT) * shareOf(data.times[i]), y = (v) => 6 + (height - 12) * (1 - (v - floor) / (limit - floor));
   for (const level of [floor, (floor + limit) / 2, limit]) {
     draws("line", { x1: LEFT, x2: width - RIGHT, y1: y(level), y2: y(level), class: "grid" }, picture);
     draws("text", { x: LEFT - 7, y: y(level) + 4, class: "tick" }, picture).textContent = String(Number(level.toPrecision(3)));
   }
   for (const { color, values } of lines) {
-    let path = "", open = false;
-    values.forEach((v, i) => {
-      if (v === null) { open = false; return; }
-      path += `${open ? "L" : "M"}${x(i).toFixed(1)} ${y(v).toFixed(1)}`;
-      open = true;
+    const line = draws("path", { fill: "none", stroke: color, "stroke-width": 1.8, "stroke-linejoin": "round" }, picture);
+    redraws.push(() => {
+      let path = "", open = false;
+      values.forEach((v, i) => {
+        if (v === null) { open = false; return; }
+        path += `${open ? "L" : "M"}${x(i).toFixed(1)} ${y(v).toFixed(1)}`;
+        open = true;
+      });
+      line.setAttribute("d", path);
     });
-    draws("path", { d: path, fill: "none", stroke: color, "stroke-width": 1.8, "stroke-linejoin": "round" }, picture);
   }
   const cursor = draws("line", { y1: 2, y2: height - 2, class: "cursor" }, picture);
   const move = (event) => {
     const area = picture.getBoundingClientRect();
-    seek(data.times[0] + duration * (event.clientX - area.left - LEFT) / (area.width - LEFT - RIGHT));
+    seek(data.times[0] + axis * (event.clientX - area.left - LEFT) / (area.width - LEFT - RIGHT));
   };
   picture.addEventListener("pointerdown", (event) => { picture.setPointerCapture(event.pointerId); move(event); });
   picture.addEventListener("pointermove", (event) => { if (event.buttons) move(event); });
@@ -72,41 +87,22 @@ function drawChart({ title, unit, lines }, parent) {
   });
 }
 
+/* Lay out the charts if the shown station, a limit or the width has changed, and draw their lines. */
 function layCharts() {
-  cursors = [];
-  const parent = element("charts");
-  parent.textContent = "";
-  const charts = chartsOf(shown.station);
+  const parent = element("charts"), charts = chartsOf(shown.station);
+  axis = axisLength();
   element("chart-panel").hidden = !charts.length;
-  for (const chart of charts) drawChart(chart, parent);
-  cursors.push(moveTimeline);
+  const layout = JSON.stringify([shown.station, axis, parent.clientWidth,
+    charts.map(({ title, limit, floor, lines }) => [title, limit, floor, lines.map(({ name }) => name)])]);
+  if (layout !== laidCharts) {
+    laidCharts = layout;
+    [cursors, redraws, parent.textContent] = [[], [], ""];
+    for (const chart of charts) drawChart(chart, parent);
+    cursors.push(moveTimeline);
+  }
+  for (const redraw of redraws) redraw();
+  layTimeline();
   showCursors();
 }
 
 function showCursors() { for (const show of cursors) show(); }
-
-/* Rows of the timeline; each interval is a button that leads to its start. */
-function layTimeline() {
-  const parent = element("timeline"), rows = data.timeline.slice(0, 150);
-  element("timeline-panel").hidden = !rows.length;
-  for (const [path, kind, intervals] of rows) {
-    const row = make("div", "", parent, { className: "row" }), depth = path.split("/").length - 1;
-    const label = make("span", path.split("/").pop(), row, { className: "label", title: `${kind} ${path}` });
-    label.style.paddingLeft = `${Math.min(depth, 6) * 8}px`;
-    const track = make("div", "", row, { className: "track" });
-    for (const [start, end, why, whyEnd] of intervals) {
-      const until = end === null ? data.times[last] : end;
-      const text = `${kind} ${path.split("/").pop()}: ${start.toFixed(2)} s to ${end === null ? "the end of the run" : end.toFixed(2) + " s"}`
-        + (why ? `. Start: ${why}` : "") + (whyEnd ? `. End: ${whyEnd}` : "");
-      const bar = make("button", "", track, { type: "button", className: "bar " + kind, title: text });
-      bar.setAttribute("aria-label", text);
-      bar.style.left = `${100 * shareOf(start)}%`;
-      bar.style.width = `max(4px, ${100 * (shareOf(until) - shareOf(start))}%)`;
-      bar.onclick = () => seek(start);
-    }
-  }
-  if (data.timeline.length > rows.length) make("p", `${data.timeline.length - rows.length} more elements are in the list of the storyboard.`, parent);
-  make("div", "", make("div", "", parent, { className: "over" }), { id: "now" });
-}
-
-function moveTimeline() { const now = element("now"); if (now) now.style.left = `${100 * shareOf(shown.time)}%`; }

@@ -4,6 +4,7 @@ const LAYERS = [["truth", "true boxes"], ["labels", "names"], ["own", "own detec
 let playing = false, startedAt = 0, startedFrom = 0, announced = 0;
 
 function showTime(time) {
+  if (last < 0) return;
   shown.time = Math.max(data.times[0], Math.min(data.times[last], time));
   shown.index = indexAt(shown.time);
   draw();
@@ -14,6 +15,7 @@ function showTime(time) {
 /* Stop, and show an instant. */
 function seek(time) {
   pause();
+  followEnd(false);
   showTime(time);
   announce();
 }
@@ -33,6 +35,7 @@ function fromAddress() {
 
 let panelIndex = -1, panelStation = null;
 function showPanels() {
+  element("slider").max = last;
   element("slider").value = shown.index;
   element("clock").textContent = shown.time.toFixed(2) + " s";
   if (shown.index === panelIndex && shown.station === panelStation) return;
@@ -88,7 +91,15 @@ function pause() {
   element("play").textContent = "Play";
 }
 
+/* Show the newest frame of a run in progress, or stay at the shown instant. */
+function followEnd(on) {
+  atEnd = on && running;
+  if (element("at-end")) element("at-end").checked = atEnd;
+}
+
 function play() {
+  if (running && shown.time >= data.times[last] - 1e-6) { followEnd(true); return; }
+  followEnd(false);
   if (shown.time >= data.times[last] - 1e-6) showTime(data.times[0]);
   playing = true;
   element("play").textContent = "Pause";
@@ -100,7 +111,9 @@ function play() {
 function advance(now) {
   if (!playing) return;
   showTime(startedFrom + Math.max(0, now - startedAt) / 1000 * Number(element("rate").value));
-  if (shown.time >= data.times[last]) pause(); else requestAnimationFrame(advance);
+  if (shown.time < data.times[last]) { requestAnimationFrame(advance); return; }
+  pause();
+  followEnd(true);
 }
 
 function selectView(view) {
@@ -113,6 +126,7 @@ function selectView(view) {
 
 function selectStation(name) {
   shown.station = name;
+  element("station").value = name;
   for (const option of element("view").options) option.disabled = !name && option.value !== "top";
   if (!name && shown.view !== "top") selectView("top");
   layLayers();
@@ -121,9 +135,12 @@ function selectStation(name) {
 }
 
 /* Check boxes of the layers and of the senders whose messages the station receives. */
+let laidLayers = "";
 function layLayers() {
-  const parent = element("layers"), received = (data.stations[shown.station] || {}).received || [];
-  const senders = [...new Set(received.flatMap((boxes) => boxes ? Object.keys(boxes) : []))];
+  const parent = element("layers"), received = [...(senders[shown.station] || [])];
+  const layout = JSON.stringify([shown.station, received]);
+  if (layout === laidLayers) return;
+  laidLayers = layout;
   parent.textContent = "";
   const colors = { own: C.own, fused: C.fused, plan: C.link, messages: C.link };
   const add = (text, color, checked, change) => {
@@ -136,37 +153,67 @@ function layLayers() {
     if (!shown.station && ["own", "fused", "plan"].includes(key)) continue;
     add(text, colors[key], shown.layers[key], (on) => { shown.layers[key] = on; });
   }
-  for (const sender of senders) add("received from " + sender, senderColor(sender), !shown.hidden.has(sender),
+  for (const sender of received) add("received from " + sender, senderColor(sender), !shown.hidden.has(sender),
     (on) => { if (on) shown.hidden.delete(sender); else shown.hidden.add(sender); });
 }
 
-function setUp() {
-  for (const [key] of LAYERS) shown.layers[key] = true;
-  for (const name of stations) make("option", name, element("station")).value = name;
-  make("option", "ground truth only", element("station")).value = "";
-  element("slider").max = last;
-  for (const [time, path, after, why] of data.changes) {
-    const item = make("li", "", element("changes"), { title: path });
+/* Add the parts of the page that new frames contain. */
+function grow() {
+  const choice = element("station");
+  for (const name of stations.slice(choice.options.length - 1)) choice.add(new Option(name, name), choice.options.length - 1);
+  if (!shown.station && stations.length && !hasChosen) selectStation(stations[0]);
+  document.querySelector(".stations").hidden = !stations.length;
+  addChanges();
+  showDecisive();
+  layLayers();
+  layCharts();
+  if (running && !topView.follow && !hasMoved) fit();
+}
+
+let listed = 0;
+function addChanges() {
+  for (const [time, path, after, why] of data.changes.slice(listed)) {
+    const item = make("li", "", element("changes"), { title: path, className: "future" });
     const button = make("button", `${time.toFixed(2)} s  ${path.split("/").pop()} → ${after}`, item, { type: "button" });
     if (why) make("span", why, button);
     button.onclick = () => seek(time);
   }
-  const decisive = element("decisive");
-  if (data.decisive) {
-    const { time, text } = data.decisive;
-    decisive.textContent = `Decisive instant: ${time.toFixed(2)} s`;
-    decisive.title = text;
-    decisive.onclick = () => seek(time);
-    element("mark").style.left = `${100 * shareOf(time)}%`;
-    element("mark").title = text;
-  }
-  decisive.hidden = element("mark").hidden = !data.decisive;
+  listed = data.changes.length;
+}
+
+function showDecisive() {
+  const decisive = element("decisive"), mark = element("mark");
+  decisive.hidden = mark.hidden = !data.decisive;
+  if (!data.decisive) return;
+  const { time, text } = data.decisive;
+  decisive.textContent = `Decisive instant${running ? " so far" : ""}: ${time.toFixed(2)} s`;
+  decisive.title = mark.title = text;
+  decisive.onclick = () => seek(time);
+  mark.style.left = `${duration > 0 ? 100 * (time - data.times[0]) / duration : 0}%`;
+}
+
+/* Show the first frames. */
+function begin() {
+  for (const name of stations) if (!shown.station) shown.station = name;
+  grow();
+  follow(Boolean(shown.station) && (data.series[shown.station] || {}).speed !== undefined);
+  selectStation(shown.station);
+  fit();
+  const linked = fromAddress();
+  followEnd(linked === null);
+  showTime(linked !== null ? linked : atEnd ? data.times[last] : data.decisive ? data.decisive.time : data.times[0]);
+}
+
+let hasChosen = false, hasMoved = false;
+function setUp() {
+  for (const [key] of LAYERS) shown.layers[key] = true;
+  make("option", "ground truth only", element("station")).value = "";
   element("play").onclick = () => playing ? pause() : play();
   element("back").onclick = () => step(-1);
   element("forward").onclick = () => step(1);
   element("slider").oninput = (event) => seek(data.times[Number(event.target.value)]);
   element("rate").onchange = () => { if (playing) play(); };
-  element("station").onchange = (event) => { selectStation(event.target.value); };
+  element("station").onchange = (event) => { hasChosen = true; selectStation(event.target.value); };
   element("view").onchange = (event) => selectView(event.target.value);
   element("camera").onchange = () => showImages();
   element("fit").onclick = () => { follow(false); fit(); draw(); };
@@ -180,7 +227,7 @@ const KEYS = {
   ArrowRight: (event) => event.shiftKey ? seek(shown.time + 1) : step(1),
   ArrowLeft: (event) => event.shiftKey ? seek(shown.time - 1) : step(-1),
   Home: () => seek(data.times[0]),
-  End: () => seek(data.times[last]),
+  End: () => { seek(data.times[last]); followEnd(true); },
   d: () => { if (data.decisive) seek(data.decisive.time); },
   f: () => { follow(!topView.follow); draw(); },
 };
@@ -196,23 +243,19 @@ addEventListener("keydown", (event) => {
 canvas.addEventListener("wheel", (event) => {
   if (shown.view !== "top") return;
   event.preventDefault();
+  hasMoved = true;
   topView.scale = Math.max(0.05, Math.min(200, topView.scale * Math.exp(-event.deltaY / 600)));
   draw();
 }, { passive: false });
 canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
 canvas.addEventListener("pointermove", (event) => {
   if (!event.buttons || shown.view !== "top") return;
+  hasMoved = true;
   follow(false);
   topView.x -= event.movementX / topView.scale; topView.y += event.movementY / topView.scale;
   draw();
 });
-addEventListener("resize", () => { layCharts(); draw(); });
+addEventListener("resize", () => { if (last >= 0) { layCharts(); draw(); } });
 addEventListener("hashchange", () => { const time = fromAddress(); if (time !== null && time !== announced) seek(time); });
 
 setUp();
-layTimeline();
-follow(Boolean(shown.station) && (data.series[shown.station] || {}).speed !== undefined);
-selectStation(shown.station);
-fit();
-const linked = fromAddress();
-showTime(linked !== null ? linked : data.decisive ? data.decisive.time : data.times[0]);

@@ -1,23 +1,75 @@
 "use strict";
-const data = JSON.parse(document.getElementById("data").textContent);
 const element = (id) => document.getElementById(id);
+const page = JSON.parse(element("data").textContent);
+/* Frames of the run so far; `addPart` appends frames. */
+const data = { roads: page.roads, colors: page.colors, images: page.images, times: [], ticks: [], actors: {}, poses: {},
+               stations: {}, changes: [], messages: [], timeline: [], series: {}, contact: null, decisive: null };
 const C = data.colors, INK = "#334155", SELF = "#0f172a";
 const SENDERS = ["#ea580c", "#c026d3", "#0e7490", "#4d7c0f", "#be123c", "#92400e"];
 /* Time after its outcome for which a message is drawn [s]. */
 const SHOWN = 0.15;
-const last = data.times.length - 1, duration = data.times[last] - data.times[0];
+/* Index of the last frame and duration [s], names of the actors and of the stations, and senders by station. */
+let last = -1, duration = 0, names = [], stations = [];
+const senders = {};
+/* Whether the run is in progress, and whether the page shows its newest frame. */
+let running = false, atEnd = false;
 
 /* Replace each 0 of a column by its predecessor. */
 function unpack(column) {
   for (let i = 1; i < column.length; i += 1) if (column[i] === 0) column[i] = column[i - 1];
   return column;
 }
-Object.values(data.poses).forEach(unpack);
-Object.values(data.stations).forEach((parts) => Object.values(parts).forEach(unpack));
-const names = Object.keys(data.actors), stations = Object.keys(data.stations);
+
+/* Append the entries of new frames to a column of `columns`, of which `before` frames were present. */
+function addColumn(columns, key, added, before) {
+  const column = columns[key] || (columns[key] = []);
+  while (column.length < before) column.push(null);
+  for (const entry of added) column.push(entry);
+}
+
+/* Append null to the columns that have no entries of the last frames. */
+function padColumns(columns) {
+  for (const column of Object.values(columns)) while (column.length < data.times.length) column.push(null);
+}
+
+/* Append a part of the run in the format of the page. */
+function addPart(part) {
+  const before = data.times.length;
+  for (const key of ["times", "ticks", "changes", "messages"]) for (const entry of part[key]) data[key].push(entry);
+  for (const [name, actor] of Object.entries(part.actors)) data.actors[name] = data.actors[name] || actor;
+  for (const [name, column] of Object.entries(part.poses)) addColumn(data.poses, name, unpack(column), before);
+  padColumns(data.poses);
+  for (const [name, parts] of Object.entries(part.stations)) addStation(name, parts, before);
+  Object.values(data.stations).forEach(padColumns);
+  for (const [name, columns] of Object.entries(part.series)) addSeries(name, columns, before);
+  for (const { age, ...columns } of Object.values(data.series)) { padColumns(columns); padColumns(age || {}); }
+  for (const row of part.timeline) {
+    const known = data.timeline.findIndex(([path]) => path === row[0]);
+    if (known < 0) data.timeline.push(row); else data.timeline[known] = row;
+  }
+  data.contact = part.contact;
+  data.decisive = part.decisive;
+  last = data.times.length - 1;
+  duration = last < 0 ? 0 : data.times[last] - data.times[0];
+  names = Object.keys(data.actors);
+  stations = Object.keys(data.stations);
+}
+
+function addStation(name, parts, before) {
+  const columns = data.stations[name] || (data.stations[name] = {}), known = senders[name] || (senders[name] = new Set());
+  for (const [key, column] of Object.entries(parts)) addColumn(columns, key, unpack(column), before);
+  for (const boxes of parts.received || []) for (const sender of Object.keys(boxes || {})) known.add(sender);
+}
+
+function addSeries(name, { age, ...columns }, before) {
+  const series = data.series[name] || (data.series[name] = {});
+  for (const [key, column] of Object.entries(columns)) addColumn(series, key, column, before);
+  if (age) series.age = series.age || {};
+  for (const [sender, column] of Object.entries(age || {})) addColumn(series.age, sender, column, before);
+}
 
 /* What is shown: time [s], index of the frame, station ("" for none), view, and layers by name. */
-const shown = { time: data.times[0], index: 0, station: stations[0] || "", view: "top", layers: {}, hidden: new Set() };
+const shown = { time: 0, index: 0, station: "", view: "top", layers: {}, hidden: new Set() };
 
 function make(tag, text, parent, properties = {}) {
   const made = Object.assign(document.createElement(tag), properties);
@@ -70,10 +122,15 @@ function* perceivedBoxes() {
 
 /* Return the messages to draw, to the shown station or without one to all: sender, receiver, state, and the share of
    the way that a message in flight has covered. */
-const bySent = data.messages.slice().sort((a, b) => a[0] - b[0]);
-const longest = bySent.reduce((most, [sent, , , arrives]) => Math.max(most, (arrives === null ? sent : arrives) - sent), 0) + SHOWN;
+let bySent = [], longest = SHOWN;
+function sortMessages() {
+  bySent = data.messages.slice().sort((a, b) => a[0] - b[0]);
+  longest = bySent.reduce((most, [sent, , , arrives]) => Math.max(most, (arrives === null ? sent : arrives) - sent), 0) + SHOWN;
+}
+
 function messagesNow() {
   const { time, station } = shown, found = new Map();
+  if (bySent.length < data.messages.length) sortMessages();
   let low = 0, high = bySent.length;
   while (low < high) { const middle = (low + high) >> 1; if (bySent[middle][0] < time - longest) low = middle + 1; else high = middle; }
   for (let i = low; i < bySent.length && bySent[i][0] <= time + 1e-6; i += 1) {

@@ -21,7 +21,9 @@ function fit() {
   const area = canvas.getBoundingClientRect();
   topView.x = (left + right) / 2; topView.y = (bottom + top) / 2;
   topView.scale = Math.min(area.width / (right - left + 16), area.height / (top - bottom + 16));
-  if (topView.follow) topView.scale = Math.max(topView.scale, Math.min(area.width, area.height) / 70);
+  const close = Math.min(area.width, area.height) / 70;
+  if (topView.follow) topView.scale = Math.max(topView.scale, close);
+  if (running) topView.scale = Math.min(topView.scale, close);
 }
 
 function trace(points) {

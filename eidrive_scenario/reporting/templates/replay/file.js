@@ -1,0 +1,3 @@
+/* Data of a recorded run, which the page contains. */
+addPart(page);
+begin();
