@@ -7,6 +7,7 @@ fusion      fusion methods
 v2x         channels
 driving     planners, vehicle controllers, driving stacks
 run         runs from Python
+live        runs in the browser while they are in progress
 common      names that several groups need: errors, settings, geometry, roads
 
 Extensions import these modules only; the engine itself never does. Each module states which of its names are stable.

@@ -10,6 +10,7 @@ import typer
 
 from eidrive_scenario.cli.added_options import Criteria, Drive, Keep, Planner
 from eidrive_scenario.cli.error_output import print_warnings
+from eidrive_scenario.cli.live import Live, LivePort, LiveSpeed, live_view, wait_until_closed
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
 from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
@@ -110,6 +111,9 @@ def run(
             help="Explain the start of an event or act, or its absence; repeatable.",
         ),
     ] = None,
+    live: Live = False,
+    live_speed: LiveSpeed = None,
+    live_port: LivePort = None,
     allow_torchscript: Annotated[
         bool,
         rare(
@@ -174,6 +178,16 @@ def run(
         test = None
     most = repeat if test is None else test.limit
 
+    path = resolve_scenario(scenario)
+    is_distribution = definition(path) == "distribution"
+    written = {"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}
+    check_output_paths(written, (path, channel, weather, *stacks.values(), *(criterion or ())))
+    several = "--success-rate" if test is not None else f"--repeat {repeat}" if repeat > 1 else ""
+    if is_distribution and max_runs != 1:
+        several = several or "a distribution; --max-runs 1 runs one of it"
+    viewed = ctx.with_resource(live_view(live, live_speed, live_port, several=several, to_stderr=json))
+    watching = () if viewed is None else (viewed,)
+
     def run_seeds(source: Path | ConcreteRun) -> list[int]:
         codes: list[int] = []
         parts = [] if isinstance(source, Path) else [f"run-{source.number}"]
@@ -193,6 +207,7 @@ def run(
                     csv=_with_suffixes(csv, suffixes) if csv is not None else None,
                     log=_with_suffixes(Path(log), suffixes) if log is not None and log != STANDARD_OUTPUT else log,
                     explanations=explanations,
+                    observers=watching,
                     wall_limit=wall_limit,
                 )
             except InputError as error:
@@ -203,6 +218,7 @@ def run(
                 continue
             except EidriveError as error:
                 failures.report(error)
+                wait_until_closed(viewed)
                 codes.append(ABORTED)
                 continue
             if json:
@@ -218,14 +234,12 @@ def run(
                 typer.echo(f"files: {result.folder}", err=json)
             for explanation in explanations:
                 typer.echo("\n".join(explanation.lines()), err=json)
+            wait_until_closed(viewed)
             codes.append(result.exit_code)
         decided = None if test is None else decision_code(test, codes, json=json)
         return codes if decided is None else [decided]
 
-    path = resolve_scenario(scenario)
-    written = {"--csv": csv, "--log": None if log == STANDARD_OUTPUT else log}
-    check_output_paths(written, (path, channel, weather, *stacks.values(), *(criterion or ())))
-    if definition(path) == "distribution":
+    if is_distribution:
         from eidrive_scenario.cli.batch import run_distribution
 
         raise typer.Exit(

@@ -1,4 +1,4 @@
-"""Replay and report in Chromium, opened from disk.
+"""Replay and report in Chromium, opened from disk, and the live view of a run.
 
 EIDRIVE_BROWSER names the program, for example /usr/bin/chromium; axe-playwright-python is required, too.
 EIDRIVE_SCREENSHOTS names a folder for pictures of the pages.
@@ -6,13 +6,21 @@ EIDRIVE_SCREENSHOTS names a folder for pictures of the pages.
 
 from __future__ import annotations
 
+import math
 import os
+import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 from command_fixtures import Eidrive
+
+from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.live.live_view import LiveView
 
 BROWSER = os.environ.get("EIDRIVE_BROWSER")
 SCREENSHOTS = os.environ.get("EIDRIVE_SCREENSHOTS")
@@ -47,17 +55,23 @@ def report(eidrive: Eidrive, tmp_path: Path) -> Path:
 
 
 class Page:
-    """Page of a browser with the messages of its console and its requests other than to files."""
+    """Page of a browser with the messages of its console and its requests other than to files.
 
-    def __init__(self, browser: Any, file: Path, width: int, *, dark: bool = False, address: str = "") -> None:
+    site  address below which a live view may request
+    """
+
+    def __init__(
+        self, browser: Any, file: Path | None, width: int, *, dark: bool = False, address: str = "", site: str = ""
+    ) -> None:
         scheme = "dark" if dark else "light"
         self._context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
         self.page = self._context.new_page()
         self.faults: list[str] = []
         self.page.on("console", lambda message: self._note(message.type in ("error", "warning"), message.text))
         self.page.on("pageerror", lambda error: self._note(True, str(error)))
-        self.page.on("request", lambda request: self._note(not request.url.startswith(("file:", "data:")), request.url))
-        self.page.goto(file.as_uri() + address)
+        allowed = ("file:", "data:", *([site] if site else []))
+        self.page.on("request", lambda request: self._note(not request.url.startswith(allowed), request.url))
+        self.page.goto((site if file is None else file.as_uri()) + address)
 
     def _note(self, is_fault: bool, text: str) -> None:
         if is_fault:
@@ -72,6 +86,11 @@ class Page:
         return bool(self.page.evaluate("document.documentElement.scrollWidth > window.innerWidth"))
 
     def close(self, name: str, *, full: bool = True) -> None:
+        """Check the page, store a picture of all of it or of its window, and close it."""
+        self.check(name, full=full)
+        self._context.close()
+
+    def check(self, name: str, *, full: bool = True) -> None:
         """Check for faults and accessibility, and store a picture of the full page or of its window."""
         from axe_playwright_python.sync_playwright import Axe
 
@@ -79,8 +98,14 @@ class Page:
         assert not [fault["id"] for fault in found if fault["impact"] in SERIOUS]
         if SCREENSHOTS:
             self.page.screenshot(path=f"{SCREENSHOTS}/{name}.png", full_page=full)
-        self._context.close()
         assert not self.faults
+
+    def wait(self, condition: str) -> None:
+        """Wait until an expression is true. The rules of a live view forbid `wait_for_function`, which compiles it."""
+        end = time.monotonic() + 60.0
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end, condition
+            self.page.wait_for_timeout(20)
 
 
 def replay_of(report: Path, channel: str) -> Path:
@@ -162,3 +187,76 @@ def test_report_links_to_replay_of_a_run(browser: Any, report: Path) -> None:
     page.page.wait_for_function("typeof shown !== 'undefined'")
     assert "/replays/" in page.page.url
     page.close("replay-from-report")
+
+
+DATA = """(() => {
+  const sorted = (value) => Array.isArray(value) ? value.map(sorted)
+    : value === null || typeof value !== "object" ? value
+    : Object.fromEntries(Object.keys(value).sort().map((key) => [key, sorted(value[key])]));
+  return JSON.stringify(sorted({ ...data, images: null }));
+})()"""
+
+
+class Gate:
+    """Observer at which a run waits at a tick until it is opened."""
+
+    def __init__(self, tick: int) -> None:
+        self._tick = tick
+        self.opened = threading.Event()
+
+    def observe(self, frame: Frame) -> None:
+        if frame.view.tick == self._tick:
+            assert self.opened.wait(120.0)
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.timeout(300)
+def test_live_view_fills_and_becomes_the_replay(browser: Any, eidrive: Eidrive, tmp_path: Path) -> None:
+    opened: list[str] = []
+    first, second = Gate(40), Gate(100)
+    with (
+        LiveView(speed=math.inf, wait=0.0, browser=False, announce=opened.append) as live,
+        ThreadPoolExecutor() as pool,
+    ):
+        run = pool.submit(run_and_save, "coop/scenario_1", out=tmp_path / "run", observers=[live, first, second])
+        page = Page(browser, None, 1440, site=address_of(opened))
+        page.wait("last === 40 && shown.time === 2")
+        assert page.page.inner_text("#state") == "live"
+        page.check("live-desktop")
+
+        late = Page(browser, None, 390, site=live.address, dark=True)
+        late.wait("last === 40")
+        assert not late.wide()
+        late.page.locator("#slider").fill("5")
+        assert not late.page.is_checked("#at-end")
+        first.opened.set()
+        for each, instant in ((page, 5.0), (late, 0.25)):
+            each.wait("last === 100 && grownTo === 100")
+            each.wait(f"shown.time === {instant}")
+        late.page.locator("h1").click()
+        late.page.keyboard.press("End")
+        assert late.page.is_checked("#at-end")
+        late.check("live-phone", full=False)
+        second.opened.set()
+
+        assert run.result().passed
+        replay = tmp_path / "replay.html"
+        assert eidrive("view", tmp_path / "run", "--out", replay).exit_code == 0
+        recorded = Page(browser, replay, 1440)
+        for each in (page, late, Page(browser, None, 1440, site=live.address)):
+            each.wait("!running && element('end-choice').hidden")
+            assert each.page.evaluate(DATA) == recorded.page.evaluate(DATA)
+            for part in ("badge", "verdict", "decisive"):
+                assert each.page.inner_text(f"#{part}") == recorded.page.inner_text(f"#{part}")
+            assert not each.faults
+        late.close("live-end")
+
+
+def address_of(opened: list[str]) -> str:
+    end = time.monotonic() + 60.0
+    while not opened:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return opened[0]

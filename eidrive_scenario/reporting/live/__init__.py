@@ -1,0 +1,1 @@
+"""Page of a run in progress, by a local server."""

@@ -1,0 +1,214 @@
+"""Observer that shows a run in the browser while it is in progress."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Self
+
+from eidrive_scenario.errors import InputError, SimulationError
+from eidrive_scenario.experiments.commands import command_of_source
+from eidrive_scenario.experiments.single_run import as_json_text
+from eidrive_scenario.recording.damage import DamageReport
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.drawing.road_drawing import network_drawing
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
+from eidrive_scenario.reporting.live.browser import open_in_browser
+from eidrive_scenario.reporting.live.feed import Feed
+from eidrive_scenario.reporting.live.pace import Pace
+from eidrive_scenario.reporting.live.server import LiveServer
+from eidrive_scenario.reporting.page import render_page
+from eidrive_scenario.reporting.replay.frame_data import (
+    UNDRAWABLE,
+    Data,
+    ReplayBuilder,
+    describe_error,
+    packed,
+    replay_data,
+)
+from eidrive_scenario.reporting.replay.page import station_settings
+from eidrive_scenario.reporting.replay.page_values import TEMPLATE, decisive_instant, page_values
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
+from eidrive_scenario.reporting.run_report.settings_text import run_facts
+from eidrive_scenario.simulation.run import RunResult
+
+if TYPE_CHECKING:
+    from eidrive_scenario.simulation.simulation import Simulation
+
+WAIT = 5.0
+"""Default of the maximum time for which the start of a run waits for a page [s]."""
+_PERIOD = 0.04
+"""Time between two events with frames [s]: one event per frame at the default time step and speed."""
+_RELOAD = 2.0
+"""Time in which a page that is reloaded connects again [s]."""
+_FRAGMENTS = ("badge", "notices", "verdict")
+"""Parts of the page that change during a run; each has a template and an element of its name."""
+
+
+class LiveView:
+    """Observer of one run whose frames appear in a page while the run is in progress.
+
+    speed     simulated time per wall time; `math.inf` is as fast as possible
+    port      TCP port of 127.0.0.1; 0 for a free one
+    wait      time for which the start of the run waits for the first page [s]
+    browser   whether the page is opened in the default browser
+    announce  called with the address when the run begins; by default it is written to standard error
+
+    Use it in a `with` block, which ends the server: `with LiveView() as live: run_file(source, observers=[live])`.
+    The page contains all frames since the start, whenever it is opened. A slow or closed page has no effect on the run.
+
+    Raise SettingError if the port cannot be used or the speed is invalid.
+    """
+
+    def __init__(
+        self,
+        *,
+        speed: float = 1.0,
+        port: int = 0,
+        wait: float = WAIT,
+        browser: bool = True,
+        announce: Callable[[str], None] | None = None,
+    ) -> None:
+        self._pace = Pace(speed)
+        self._wait, self._browser, self._announce = wait, browser, announce or _write_address
+        self._report = DamageReport()
+        self._builder: ReplayBuilder | None = None
+        self._feed = Feed()
+        self._values: dict[str, Any] = {}
+        self._page: tuple[dict[str, Any], bytes] = {}, b""
+        """Rendered page and its values."""
+        self._rendering = threading.Lock()
+        self._instants: Data = {"contact": None, "decisive": None}
+        self._building = threading.RLock()
+        """Lock of the frames that are not yet sent."""
+        self._ended = threading.Event()
+        self._server = LiveServer(self._render, self._feed, port=port)
+
+    @property
+    def address(self) -> str:
+        """Address of the page, with a random part that other programs cannot guess."""
+        return self._server.address
+
+    @property
+    def clients(self) -> int:
+        """Number of open pages."""
+        return self._feed.clients
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def begin(self, simulation: Simulation) -> None:
+        """Announce the address, and wait for the first page. `Simulation` calls it before the first tick.
+
+        Raise SimulationError if it was called for another run.
+        """
+        if self._builder is not None:
+            raise SimulationError("the live view has shown a run; a second run needs a second LiveView")
+        settings = json.loads(simulation.resolved.canonical)
+        self._builder = ReplayBuilder(self._report, station_settings(settings))
+        self._values = page_values(
+            simulation.scenario.name,
+            simulation.seed,
+            settings,
+            facts=run_facts(settings),
+            command=command_of_source(simulation.scenario, simulation.seed, simulation.settings),
+            result=None,
+            roads=self._roads(simulation),
+            data=replay_data([]),
+            images={},
+            live=True,
+        )
+        self._announce(self.address)
+        if self._browser:
+            open_in_browser(self.address)
+        threading.Thread(target=self._send_regularly, name="eidrive live frames", daemon=True).start()
+        self._feed.wait_for_client(self._wait)
+
+    def _roads(self, simulation: Simulation) -> RoadDrawing:
+        try:
+            return network_drawing(simulation.roads)
+        except (InputError, *UNDRAWABLE) as error:
+            self._report.add("roads are not drawn", describe_error(error))
+            return RoadDrawing()
+
+    def observe(self, frame: Frame) -> None:
+        """Add a frame, and delay the run until the next one is due.
+
+        Raise SimulationError before `begin`.
+        """
+        if self._builder is None:
+            raise SimulationError("the live view has not begun; it observes a Simulation, which calls begin")
+        with self._building:
+            self._builder.observe(frame)
+        self._pace.wait(frame.view.time)
+
+    def conclude(self, result: RunResult) -> None:
+        """Show the verdicts. `Simulation.run` calls it at the end."""
+        self._end(parse_run(json.loads(as_json_text(result))))
+
+    def close(self) -> None:
+        """End the run; without `conclude` the page states that the run was aborted. The page stays available."""
+        self._end(None)
+
+    def wait_until_closed(self) -> None:
+        """Return when all pages are closed; at once if none is open."""
+        while self._feed.clients:
+            self._feed.wait_until_alone()
+            self._feed.wait_for_client(_RELOAD)
+
+    def stop(self) -> None:
+        """End the server after the pages have received the remaining frames. A second call has no effect."""
+        self._ended.set()
+        self._server.stop()
+
+    def _send_regularly(self) -> None:
+        """Send frames until the run has ended. No connection delays the run."""
+        while not self._ended.wait(_PERIOD):
+            self._send_frames()
+
+    def _send_frames(self) -> None:
+        with self._building:
+            if self._builder is None:
+                return
+            part = self._builder.take()
+            self._instants = {key: part[key] for key in ("contact", "decisive")}
+            if part["times"]:
+                self._feed.add("part", packed(part))
+            if self._report.lines() != self._values["notices"]:
+                self._values = {**self._values, "notices": self._report.lines()}
+                self._send_page()
+
+    def _end(self, result: ReportedRun | None) -> None:
+        """Send the last frames and the result, None for an aborted run."""
+        with self._building:
+            if self._ended.is_set() or self._builder is None:
+                return
+            self._send_frames()
+            self._ended.set()
+            self._values = {**self._values, "result": result, "complete": result is not None}
+            self._send_page()
+
+    def _send_page(self) -> None:
+        """Send the parts of the page around the frames."""
+        values = self._values
+        fragments = {name: render_page(f"replay/{name}.html.jinja", **values) for name in _FRAGMENTS}
+        decisive = decisive_instant(self._instants, values["result"])
+        self._feed.add("page", {**fragments, "decisive": decisive, "ended": self._ended.is_set()})
+
+    def _render(self) -> bytes:
+        """Return the page without frames."""
+        with self._rendering:
+            values = self._values
+            if self._page[0] is not values:
+                self._page = values, render_page(TEMPLATE, **values).encode(errors="replace")
+            return self._page[1]
+
+
+def _write_address(address: str) -> None:
+    sys.stderr.write(f"live view: {address}\n")
+    sys.stderr.flush()

@@ -1,0 +1,158 @@
+"""Local server of the page of a run in progress. It is reachable from this machine only."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import secrets
+import selectors
+import socket
+import sys
+import threading
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socketserver import TCPServer
+from typing import Any
+from urllib.parse import urlsplit
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.reporting.live.feed import Client, Feed
+
+HOST = "127.0.0.1"
+SEND_TIMEOUT = 20.0
+"""Time after which a client that reads nothing is disconnected [s]."""
+HEARTBEAT = 0.5
+"""Period of the check whether a page is still open [s]."""
+MOST_CLIENTS = 32
+"""Maximum number of pages at the same time."""
+_LOCAL = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?", re.IGNORECASE | re.ASCII)
+"""Accepted Host headers. The port differs if it is forwarded by ssh."""
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+
+_log = logging.getLogger(__name__)
+
+
+class LiveServer:
+    """HTTP server of one page and its events, in separate threads.
+
+    page   function that returns the HTML of the page; it is called in a thread of the server
+    port   TCP port; 0 for a free one
+
+    Raise SettingError if the port cannot be used.
+    """
+
+    def __init__(self, page: Callable[[], bytes], feed: Feed, *, port: int = 0) -> None:
+        if not 0 <= port <= 65535:
+            raise SettingError(Diagnostic(f"port {port} does not exist", "give 1 to 65535, or 0 for a free one"))
+        self._feed = feed
+        self._token = secrets.token_urlsafe(16)
+        try:
+            self._server = _Server((HOST, port), _Handler)
+        except OSError as error:
+            message = f"port {port} of {HOST} cannot be used: {error.strerror or error}"
+            raise SettingError(Diagnostic(message, "give another port, or 0 for a free one")) from error
+        self._server.feed, self._server.page, self._server.token = feed, page, self._token
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, name="eidrive live view", daemon=True
+        )
+        self._thread.start()
+
+    @property
+    def address(self) -> str:
+        """Address of the page."""
+        return f"http://{HOST}:{self._server.server_address[1]}/{self._token}/"
+
+    def stop(self) -> None:
+        """Send the remaining events, and end the server. A second call has no effect."""
+        if self._thread.is_alive():
+            self._feed.stop(timeout=2.0)
+            self._server.shutdown()
+            self._thread.join()
+            self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    block_on_close = False
+    allow_reuse_address = os.name != "nt"  # On Windows, the option lets two servers share a port
+    feed: Feed
+    page: Callable[[], bytes]
+    token: str
+
+    def server_bind(self) -> None:
+        """Bind the socket without the search for a host name of HTTPServer, which may ask a name server."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = HOST, self.server_address[1]
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Ignore connections that end early; log other errors."""
+        if not isinstance(sys.exc_info()[1], OSError):
+            _log.warning("a request of the live view failed", exc_info=True)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    timeout = SEND_TIMEOUT
+    server_version, sys_version = "eidrive", ""
+
+    def do_GET(self) -> None:
+        """Answer with the page or its events. Foreign hosts and addresses without the token get an error."""
+        if not _LOCAL.fullmatch(self.headers.get("Host", "")):
+            self.send_error(HTTPStatus.FORBIDDEN, "Host is not local")
+            return
+        token, _, name = urlsplit(self.path).path.removeprefix("/").partition("/")
+        if not secrets.compare_digest(token.encode(errors="replace"), self.server.token.encode()):
+            self.send_error(HTTPStatus.NOT_FOUND)
+        elif name == "":
+            self._send_page()
+        elif name == "events":
+            self._send_events()
+        else:
+            self.send_error(HTTPStatus.NOT_FOUND)
+
+    def _send_page(self) -> None:
+        page = self.server.page()
+        self._send_headers("text/html; charset=utf-8", len(page))
+        self.wfile.write(page)
+
+    def _send_events(self) -> None:
+        feed = self.server.feed
+        if feed.clients >= MOST_CLIENTS:
+            self.send_error(HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are open")
+            return
+        newest = self.headers.get("Last-Event-ID", "")
+        with feed.client(int(newest) + 1 if re.fullmatch(r"\d{1,9}", newest, re.ASCII) else 0) as client:
+            self._send_headers("text/event-stream")
+            while (events := feed.next_events(client, HEARTBEAT)) is not None and self._send(client, events):
+                pass
+
+    def _send(self, client: Client, events: list[bytes]) -> bool:
+        """Send events, or a comment without events. Return False if the page is closed."""
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.connection, selectors.EVENT_READ)
+            if selector.select(0.0) and not self.connection.recv(1, socket.MSG_PEEK):
+                return False
+        self.wfile.write(b"".join(events) or b":\n\n")
+        self.server.feed.advance(client, len(events))
+        return True
+
+    def _send_headers(self, content_type: str, length: int | None = None) -> None:
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", content_type)
+        if length is not None:
+            self.send_header("Content-Length", str(length))
+        for name, value in _HEADERS.items():
+            self.send_header(name, value)
+        self.end_headers()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Print no line per request."""
