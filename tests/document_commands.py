@@ -245,6 +245,8 @@ def main() -> int:
     options = parser.parse_args()
     listed = read_list()
     errors = [f"{page} is not in {LIST.name}" for page in pages() if page not in listed]
+    for error in errors:
+        print("failed:", error, file=sys.stderr)
     with tempfile.TemporaryDirectory() as temporary:
         python = Path(sys.executable) if options.installed else _installed_wheel(Path(temporary))
         environment = environment_of(python)
@@ -255,11 +257,12 @@ def main() -> int:
             check = check_page(page, listed[page], slow=not options.quick)
             folder = Path(temporary, str(number))
             folder.mkdir()
-            errors += run_page(check, folder, environment)
+            found = run_page(check, folder, environment)
             for line in check.skipped:
                 print("not executed:", line, flush=True)
-    for error in errors:
-        print(error, file=sys.stderr)
+            for error in found:
+                print("failed:", error, file=sys.stderr, flush=True)
+            errors += found
     print(f"{len(errors)} promises are not kept")
     return 1 if errors else 0
 
