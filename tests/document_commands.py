@@ -230,8 +230,9 @@ def _broken(step: Step, done: subprocess.CompletedProcess[str], folder: Path) ->
 def environment_of(python: Path) -> dict[str, str]:
     """Return the variables of commands of the environment of a Python; CHECKOUT is the folder of this repository."""
     kept = {name: text for name, text in os.environ.items() if name not in ("PYTEST_ADDOPTS", "EIDRIVE_PROJECT")}
-    # Fixed width, so that tables are not folded
-    return {**kept, "PATH": f"{python.parent}{os.pathsep}{os.environ['PATH']}", "CHECKOUT": str(ROOT), "COLUMNS": "160"}
+    # Fixed width, so that tables are not folded, and a browser that opens no page
+    fixed = {"CHECKOUT": str(ROOT), "COLUMNS": "160", "BROWSER": "true"}
+    return {**kept, **fixed, "PATH": f"{python.parent}{os.pathsep}{os.environ['PATH']}"}
 
 
 def main() -> int:
