@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import islice
 from pathlib import Path
@@ -135,6 +136,7 @@ def plan_of(
     digest = sha256_of(canonical_json({"files": first.files, "versions": dict(first.versions)}).encode())
     plan = SweepPlan(scenario, tuple(points), chosen, min(total, runs or total), settings, digest, profile)
     _check_names(points, first.parameters)
+    _check_settings(scenario, points, settings)
     for point in points:  # a point that cannot be run is an error before the runs, not among them
         at = settings_at(_without_run(point), settings, profile)
         if isinstance(at.channel, Mapping):
@@ -149,6 +151,20 @@ def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:
         if not is_setting(name) and parameter not in declared:
             text = f"--vary: unknown parameter or setting {parameter!r}"
             raise SettingError(Diagnostic(text, suggestion(parameter, [*declared, *sorted(SETTINGS)])))
+
+
+def _check_settings(scenario: Path, points: Sequence[Point], settings: RunSettings) -> None:
+    """Build a run with each value of a setting, of numbers with the least and the greatest one, to find invalid ones.
+
+    Raise InputError for an invalid value.
+    """
+    for name in SETTINGS:
+        values = dict.fromkeys(point[name] for point in points if name in point)
+        numbers = [value for value in values if not isinstance(value, str)]
+        texts: list[Scalar] = [value for value in values if isinstance(value, str)]
+        for value in texts + ([min(numbers), max(numbers)] if numbers else []):
+            with suppress(ConstraintError):
+                _resolved(scenario, points[0].get(RUN), settings_at({name: value}, settings, None))
 
 
 def versions() -> Mapping[str, str]:

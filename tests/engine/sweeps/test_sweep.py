@@ -153,6 +153,23 @@ def test_plan_with_an_impossible_later_point_raises(scenario: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("axis", "expected"),
+    [
+        ("detector=oracle,nope", "unknown detector 'nope'"),
+        ("planner=route,behavior", "planner 'route' has no effect"),
+        ("weather=nope", "no weather preset 'nope'"),
+        ("channel=none,nope", "no channel profile 'nope'"),
+        ("dt=0.05,0", "a tick of 0 s"),
+        ("time_limit=-1,20", "time_limit is -1"),
+    ],
+)
+def test_invalid_setting_of_a_later_point_raises(scenario: Path, axis: str, expected: str) -> None:
+    points = points_of(parse_axes([axis, "Speed=10,30"]), "grid", None, 1)
+    with pytest.raises(InputError, match=expected):
+        plan_of(scenario, points, RunSettings())
+
+
+@pytest.mark.parametrize(
     ("options", "expected"),
     [
         ({"runs": 9, "seeds": [1]}, "--runs is 9"),
