@@ -125,6 +125,7 @@ class ResultStore:
     def _create(self) -> None:
         if _is_empty(self._connection):
             with self._connection:
+                self._connection.execute("BEGIN IMMEDIATE")  # without it, each statement is a transaction
                 self._connection.execute(f"PRAGMA application_id={APPLICATION}")
                 self._connection.execute(f"PRAGMA user_version={FORMAT}")
                 for statement in _TABLES.split(";"):

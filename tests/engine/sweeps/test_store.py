@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -71,6 +73,27 @@ def test_open_of_other_files_raises_and_keeps_them(tmp_path: Path) -> None:
         with pytest.raises(SettingError, match=r"not a store|cannot use the store"), opened(path):
             pass
         assert path.read_bytes() == before
+
+
+def test_new_store_has_all_its_tables_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another process finds no file, an empty one, or a complete store, also if the creating one is killed."""
+    path, seen, connect = tmp_path / "s.db", set(), sqlite3.connect
+
+    def traced(*arguments: Any, **options: Any) -> sqlite3.Connection:
+        connection: sqlite3.Connection = connect(*arguments, **options)
+        connection.set_trace_callback(look)
+        return connection
+
+    def look(statement: str) -> None:
+        with closing(connect(path)) as other:
+            seen.add(
+                frozenset(name for (name,) in other.execute("SELECT name FROM sqlite_master WHERE type = 'table'"))
+            )
+
+    monkeypatch.setattr(sqlite3, "connect", traced)
+    with opened(path) as store:
+        assert store.statuses() == {}
+    assert seen == {frozenset(), frozenset({"meta", "runs"})}
 
 
 def test_two_writers_of_one_store_raise(tmp_path: Path) -> None:
