@@ -144,11 +144,14 @@ def _setup(episodes: int) -> tuple[str, ...]:
         "in which the ego touches nothing. Positions, speeds, areas and the rule of the ego are those of EI-Drive.",
         "Free parameters, one value per scenario and equal in its three cells: the start of the hidden car (the "
         "nearest in steps of half a meter from which the cars collide without cooperation in seeds 1 to 20), and "
-        "the start of a bus at the head of the traffic with its variation between seeds: one from which it hides the "
-        "car from the sending vehicle in about half of the runs (5, 6), or that, in steps of half a meter, from which "
-        "messages of that vehicle alone avoid the collision in the fewest of seeds 1 to 20 (7, 8). EI-Drive draws "
-        "30 cars at random, and neither their motion nor their models are recorded. Acceleration is 3.5 m/s². No "
-        "value differs between the cells of a scenario.",
+        "the traffic in front of the sending vehicle. EI-Drive draws 30 cars at random, and neither their motion nor "
+        "their models are recorded; here buses drive at the head of these cars. In 5 and 6 it is one bus, with a "
+        "start from which it hides the car from the sending vehicle in about half of the runs. In 7 and 8 there are "
+        "three, one in each lane, with one start for both scenarios: the middle of the values from which they hide "
+        "the car in all of seeds 1 to 10. So the rates of the vehicle alone follow from the choice of the traffic: "
+        "with one bus in 7 and 8, too, they are 10 % and 30 %, and with 30 cars without a bus, at rest at first in "
+        "EI-Drive's area of traffic, 90 % and 100 % (10 seeds, oracle). Acceleration is 3.5 m/s². No value differs "
+        "between the cells of a scenario.",
         "The paper does not state the number of its episodes; its rates fit three batches of 10 to 20 each. It does "
         "not state the detector either: its published configuration selects YOLOv5.",
     )
