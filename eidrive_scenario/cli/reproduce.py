@@ -39,6 +39,12 @@ def reproduce(
     restart: Annotated[
         bool, typer.Option("--restart", help="Repeat the runs of the record, too; without it they are kept.")
     ] = False,
+    replays: Annotated[
+        bool,
+        typer.Option(
+            "--replays", help="Also write a replay of each arm with seed 1 (table2, table3, detection, pipeline, ei)."
+        ),
+    ] = False,
 ) -> None:
     """Reproduce the experiments of the EI-Drive paper, and write reports with its numbers beside the measured ones.
 
@@ -50,6 +56,7 @@ def reproduce(
     from eidrive_scenario.experiments.reproduction.reproduce import reproduce as reproduce_part
     from eidrive_scenario.reporting.reproduction.figures import draw
     from eidrive_scenario.reporting.reproduction.page import write_paper_page
+    from eidrive_scenario.reporting.reproduction.replays import write_part_replays
 
     names = [] if detectors is None else [name.strip() for name in detectors.split(",")]
     chosen = [(part, selected_detectors(part, names)) for part in selected_parts(parts or [ALL])]
@@ -64,6 +71,9 @@ def reproduce(
             console=Console(stderr=True),
         )
         draw(part.name, done.report, out)
+        if replays and part.has_replays:
+            written = write_part_replays(part, out, used, workers=workers, console=Console(stderr=True))
+            typer.echo(f"{part.name}: wrote {written}")
         page = write_paper_page(out)
         kept = len(done.episodes) - done.added
         typer.echo(

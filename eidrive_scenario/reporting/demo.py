@@ -6,7 +6,6 @@ python -m eidrive_scenario.reporting.demo --out reports/demo.html
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -46,7 +45,7 @@ from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing
 from eidrive_scenario.reporting.drawing.street_view import driver_view, helper_view, street_image
 from eidrive_scenario.reporting.replay.run_replays import write_replays
-from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
+from eidrive_scenario.reporting.run_report.reported_run import run_of_result
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed
 from eidrive_scenario.world.specs import actor_spec
@@ -112,16 +111,6 @@ def write_results(out: Path, runs: Sequence[tuple[Job, RunResult]]) -> Path:
     return out
 
 
-def reported_runs(runs: Sequence[tuple[Job, RunResult]]) -> list[ReportedRun]:
-    """Return the runs as input of a report, with the folders of recorded ones."""
-    return [
-        parse_run(json.loads(as_json_text(replace(result, scenario=job.scenario)))).model_copy(
-            update={"folder": result.folder}
-        )
-        for job, result in runs
-    ]
-
-
 def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console) -> tuple[Table, Table]:
     """Execute all runs, print the tables, and write page, replays and numbers (`.json` in the same folder)."""
     settings = run_settings(detector="oracle")
@@ -131,7 +120,7 @@ def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console)
         task = partial(run_story, watched=seeds[0], below=Path(recordings))
         results = run_jobs(jobs, task, workers=workers, console=console, title="demo")
         runs = [(job, result) for job, (result, _) in zip(jobs, results, strict=True)]
-        reported, without = write_replays(reported_runs(runs), out.parent)
+        reported, without = write_replays([run_of_result(result, job.scenario) for job, result in runs], out.parent)
     for line in without:
         console.print(Text(line, style="yellow"))
     stories: Mapping[tuple[str, str], Story] = {

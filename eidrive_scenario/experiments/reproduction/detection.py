@@ -214,4 +214,5 @@ PART = Part(
     DETECTORS,
     cases,
     report,
+    has_replays=True,
 )

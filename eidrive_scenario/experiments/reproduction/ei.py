@@ -73,4 +73,5 @@ PART = Part(
     DETECTORS,
     cases,
     report,
+    has_replays=True,
 )

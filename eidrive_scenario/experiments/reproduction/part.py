@@ -55,6 +55,7 @@ class Part:
     default    detectors without an option
     cases      function that returns its cases for some detectors
     report     function that returns its report from the episodes of these detectors
+    has_replays  whether its runs can be recorded for replays: few cases, each a run of a scenario of the library
     """
 
     name: str
@@ -65,6 +66,7 @@ class Part:
     default: tuple[str, ...]
     cases: Callable[[Sequence[str]], Sequence[Case]]
     report: Callable[[Sequence[Episode], Sequence[str]], PartReport]
+    has_replays: bool = False
 
     def jobs(self, episodes: int, detectors: Sequence[str]) -> list[EpisodeJob]:
         """Return all runs, ordered by seed, so that an interrupted part has complete pairs."""

@@ -80,4 +80,5 @@ PART = Part(
     DETECTORS,
     cases,
     report,
+    has_replays=True,
 )

@@ -212,4 +212,5 @@ PART = Part(
     DETECTORS,
     cases,
     report,
+    has_replays=True,
 )

@@ -209,4 +209,5 @@ PART = Part(
     DETECTORS[:1],
     cases,
     report,
+    has_replays=True,
 )

@@ -13,6 +13,7 @@ from eidrive_scenario.experiments.reproduction.parts import PARTS
 from eidrive_scenario.experiments.reproduction.provenance import read_provenance
 from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.reporting.page import png_address, write_page
+from eidrive_scenario.reporting.reproduction.replays import replays_page
 
 PAGE = "index.html"
 """Name of the page in the folder of the results."""
@@ -62,6 +63,7 @@ def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
         "sections": sections,
         "figure": png_address(figure.read_bytes()) if figure.is_file() else "",
         "origin": ", ".join(_origin(origin)),
+        "replays": replays_page(name) if (out / replays_page(name)).is_file() else "",
     }
 
 

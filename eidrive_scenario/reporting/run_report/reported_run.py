@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -12,6 +14,9 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.run_files import read_result
 from eidrive_scenario.simulation.result_views import typed
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
+
+if TYPE_CHECKING:
+    from eidrive_scenario.simulation import RunResult
 
 _OF_REPORT = ("folder", "replay", "axes")
 """Fields that are no part of a result."""
@@ -100,3 +105,11 @@ def parse_run(result: Mapping[str, Any] | ReportedRun, source: str | Path = "") 
                 str(source),
             )
         ) from error
+
+
+def run_of_result(result: RunResult, scenario: str) -> ReportedRun:
+    """Return a run of this process, with its folder if it has one, and with the scenario as the report names it."""
+    from eidrive_scenario.experiments.single_run import as_json_text
+
+    run = parse_run(json.loads(as_json_text(replace(result, scenario=scenario))))
+    return run.model_copy(update={"folder": result.folder})

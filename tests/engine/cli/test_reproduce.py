@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive
+from lxml import html
 
 from eidrive_scenario.experiments.reproduction import table_2
+from eidrive_scenario.experiments.reproduction.episodes import Episode
+from eidrive_scenario.experiments.reproduction.layout import PartReport
 from eidrive_scenario.experiments.reproduction.parts import PARTS
+from eidrive_scenario.reporting.reproduction import figures
 
 QUICK = ("--detectors", "oracle", "--workers", "1")
 """Options of runs without image processing in the process of the test."""
@@ -112,3 +118,21 @@ def test_damaged_file_ends_with_exit_code_2_before_the_runs(
 def test_help_names_all_parts(eidrive: Eidrive) -> None:
     text = eidrive("reproduce", "--help").stdout
     assert [name for name in PARTS if name not in text] == []
+
+
+def test_replays_are_linked_from_the_page(eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page links to the report of the recorded runs, which links to a replay of each."""
+    part = replace(PARTS["table2"], cases=lambda detectors: table_2.cases(detectors)[:2], report=empty_report)
+    monkeypatch.setitem(PARTS, "table2", part)
+    monkeypatch.setattr(figures, "draw", lambda *_: None)
+    done = eidrive("reproduce", "table2", "--episodes", 1, *QUICK, "--out", tmp_path, "--replays")
+    assert done.exit_code == 0, done.stderr
+    (address,) = html.parse(tmp_path / "index.html").xpath("//a[contains(@href, 'replays_table2')]/@href")
+    report = tmp_path / address
+    links = html.parse(report).xpath("//a[starts-with(@href, 'replays/')]/@href")
+    assert len(set(links)) == 2
+    assert all((report.parent / link).is_file() for link in links)
+
+
+def empty_report(episodes: Sequence[Episode], detectors: Sequence[str]) -> PartReport:
+    return PartReport("Two runs", ())
