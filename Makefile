@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce docs check-docs bench eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
+.PHONY: help install demo test lint reproduce docs check-docs bench bench-compare bench-history eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -40,7 +40,8 @@ reproduce: install  ## repeat the experiments of the paper, and compare trends w
 	OPENBLAS_NUM_THREADS=1 $(BIN)/eidrive reproduce all --out reports/paper
 	$(BIN)/python -m eidrive_scenario.reporting.trends --out reports/trends
 
-bench: install  ## measure simulated seconds per wall second, and the time per package
+bench: install  ## measure the figures of docs/performance.md, and the time per package
+	$(BIN)/python benchmarks/figures.py
 	$(BIN)/python benchmarks/bench_scenario_1.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/bench_planner.py
 	$(BIN)/python benchmarks/bench_fusion.py
@@ -49,6 +50,13 @@ bench: install  ## measure simulated seconds per wall second, and the time per p
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/bench_gym.py
 	@test -z "$$EIDRIVE_MAPS" && echo 'bench_traffic is skipped: EIDRIVE_MAPS is not set' || $(BIN)/python benchmarks/bench_traffic.py
 	@test -z "$$EIDRIVE_CORPORA" && echo 'bench_corpora is skipped: EIDRIVE_CORPORA is not set' || $(BIN)/python benchmarks/bench_corpora.py
+
+bench-compare: install  ## measure the commits BASE and HEAD in turn, and print the ratios
+	@test -n "$(BASE)" || { echo 'BASE is not set: the commit to compare with, as in make bench-compare BASE=main~5'; exit 2; }
+	$(BIN)/python benchmarks/compare.py $(BASE)
+
+bench-history: install  ## add the figures of the current commit to benchmarks/history.csv
+	$(BIN)/python benchmarks/history.py
 
 eval: install   ## evaluate the learned detectors on held-out images and library scenes: reports/detection.md
 	$(BIN)/python -m training.evaluate

@@ -40,7 +40,7 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world.physics.bodies import quaternion
-from eidrive_scenario.world.physics.bullet import bullet
+from eidrive_scenario.world.physics.bullet import bullet, connect, disconnect
 from eidrive_scenario.world.view import ActorState
 
 SCENARIO = "coop/scenario_1"
@@ -184,14 +184,14 @@ def _tick_of_bare_loop(
 @contextmanager
 def fresh_client(trace: Trace) -> Iterator[None]:
     """Create a client with the bodies of the run and the same client number."""
-    if bullet.connect(bullet.DIRECT) != CLIENT:
+    if connect() != CLIENT:
         raise RuntimeError("pybullet: another client is open")
     try:
         for function, arguments, options in trace.setup:
             function(*arguments, **options)
         yield
     finally:
-        bullet.disconnect(physicsClientId=CLIENT)
+        disconnect(CLIENT)
 
 
 CLIENT = 0
@@ -246,6 +246,50 @@ def _package_of(function: Function) -> str:
     return ""
 
 
+@dataclass(frozen=True)
+class Measured:
+    """Times of a run and of the bare loop.
+
+    simulated   simulated time [s]
+    loading     times of loading [s]
+    run_time, bare_time, calls_time   of the run, of the bare loop and of the pybullet calls of the run [s]
+    """
+
+    simulated: float
+    loading: list[float]
+    run_time: float
+    bare_time: float
+    calls_time: float
+    trace: Trace
+    dt: float
+
+
+def build(seed: int, channel: str, *observers: Any) -> Simulation:
+    """Return the run that is measured."""
+    settings = RunSettings(channel=channel, detector="oracle")
+    scenario = load_for_seed(resolve_scenario(SCENARIO), seed, settings.parameters)
+    return Simulation(scenario, seed=seed, settings=settings, observers=observers)
+
+
+def measure(runs: int, seed: int, channel: str) -> Measured:
+    """Measure the run, the bare loop and the pybullet calls of the run in turn."""
+    trace = Trace()
+    with record_calls(trace):
+        simulation = build(seed, channel, trace)
+        bodies, trace.driven = simulation.world._bodies, simulation.stack.drivers
+        trace.handles = {name: body.handle for name, body in bodies.items()}
+        dt, simulated = simulation.settings.dt, simulation.run().simulated_s
+    bare_loop(trace, dt)
+    complete, loading, bare, repeated = [], [], [], []
+    for _ in range(runs):
+        loading.append(timed(lambda: build(seed, channel).close()))
+        complete.append(timed_run(build(seed, channel)))
+        bare.append(bare_loop(trace, dt))
+        repeated.append(repeated_calls(trace))
+    run_time, bare_time, calls_time = (sum_of_minima(part) for part in (complete, bare, repeated))
+    return Measured(simulated, loading, run_time, bare_time, calls_time, trace, dt)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -253,45 +297,23 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--channel", default="ideal")
     arguments = parser.parse_args()
-    path = resolve_scenario(SCENARIO)
-    settings = RunSettings(channel=arguments.channel, detector="oracle")
-
-    def build(*observers: Any) -> Simulation:
-        scenario = load_for_seed(path, arguments.seed, settings.parameters)
-        return Simulation(scenario, seed=arguments.seed, settings=settings, observers=observers)
-
-    trace = Trace()
-    with record_calls(trace):
-        simulation = build(trace)
-        bodies, trace.driven = simulation.world._bodies, simulation.stack.drivers
-        trace.handles = {name: body.handle for name, body in bodies.items()}
-        simulated = simulation.run().simulated_s
-    bare_loop(trace, settings.dt)
-    complete, loading, bare, repeated = [], [], [], []
-    for _ in range(arguments.runs):
-        loading.append(timed(lambda: build().close()))
-        complete.append(timed_run(build()))
-        bare.append(bare_loop(trace, settings.dt))
-        repeated.append(repeated_calls(trace))
-    ticks, run_time, bare_time, calls_time = (
-        len(trace.states),
-        sum_of_minima(complete),
-        sum_of_minima(bare),
-        sum_of_minima(repeated),
-    )
-    steps = (ticks - 1) * round(settings.dt * PHYSICS_RATE)
+    measured = measure(arguments.runs, arguments.seed, arguments.channel)
+    trace, run_time, bare_time = measured.trace, measured.run_time, measured.bare_time
+    ticks = len(trace.states)
+    steps = (ticks - 1) * round(measured.dt * PHYSICS_RATE)
     rays = sum(len(call[1][0]) for calls in trace.calls("rayTestBatch") for call in calls)
 
-    print(f"{SCENARIO}, oracle, channel {arguments.channel}, seed {arguments.seed}: {simulated:.2f} s in {ticks} ticks")
+    run = f"{SCENARIO}, oracle, channel {arguments.channel}, seed {arguments.seed}"
+    print(f"{run}: {measured.simulated:.2f} s in {ticks} ticks")
     print(f"  {len(trace.handles)} actors, {steps} physics steps, {rays} rays; {arguments.runs} runs")
-    print(f"  simulated s per wall s     {simulated / run_time:8.1f}   (aim: at least 30)")
-    print(f"  including loading          {simulated / (run_time + min(loading)):8.1f}")
+    print(f"  simulated s per wall s     {measured.simulated / run_time:8.1f}   (aim: at least 30)")
+    print(f"  including loading          {measured.simulated / (run_time + min(measured.loading)):8.1f}")
     print(f"  per tick                   {1e3 * run_time / ticks:8.3f} ms")
     print(f"  bare pybullet loop         {1e3 * bare_time / ticks:8.3f} ms per tick")
     print(f"  ratio to the bare loop     {run_time / bare_time:8.2f}   (aim: below 3)")
-    print(f"  pybullet calls of the run  {1e3 * calls_time / ticks:8.3f} ms per tick")
+    print(f"  pybullet calls of the run  {1e3 * measured.calls_time / ticks:8.3f} ms per tick")
     profile = cProfile.Profile()
-    simulation = build()
+    simulation = build(arguments.seed, arguments.channel)
     profile.enable()
     simulation.run()
     profile.disable()

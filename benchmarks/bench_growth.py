@@ -1,0 +1,87 @@
+"""Cost per car and per station over their number, on one core, as a table and a plot.
+
+Scripted cars drive on Town04 (`EIDRIVE_MAPS`), as in `bench_traffic.py`. Stations drive on a straight road and send CAM
+at 10 Hz by IEEE 802.11p, as in `bench_radio.py`: one receives, or all receive and fuse, where the number of messages
+grows with its square. Times are processor times of whole runs without loading.
+
+    python benchmarks/bench_growth.py [--plot docs/figures/growth.png]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from bench_radio import RATE, TICK, complete_run
+from bench_traffic import town_file, traffic_run
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter, ScalarFormatter
+
+CARS, STATIONS = (100, 200, 500, 1000), (20, 50, 100, 200)
+SECONDS = 5.0
+"""Simulated time of a run with cars [s]."""
+REPEATS = 2
+
+Cost = Callable[[int], float]
+
+
+def car_cost(count: int) -> float:
+    """Return the time per car and tick [ms]."""
+    return 1e3 * TICK / traffic_run(town_file("Town04"), count, 0, SECONDS, runs=REPEATS) / count
+
+
+def station_cost(count: int, *, all_listen: bool) -> float:
+    """Return the time per station and tick [ms]; the fewer there are, the longer is the run."""
+    seconds = min(100.0 / count, 2.0)
+    rate = max(complete_run(count, seconds, RATE, all_listen, "random") for _ in range(REPEATS))
+    return 1e3 * TICK / rate / count
+
+
+SERIES: dict[str, tuple[tuple[int, ...], Cost]] = {
+    "scripted cars": (CARS, car_cost),
+    "stations, one receives": (STATIONS, lambda count: station_cost(count, all_listen=False)),
+    "stations, all receive": (STATIONS, lambda count: station_cost(count, all_listen=True)),
+}
+
+
+def draw(costs: dict[str, list[tuple[int, float]]], path: Path) -> None:
+    """Write a plot of the costs."""
+    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    for axes, names in zip(figure.subplots(1, 2), (["scripted cars"], [*SERIES][1:]), strict=True):
+        for name in names:
+            if name in costs:
+                axes.plot(*zip(*costs[name], strict=True), "o-", label=name)
+        axes.set(xlabel="number", ylabel="time per tick and vehicle [ms]", xscale="log", ylim=(0.0, None))
+        ticks = sorted({number for name in names for number in SERIES[name][0]})
+        axes.set_xticks(ticks, labels=[str(number) for number in ticks])
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.yaxis.set_major_formatter(ScalarFormatter())
+        axes.grid(axis="y", color="#e5e7eb")
+        if axes.lines:
+            axes.legend(frameon=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    """Measure, print and draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--plot", type=Path, help="PNG file")
+    options = parser.parse_args()
+    costs: dict[str, list[tuple[int, float]]] = {}
+    for name, (counts, cost) in SERIES.items():
+        if cost is car_cost and not os.environ.get("EIDRIVE_MAPS"):
+            print(f"{name}: skipped, EIDRIVE_MAPS is not set")
+            continue
+        costs[name] = [(count, cost(count)) for count in counts]
+        cells = "".join(f"{count:>8}: {value:.4f} ms" for count, value in costs[name])
+        print(f"{name:24}{cells}   growth {costs[name][-1][1] / costs[name][0][1] - 1.0:+.0%}", flush=True)
+    if options.plot:
+        draw(costs, options.plot)
+        print(f"wrote {options.plot}")
+
+
+if __name__ == "__main__":
+    main()

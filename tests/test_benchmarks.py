@@ -1,0 +1,108 @@
+"""Figures of the benchmarks: their measurement, the history of commits, and the comparison of two."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+BENCHMARKS = ROOT / "benchmarks"
+
+
+@pytest.fixture(autouse=True)
+def benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+
+
+def is_repository() -> bool:
+    return (ROOT / ".git").exists()
+
+
+def test_bare_loop_is_faster_than_the_run() -> None:
+    from bench_scenario_1 import measure
+
+    measured = measure(runs=1, seed=1, channel="ideal")
+    assert 0.0 < measured.bare_time < measured.run_time
+    assert measured.simulated == pytest.approx(len(measured.trace.states) * measured.dt, abs=0.1)
+
+
+def test_better_figure_depends_on_its_unit() -> None:
+    from figures import better
+
+    assert better("planner", [0.8, 1.2]) == 0.8
+    assert better("yolov5", [0.8, 1.2]) == 1.2
+
+
+def test_unknown_figure_is_an_error() -> None:
+    from figures import available
+
+    with pytest.raises(SystemExit, match="unknown figure: speed"):
+        available(["speed"])
+
+
+def test_figures_of_maps_are_omitted_without_maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    from figures import available
+
+    monkeypatch.delenv("EIDRIVE_MAPS", raising=False)
+    assert "cars_200" not in available()
+    assert "scenario_1" in available()
+
+
+def test_gain_is_above_one_where_head_is_better() -> None:
+    from compare import comparison, gain
+
+    assert gain("planner", 2.0, 1.0) == gain("yolov5", 1.0, 2.0) == 2.0
+    assert "1.50   (1.33 to 1.50)" in comparison("yolov5", [(1.0, 1.5), (0.9, 1.2)])
+
+
+def test_history_has_one_line_per_measurement(tmp_path: Path) -> None:
+    from history import add_row, columns
+
+    file = tmp_path / "history.csv"
+    for commit in ("a", "b"):
+        add_row(file, [commit, *["1"] * (len(columns()) - 1)])
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["commit"] for row in rows] == ["a", "b"]
+    assert {len(row) for row in rows} == {len(columns())}
+
+
+def test_history_of_other_figures_is_refused(tmp_path: Path) -> None:
+    from history import add_row
+
+    file = tmp_path / "history.csv"
+    file.write_text("commit,speed\n", encoding="utf-8")
+    with pytest.raises(SystemExit, match="other columns"):
+        add_row(file, ["a", "1"])
+    assert file.read_text(encoding="utf-8") == "commit,speed\n"
+
+
+def worktrees() -> str:
+    command = ("git", "worktree", "list", "--porcelain")
+    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+
+
+@pytest.mark.skipif(not is_repository(), reason="not a checkout of git")
+def test_comparison_measures_commits_and_removes_checkouts() -> None:
+    before = worktrees()
+    command = (sys.executable, str(BENCHMARKS / "compare.py"), "HEAD", "--figures", "version", "--repeats", "1")
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    header, row = done.stdout.splitlines()
+    assert header.split()[0] == "figure"
+    name, base, head, *_ = row.split()
+    assert name == "version"
+    assert float(base) > 0.0
+    assert float(head) > 0.0
+    assert worktrees() == before
+
+
+@pytest.mark.skipif(not is_repository(), reason="not a checkout of git")
+def test_comparison_with_unknown_commit_is_an_error() -> None:
+    command = (sys.executable, str(BENCHMARKS / "compare.py"), "no-such-commit")
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "git rev-parse" in done.stderr
