@@ -48,3 +48,27 @@ def test_step_by_hand_shows_why_the_ego_brakes(tmp_path: Path, channel: str, bra
     assert any(int(row["messages"]) for row in rows) is braked
     before = [row for row in rows if float(row["time"]) < 4.0]
     assert any("conflict area" in row["reason"] and float(row["brake"]) > 0.0 for row in before) is braked
+
+
+def test_policy_is_better_than_the_rule_under_latency(tmp_path: Path) -> None:
+    pytest.importorskip("gymnasium")
+    _, late, none = run("evaluate_policy.py", "--seeds", "8", "--latency", "0.45", folder=tmp_path)
+    assert late.split()[0] == "0.45"
+    rule, policy = (part for part in late.split() if "/" in part)
+    assert int(policy.split("/")[0]) > int(rule.split("/")[0])
+    *_, blind = (part for part in none.split() if "/" in part)
+    assert int(blind.split("/")[0]) < int(policy.split("/")[0])
+
+
+def test_training_writes_a_policy_that_can_be_evaluated(tmp_path: Path) -> None:
+    pytest.importorskip("gymnasium")
+    small = ("--generations", "1", "--population", "2", "--episodes", "1", "--workers", "1")
+    files = ("--out", "policy.npz", "--curve", "curve.csv", "--plot", "curve.png")
+    *_, last = run("train_policy.py", *small, *files, folder=tmp_path)
+    assert last.startswith("wrote policy.npz")
+    header, *rows = (tmp_path / "curve.csv").read_text(encoding="utf-8").splitlines()
+    assert header == "generation,reward,passed"
+    assert len(rows) == 2
+    assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
+    _, row = run("evaluate_policy.py", "--policy", "policy.npz", "--seeds", "1", "--latency", "0.3", folder=tmp_path)
+    assert row.split()[0] == "0.30"
