@@ -2,7 +2,7 @@
 
 Both commits are checked out to temporary folders, and measured by the scripts of this checkout. A ratio above one means
 that HEAD is better. Each figure is the best of its measurements; the range is that of the ratios of measurements made
-directly one after the other, which tells what other load of the machine does.
+directly one after the other: its width is the effect of other load.
 
     python benchmarks/compare.py BASE [HEAD] [--figures NAME ...] [--repeats 3]
 """

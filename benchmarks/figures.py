@@ -1,6 +1,6 @@
 """Figures by which the speed of the project is followed, each beside its aim and the figure of version 0.1.0.
 
-Each figure is measured in a process of its own. Processor times count where a figure has one process and one thread,
+Each figure is measured in a separate process. Processor times count where a figure has one process and one thread,
 since other load changes them least; sweeps count by the clock. `EIDRIVE_MAPS` names the folder of CARLA's Town04.xodr;
 the figures of traffic are omitted without it.
 
@@ -179,7 +179,7 @@ def available(names: Iterable[str] = ()) -> list[str]:
 
 
 def measure(name: str, checkout: Path = ROOT) -> float | None:
-    """Return a figure of the package of a checkout, measured in a process of its own; None if it fails there."""
+    """Return a figure of the package of a checkout, measured in a separate process; None if it fails there."""
     paths = [str(checkout / folder) for folder in ("", "behaviors", "criteria")]
     environment = {**os.environ, **SINGLE_THREAD, "PYTHONPATH": os.pathsep.join([*paths, str(HERE)])}
     try:
