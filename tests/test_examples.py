@@ -70,5 +70,5 @@ def test_training_writes_a_policy_that_can_be_evaluated(tmp_path: Path) -> None:
     assert header == "generation,reward,passed"
     assert len(rows) == 2
     assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
-    _, row = run("evaluate_policy.py", "--policy", "policy.npz", "--seeds", "1", "--latency", "0.3", folder=tmp_path)
+    _, row, _ = run("evaluate_policy.py", "--policy", "policy.npz", "--seeds", "1", "--latency", "0.3", folder=tmp_path)
     assert row.split()[0] == "0.30"

@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -119,8 +119,12 @@ def test_invalid_scenario_opens_no_page(eidrive: Eidrive, tmp_path: Path) -> Non
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Callable[..., subprocess.Popen[str]]:
-    """Return a function that starts `eidrive run` in another process."""
+def start(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Return a function that starts `eidrive run` in another process.
+
+    A job in the background ignores SIGINT, and so would its processes.
+    """
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def run(*arguments: str, browser: str = "true") -> subprocess.Popen[str]:
         return subprocess.Popen(
@@ -132,7 +136,8 @@ def start(tmp_path: Path) -> Callable[..., subprocess.Popen[str]]:
             env={**os.environ, "BROWSER": browser},
         )
 
-    return run
+    yield run
+    signal.signal(signal.SIGINT, inherited)
 
 
 class Reader(threading.Thread):
