@@ -53,13 +53,14 @@ def draw(costs: dict[str, list[tuple[int, float]]], path: Path) -> None:
         for name in names:
             if name in costs:
                 axes.plot(*zip(*costs[name], strict=True), "o-", label=name)
-        axes.set(xlabel="number", ylabel="time per tick and vehicle [ms]", xscale="log", ylim=(0.0, None))
+        axes.set(xlabel="number", ylabel="time per tick and vehicle [ms]", xscale="log")
         ticks = sorted({number for name in names for number in SERIES[name][0]})
         axes.set_xticks(ticks, labels=[str(number) for number in ticks])
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.yaxis.set_major_formatter(ScalarFormatter())
         axes.grid(axis="y", color="#e5e7eb")
         if axes.lines:
+            axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
             axes.legend(frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)

@@ -81,6 +81,16 @@ def test_history_of_other_figures_is_refused(tmp_path: Path) -> None:
     assert file.read_text(encoding="utf-8") == "commit,speed\n"
 
 
+def test_committed_history_has_the_columns_of_the_figures() -> None:
+    from history import FILE, columns
+
+    with FILE.open(newline="", encoding="utf-8") as stream:
+        header, *rows = csv.reader(stream)
+    assert header == columns()
+    assert rows
+    assert all(len(row) == len(header) for row in rows)
+
+
 def worktrees() -> str:
     command = ("git", "worktree", "list", "--porcelain")
     return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
