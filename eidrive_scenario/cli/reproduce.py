@@ -74,6 +74,8 @@ def reproduce(
         if replays and part.has_replays:
             written = write_part_replays(part, out, used, workers=workers, console=Console(stderr=True))
             typer.echo(f"{part.name}: wrote {written}")
+        elif replays:
+            typer.echo(f"{part.name}: --replays has no effect on this part", err=True)
         page = write_paper_page(out)
         kept = len(done.episodes) - done.added
         typer.echo(

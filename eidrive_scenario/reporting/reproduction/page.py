@@ -37,7 +37,8 @@ def _duration(origins: Mapping[str, Mapping[str, Any]]) -> str:
         return ""
     runs, seconds = (sum(float(one[name]) for one in known) for name in ("runs", "last_call_s"))
     processes = max(int(one.get("processes") or 1) for one in known)
-    return f"{runs:,.0f} runs in {seconds / 60.0:.0f} minutes on {processes} process{'es' if processes > 1 else ''}"
+    duration = f"{seconds:.0f} seconds" if seconds < 120.0 else f"{seconds / 60.0:.0f} minutes"
+    return f"{runs:,.0f} runs in {duration} on {processes} process{'es' if processes > 1 else ''}"
 
 
 def _part(out: Path, name: str, origin: Mapping[str, Any]) -> dict[str, Any]:
