@@ -232,6 +232,8 @@ def main() -> None:
             print(line(name, found[name]), flush=True)
     if options.json:
         print(json.dumps(found))
+    if None in found.values():
+        sys.exit(1)
 
 
 if __name__ == "__main__":

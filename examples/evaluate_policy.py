@@ -34,6 +34,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=40, help="number of episodes per latency")
     parser.add_argument("--latency", type=float, nargs="+", default=[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], help="[s]")
     given = parser.parse_args(arguments)
+    if not given.policy.is_file():
+        parser.error(f"--policy: {given.policy} does not exist; examples/train_policy.py writes one")
+    if given.seeds < 1:
+        parser.error("--seeds must be at least 1")
     policy = Policy.load(given.policy)
     seeds = range(FIRST_SEED, FIRST_SEED + given.seeds)
     print("latency  rule: passed    95 %    time   policy: passed    95 %    time")
