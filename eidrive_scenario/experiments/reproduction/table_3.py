@@ -149,9 +149,9 @@ def _setup(episodes: int) -> tuple[str, ...]:
         "start from which it hides the car from the sending vehicle in about half of the runs. In 7 and 8 there are "
         "three, one in each lane, with one start for both scenarios: the middle of the values from which they hide "
         "the car in all of seeds 1 to 10. So the rates of the vehicle alone follow from the choice of the traffic: "
-        "with one bus in 7 and 8, too, they are 10 % and 30 %, and with 30 cars without a bus, at rest at first in "
-        "EI-Drive's area of traffic, 90 % and 100 % (10 seeds, oracle). Acceleration is 3.5 m/s². No value differs "
-        "between the cells of a scenario.",
+        "with one bus in 7 and 8, too, they are 10 % and 30 %, and with cars but no bus, at rest at first in and "
+        "around EI-Drive's area of traffic, 80 % to 100 % (10 seeds, oracle). Acceleration is 3.5 m/s². No value "
+        "differs between the cells of a scenario.",
         "The paper does not state the number of its episodes; its rates fit three batches of 10 to 20 each. It does "
         "not state the detector either: its published configuration selects YOLOv5.",
     )
