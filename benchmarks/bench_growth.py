@@ -17,7 +17,7 @@ from pathlib import Path
 from bench_radio import RATE, TICK, complete_run
 from bench_traffic import town_file, traffic_run
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter, ScalarFormatter
+from matplotlib.ticker import NullFormatter
 
 CARS, STATIONS = (100, 200, 500, 1000), (20, 50, 100, 200)
 SECONDS = 5.0
@@ -57,7 +57,6 @@ def draw(costs: dict[str, list[tuple[int, float]]], path: Path) -> None:
         ticks = sorted({number for name in names for number in SERIES[name][0]})
         axes.set_xticks(ticks, labels=[str(number) for number in ticks])
         axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.yaxis.set_major_formatter(ScalarFormatter())
         axes.grid(axis="y", color="#e5e7eb")
         if axes.lines:
             axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])

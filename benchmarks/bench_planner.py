@@ -18,7 +18,7 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-from bench_scenario_1 import sum_of_minima
+from timing import sum_of_minima
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.behavior.planner import BehaviorPlanner

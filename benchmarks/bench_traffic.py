@@ -19,7 +19,7 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from bench_scenario_1 import shares_by_package
+from timing import print_shares
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.randomness import generator
@@ -160,10 +160,7 @@ def main() -> None:
     print(f"  simulated s per s of CPU   {result.simulated_s / median(cpu):8.2f}")
     print(f"  per tick                   {1e3 * median(running) / ticks:8.3f} ms")
     print(f"  loading                    {median(loading):8.3f} s")
-    print("time of a run by package (cProfile; libraries count for the package that calls them):")
-    for package, share in shares_by_package(profile).items():
-        if share >= 0.005:
-            print(f"  {package:24} {100 * share:5.1f} %  {'#' * round(50 * share)}")
+    print_shares(profile)
     if options.profile:
         pstats.Stats(profile).sort_stats("tottime").print_stats(40)
 

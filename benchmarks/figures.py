@@ -40,7 +40,7 @@ def scenario_1_ratio() -> float:
 def planner_tick() -> float:
     """Return the time of the planner `behavior` with ten tracks [ms per tick]."""
     from bench_planner import ROAD, TICKS, drive, timed_plans
-    from bench_scenario_1 import sum_of_minima
+    from timing import sum_of_minima
 
     from eidrive_scenario.library import library_path
     from eidrive_scenario.roads import RoadNetwork
@@ -52,7 +52,7 @@ def planner_tick() -> float:
 def heavy_traffic() -> float:
     """Return the simulated time of coop/scenario_5 with the planner `behavior` per processor time."""
     from bench_planner import DT, SCENARIO, timed_ticks
-    from bench_scenario_1 import sum_of_minima
+    from timing import sum_of_minima
 
     from eidrive_scenario.library import resolve_scenario
     from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
@@ -130,8 +130,8 @@ def _children_time() -> float:
 class Figure:
     """A figure that is followed.
 
-    unit     unit; figures in units of time are better if they are less
-    measure  returns the figure
+    unit     unit
+    measure  function that returns the figure
     aim      wanted figure, None for none
     before   figure of version 0.1.0, None where it was not measured
     is_less  whether less is better
@@ -201,6 +201,12 @@ def better(name: str, values: Iterable[float]) -> float:
     return min(values) if FIGURES[name].is_less else max(values)
 
 
+def best(name: str, repeats: int) -> float | None:
+    """Return the best of several measurements of a figure here; None if all fail."""
+    values = [value for _ in range(repeats) if (value := measure(name)) is not None]
+    return better(name, values) if values else None
+
+
 def line(name: str, value: float | None) -> str:
     """Return the printed line of a figure."""
     figure = FIGURES[name]
@@ -226,8 +232,7 @@ def main() -> None:
     if not options.json:
         print(f"{'figure':20}{'here':>10}  {'unit':24}{'aim':16}0.1.0")
     for name in names:
-        values = [value for _ in range(options.repeats) if (value := measure(name)) is not None]
-        found[name] = better(name, values) if values else None
+        found[name] = best(name, options.repeats)
         if not options.json:
             print(line(name, found[name]), flush=True)
     if options.json:

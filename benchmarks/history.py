@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import median
 
 from compare import git
-from figures import FIGURES, HERE, available, better, line, measure
+from figures import FIGURES, HERE, available, best, line
 
 FILE = HERE / "history.csv"
 ROUNDS = 3_000_000
@@ -72,10 +72,9 @@ def main() -> None:
     commit, date = git("log", "-1", "--format=%H %cI").split()
     speeds, found = [core_speed()], dict.fromkeys(FIGURES, "")
     for name in available():
-        values = [value for _ in range(options.repeats) if (value := measure(name)) is not None]
-        if values:
-            found[name] = f"{better(name, values):.4g}"
-        print(line(name, better(name, values) if values else None), flush=True)
+        value = best(name, options.repeats)
+        found[name] = "" if value is None else f"{value:.4g}"
+        print(line(name, value), flush=True)
         speeds.append(core_speed())
     row = [commit[:12], date, processor(), platform.python_version(), f"{median(speeds):.1f}", *found.values()]
     add_row(options.file, row)
