@@ -121,8 +121,8 @@ def timed_run(simulation: Simulation) -> list[float]:
 def repeated_calls(trace: Trace) -> list[float]:
     """Return the time of the pybullet calls of the run [s], tick by tick."""
     times: list[float] = []
-    with fresh_client(trace):
-        for calls in trace.ticks:
+    with fresh_client(trace) as client:
+        for calls in [at_client(calls, client) for calls in trace.ticks]:
             started = time.perf_counter()
             for function, arguments, options in calls:
                 function(*arguments, **options)
@@ -132,7 +132,6 @@ def repeated_calls(trace: Trace) -> list[float]:
 
 def bare_loop(trace: Trace, dt: float) -> list[float]:
     """Return the time of the same bodies, steps and rays in bare pybullet [s], tick by tick."""
-    here = {"physicsClientId": CLIENT}
     steps = round(dt * PHYSICS_RATE)
     rays = [[arguments for _, arguments, _ in calls] for calls in trace.calls("rayTestBatch")]
     driven = [trace.handles[name] for name in trace.driven]
@@ -141,7 +140,8 @@ def bare_loop(trace: Trace, dt: float) -> list[float]:
         for previous, current in zip(trace.states, trace.states[1:], strict=False)
     ]
     times: list[float] = []
-    with fresh_client(trace):
+    with fresh_client(trace) as client:
+        here = {"physicsClientId": client}
         for (moved, velocities), cast in zip(plan, rays, strict=False):
             started = time.perf_counter()
             for origins, targets in cast:
@@ -178,20 +178,25 @@ def _tick_of_bare_loop(
 
 
 @contextmanager
-def fresh_client(trace: Trace) -> Iterator[None]:
-    """Create a client with the bodies of the run and the same client number."""
-    if connect() != CLIENT:
-        raise RuntimeError("pybullet: another client is open")
+def fresh_client(trace: Trace) -> Iterator[int]:
+    """Yield a client with the bodies of the run."""
+    client = connect()
     try:
-        for function, arguments, options in trace.setup:
+        for function, arguments, options in at_client(trace.setup, client):
             function(*arguments, **options)
-        yield
+        yield client
     finally:
-        disconnect(CLIENT)
+        disconnect(client)
 
 
-CLIENT = 0
-"""Number of the first pybullet client."""
+def at_client(calls: list[Call], client: int) -> list[Call]:
+    """Return recorded calls for another client than that of the run, which is named, or the last argument."""
+    return [
+        (function, arguments, {**options, "physicsClientId": client})
+        if "physicsClientId" in options
+        else (function, (*arguments[:-1], client), options)
+        for function, arguments, options in calls
+    ]
 
 
 @dataclass(frozen=True)
