@@ -1,10 +1,11 @@
-"""Resident memory over successive runs in one process: a driven vehicle on a road with many objects.
+"""Resident memory over successive runs in one process: a scenario, or a driven vehicle on a road with many objects.
 
-After the first runs, which fill caches, memory must not grow: the aim is less than 20 MB after the tenth run. Without
-`--road` the script writes a straight road with `--objects` posts. ASAM's `AB_RQ31_R2000.xodr` (OpenDRIVE examples) has
-objects that become 14,000 boxes; pass its path and a drivable lane.
+After the first runs, which fill caches, memory must not grow: the aim is less than 20 MB after the tenth run. Each run
+has another seed. Without `--scenario` and `--road` the script writes a straight road with `--objects` posts. ASAM's
+`AB_RQ31_R2000.xodr` (OpenDRIVE examples) has objects that become 14,000 boxes; pass its path and a drivable lane.
 
-    python benchmarks/bench_memory.py [--runs 200] [--seconds 2] [--road FILE --lane -2] [--detector oracle]
+    python benchmarks/bench_memory.py [--runs 200] [--scenario coop/scenario_1 | --road FILE --lane -2]
+        [--seconds 2] [--detector oracle]
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, run_file
 
@@ -67,17 +69,22 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--seconds", type=float, default=2.0, help="simulated time of each run [s]")
+    parser.add_argument("--scenario", help="name of a scenario of the library, or path")
+    parser.add_argument("--seconds", type=float, help="time limit of each run [s] (default: 2; with a scenario 120)")
     parser.add_argument("--road", type=Path)
     parser.add_argument("--lane", type=int, default=-1)
     parser.add_argument("--objects", type=int, default=10_000, help="number of objects of the generated road")
     parser.add_argument("--detector", default="oracle")
     options = parser.parse_args()
-    settings = RunSettings(time_limit=options.seconds, detector=options.detector)
+    seconds = options.seconds or (2.0 if options.scenario is None else 120.0)
+    settings = RunSettings(time_limit=seconds, detector=options.detector)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        road = options.road if options.road is not None else write_road(folder, options.objects)
-        scenario = write_scenario(folder, road, options.lane)
+        if options.scenario is not None:
+            scenario = resolve_scenario(options.scenario)
+        else:
+            road = options.road if options.road is not None else write_road(folder, options.objects)
+            scenario = write_scenario(folder, road, options.lane)
         started, after_tenth_run = time.perf_counter(), 0.0
         for run in range(1, options.runs + 1):
             run_file(scenario, seed=run, settings=settings)
