@@ -123,12 +123,17 @@ def _fuse_states(tracks: Table, objects: list[list[int]], gate: float) -> tuple[
     covariance[:, 1] = tracks["covariance"][:, 2:, 2:]
     known = estimates(tracks["mean"].reshape(-1, 2, 2), covariance)
     groups, count = objects, len(tracks)
-    while pairs := [pair for members in groups for pair in zip(members[::2], members[1::2], strict=False)]:
+    while pairs := [
+        pair for members in groups if len(members) > 1 for pair in zip(members[::2], members[1::2], strict=False)
+    ]:
         first, second = zip(*pairs, strict=True)
         fresh = fuse(known.take(first, axis=1), known.take(second, axis=1), gate)
         known = np.concatenate([known, fresh], axis=1)
         places = iter(range(count, count + len(pairs)))
-        groups = [[*islice(places, len(members) // 2), *members[len(members) // 2 * 2 :]] for members in groups]
+        groups = [
+            members if len(members) == 1 else [*islice(places, len(members) // 2), *members[len(members) // 2 * 2 :]]
+            for members in groups
+        ]
         count += len(pairs)
     final = known.take([members[0] for members in groups], axis=1)
     return means(final), covariances(final[:, :, 0])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.assignment import assign
 
 Table = NDArray[np.void]
@@ -19,6 +19,8 @@ UNASSIGNED_GATE = -2.0 * math.log(1e-6)
 
 One true pair in a hundred is outside a gate of 99 %, which would split objects many times per second.
 """
+_FEW_PAIRS = 1024
+"""Maximum number of pairs that are all listed, which is faster."""
 CERTAIN = -1e3
 """Cost of a pair with the same object id of a station: less than any other."""
 
@@ -60,22 +62,20 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     """
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
-    dx, dy = own.x[:, None] - other.x, own.y[:, None] - other.y
-    limit = own.reach[:, None] + other.reach
-    near = dx * dx + dy * dy <= limit * limit
-    numbered = None
-    if same_station:
-        stations = first["station"][:, None] == second["station"][None, :]
-        near &= stations
-        if second["number"].max(initial=-1) >= 0:
-            numbered = stations & (first["number"][:, None] == second["number"][None, :]) & (second["number"] >= 0)
-            near |= numbered
-    else:
-        near &= first["station"][:, None] < second["station"][None, :]
-    rows, columns = np.nonzero(near)
-    if not len(rows):
+    rows, columns = _pairs_of_stations(first["station"], second["station"], own, other, same_station)
+    x, y = own.x[rows] - other.x[columns], own.y[rows] - other.y[columns]
+    limit = own.reach[rows] + other.reach[columns]
+    near = x * x + y * y <= limit * limit
+    certain = None
+    if same_station and second["number"].max(initial=-1) >= 0:
+        number = second["number"][columns]
+        certain = (first["number"][rows] == number) & (number >= 0)
+        near |= certain
+    if not near.any():
         return Pairs([], [], [], [])
-    x, y = dx[rows, columns], dy[rows, columns]
+    if not near.all():
+        rows, columns, x, y = rows[near], columns[near], x[near], y[near]
+        certain = None if certain is None else certain[near]
     xx, xy, yy = own.xx[rows] + other.xx[columns], own.xy[rows] + other.xy[columns], own.yy[rows] + other.yy[columns]
     determinant = xx * yy - xy * xy
     mahalanobis = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
@@ -85,8 +85,7 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     narrower = np.minimum(own.width[rows], other.width[columns])
     inside |= square < 0.25 * narrower * narrower
     cost = mahalanobis + np.log(determinant)
-    if numbered is not None:
-        certain = numbered[rows, columns]
+    if certain is not None:
         inside |= certain
         cost[certain] = CERTAIN
     fits = inside | (~vague & (mahalanobis <= UNASSIGNED_GATE))
@@ -109,6 +108,46 @@ def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
         if row not in rows and column not in columns
     ]
     return assigned + assign(*zip(*rest, strict=True)) if rest else assigned
+
+
+def _pairs_of_stations(
+    first: Integers, second: Integers, own: _Side, other: _Side, same_station: bool
+) -> tuple[Integers, Integers]:
+    """Return rows and columns, in order, of the pairs of one station, or of two stations with the lower one first.
+
+    Pairs of two stations that are too far apart may be omitted.
+    """
+    if len(first) * len(second) <= _FEW_PAIRS:
+        return _where(first[:, None] == second if same_station else first[:, None] < second)
+    if same_station:
+        order = np.argsort(second, kind="stable")
+        return _ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
+    order = np.argsort(other.x, kind="stable")
+    distance = (own.reach + other.reach.max()) * (1.0 + 1e-9) + 1e-6  # a margin for rounding
+    sorted_x = other.x[order]
+    if not math.isfinite(sorted_x[-1] + distance.max()):
+        return _where(first[:, None] < second)
+    rows, columns = _ranges(
+        np.searchsorted(sorted_x, own.x - distance), np.searchsorted(sorted_x, own.x + distance, "right"), order
+    )
+    ahead = first[rows] < second[columns]
+    rows, columns = rows[ahead], columns[ahead]
+    in_order = np.lexsort((columns, rows))
+    return rows[in_order], columns[in_order]
+
+
+def _where(pairs: NDArray[np.bool_]) -> tuple[Integers, Integers]:
+    rows, columns = np.nonzero(pairs)
+    return rows, columns
+
+
+def _ranges(starts: Integers, ends: Integers, order: Integers) -> tuple[Integers, Integers]:
+    """Return each row as often as its range of places is long, and the entries of `order` at these places."""
+    counts = ends - starts
+    total = np.cumsum(counts)
+    rows = np.repeat(np.arange(len(counts)), counts)
+    places = np.arange(len(rows)) - np.repeat(total - counts - starts, counts)
+    return rows, order[places]
 
 
 class _Side(NamedTuple):

@@ -99,6 +99,9 @@ class ReportHistory:
 
     def _due(self, station: int, history: _History) -> Sequence[Report]:
         """Return the unprocessed reports of a station in order, after rollback of the tracks to the first of them."""
+        latest = history.entries[-1].report.detections.time if history.entries else history.begin
+        if len(history.new) == 1 and latest < history.new[0].detections.time < math.inf:
+            return [history.new.pop()]
         reports = [entry.report for entry in history.entries]
         kept = len(reports)
         for report in history.new:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
@@ -13,20 +14,35 @@ BODY_MARGIN = 0.9
 the width of a car: the center of another car is closer only after a collision."""
 
 
-def rows_on_bodies(detections: Detections, bodies: Array) -> list[int]:
-    """Return the rows of the detections whose centers are on bodies (K, 7), or within the margin of them."""
-    outlines = [
-        (x, y, math.cos(yaw), math.sin(yaw), length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN)
+class Outline(NamedTuple):
+    """Outline of a body with the margin: center [m], cosine and sine of its heading, half length and half width [m]."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+    half_length: float
+    half_width: float
+
+
+def outlines(bodies: Array) -> list[Outline]:
+    """Return the outlines of bodies (K, 7)."""
+    return [
+        Outline(x, y, math.cos(yaw), math.sin(yaw), length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN)
         for x, y, _, length, width, _, yaw in bodies.tolist()
     ]
-    return [
-        row
-        for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist())
-        if any(
-            abs(cos * (bx - x) + sin * (by - y)) <= half_length and abs(cos * (by - y) - sin * (bx - x)) <= half_width
-            for x, y, cos, sin, half_length, half_width in outlines
-        )
-    ]
+
+
+def rows_on_bodies(detections: Detections, bodies: Sequence[Outline]) -> list[int]:
+    """Return the rows of the detections whose centers are on bodies, or within the margin of them."""
+    rows = []
+    for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist()):
+        for x, y, cos, sin, half_length, half_width in bodies:
+            ahead, left = cos * (bx - x) + sin * (by - y), cos * (by - y) - sin * (bx - x)
+            if abs(ahead) <= half_length and abs(left) <= half_width:
+                rows.append(row)
+                break
+    return rows
 
 
 def without_rows(detections: Detections, rows: Iterable[int]) -> Detections:

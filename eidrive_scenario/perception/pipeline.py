@@ -11,7 +11,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
 from eidrive_scenario.perception.localization import PLANE, Localizer
-from eidrive_scenario.perception.own_bodies import rows_on_bodies, without_rows
+from eidrive_scenario.perception.own_bodies import outlines, rows_on_bodies, without_rows
 from eidrive_scenario.perception.pose_noise import PoseNoiseProcess
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
@@ -98,7 +98,7 @@ class Perception:
             if self._checked:
                 check_detections(self.detector, "detect", found)
             if len(readings.attached):
-                found = without_rows(found, rows_on_bodies(found, readings.attached))
+                found = without_rows(found, rows_on_bodies(found, outlines(readings.attached)))
             if self._false_objects:
                 found = with_false_objects(found, self._false_objects, with_velocity=self.detector.provides_velocity)
             if self._latency <= 0.0 and not self._computing:

@@ -148,7 +148,8 @@ class World:
 
     def attached(self, name: str) -> tuple[str, ...]:
         """Return the present trailers of a vehicle, or all other bodies of the road train of a trailer."""
-        return tuple(other for other in self._bodies if other in self._couplings.attached(name))
+        attached = self._couplings.attached(name)
+        return tuple(other for other in self._bodies if other in attached) if attached else ()
 
     @property
     def weather(self) -> Weather:

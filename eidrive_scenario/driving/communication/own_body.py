@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate
 from eidrive_scenario.fusion.tracks import pose_part
-from eidrive_scenario.perception.own_bodies import BODY_MARGIN, rows_on_bodies, without_rows
+from eidrive_scenario.perception.own_bodies import BODY_MARGIN, Outline, outlines, rows_on_bodies, without_rows
 from eidrive_scenario.sensing.readings import NOTHING_ATTACHED, EgoState
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import StationState
@@ -19,6 +21,20 @@ from eidrive_scenario.world.actor import ActorSpec
 
 GATE = AssociationGate.of(0.99, 0.0)
 """Gate of the offset between a reported object and the ego body, given the covariances of both."""
+
+
+class _Place(NamedTuple):
+    """Place of the body at one time [s].
+
+    pose      center of the body and height of its reference point [m], heading [rad]
+    body      outline of the body
+    trailers  outlines of the trailers
+    """
+
+    time: float
+    pose: tuple[float, float, float, float]
+    body: Outline
+    trailers: Sequence[Outline]
 
 
 class OwnBody:
@@ -30,10 +46,9 @@ class OwnBody:
         dt  time between two places [s]
         """
         self._spec = spec
-        self._places: deque[tuple[float, tuple[float, float, float, float], Array]] = deque(
-            maxlen=math.ceil(duration / dt) + 2
-        )
-        """Time [s], center of the body and height of its reference point [m], heading [rad]; boxes of the trailers."""
+        length, width, _ = spec.size
+        self._half_size = length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN
+        self._places: deque[_Place] = deque(maxlen=math.ceil(duration / dt) + 2)
         self._tracks: dict[str, int] = {}
         """Object id of the ego body at each station."""
 
@@ -42,16 +57,18 @@ class OwnBody:
         x, y, z = ego.position.tolist()
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         ahead, aside, _ = self._spec.offset
-        center = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
-        self._places.append((ego.time, (*center, z, ego.yaw), attached))
+        x, y = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
+        body = Outline(x, y, cos, sin, *self._half_size)
+        trailers = outlines(attached) if len(attached) else ()
+        self._places.append(_Place(ego.time, (x, y, z, ego.yaw), body, trailers))
 
     def place(self, time: float) -> tuple[float, float, float, float]:
         """Return center, height [m] and heading [rad] of the body at the last instant up to `time`, or the first."""
-        return self._at(time)[1]
+        return self._at(time).pose
 
-    def _at(self, time: float) -> tuple[float, tuple[float, float, float, float], Array]:
+    def _at(self, time: float) -> _Place:
         for held in reversed(self._places):
-            if held[0] <= time + TIME_TOLERANCE:
+            if held.time <= time + TIME_TOLERANCE:
                 return held
         return self._places[0]
 
@@ -73,8 +90,10 @@ class OwnBody:
 
         The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
         """
-        detections = self._without_trailers(detections)
-        return without_rows(detections, rows_on_bodies(detections, self._outline(detections.time)))
+        place = self._at(detections.time)
+        if place.trailers:
+            detections = without_rows(detections, rows_on_bodies(detections, place.trailers))
+        return without_rows(detections, rows_on_bodies(detections, [place.body]))
 
     def without_perceived(
         self,
@@ -95,8 +114,10 @@ class OwnBody:
         own              newest own detections
         pose_covariance  (3, 3) of the own x, y and yaw; None: the pose is exact
         """
-        detections = self._without_trailers(detections)
-        inside = rows_on_bodies(detections, self._outline(detections.time))
+        place = self._at(detections.time)
+        if place.trailers:
+            detections = without_rows(detections, rows_on_bodies(detections, place.trailers))
+        inside = rows_on_bodies(detections, [place.body])
         if inside:
             if len(inside) == 1 and detections.tracks:
                 self._tracks[station] = detections.tracks[inside[0]]
@@ -107,15 +128,6 @@ class OwnBody:
         if detections.tracks:
             self._tracks[station] = detections.tracks[row]
         return without_rows(detections, [row])
-
-    def _without_trailers(self, detections: Detections) -> Detections:
-        attached = self._at(detections.time)[2]
-        return without_rows(detections, rows_on_bodies(detections, attached)) if len(attached) else detections
-
-    def _outline(self, time: float) -> Array:
-        """Return the box (1, 7) of the body at that time."""
-        x, y, z, yaw = self.place(time)
-        return np.array([[x, y, z, *self._spec.size, yaw]])
 
     def _may_be_body(self, kind: str) -> bool:
         """Return whether the body may be reported with this class. A roadside unit is no road user."""

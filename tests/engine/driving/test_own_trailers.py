@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.perception.faults import PoseError, with_pose_error
-from eidrive_scenario.perception.own_bodies import rows_on_bodies, without_rows
+from eidrive_scenario.perception.own_bodies import outlines, rows_on_bodies, without_rows
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -34,12 +34,12 @@ def seen(*places: tuple[float, float], time: float = 0.0) -> Detections:
 def test_centers_on_a_body_or_within_the_margin_are_on_it() -> None:
     """Half of 10 m and 2.5 m, and 0.9 m more."""
     found = seen((-9.0, 0.0), (-3.2, 0.0), (-3.0, 0.0), (-9.0, 2.1), (-9.0, 2.2), (-14.8, -2.1))
-    assert rows_on_bodies(found, TRAILER) == [0, 1, 3, 5]
+    assert rows_on_bodies(found, outlines(TRAILER)) == [0, 1, 3, 5]
     turned = TRAILER.copy()
     turned[0, 6] = math.pi / 2.0
-    assert rows_on_bodies(found, turned) == [0, 3, 4]
-    assert rows_on_bodies(found, TRAILER[:0]) == []
-    assert rows_on_bodies(seen(), TRAILER) == []
+    assert rows_on_bodies(found, outlines(turned)) == [0, 3, 4]
+    assert rows_on_bodies(found, outlines(TRAILER[:0])) == []
+    assert rows_on_bodies(seen(), outlines(TRAILER)) == []
     assert without_rows(found, []) is found
     assert without_rows(found, [0, 1, 3, 5]).boxes[:, 0].tolist() == [-3.0, -9.0]
 
