@@ -12,6 +12,7 @@ from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.statistics.sequential import success_rate
 from eidrive_scenario.experiments.success_rate import RateVerdict
 from eidrive_scenario.experiments.sweeps.results import read_results
+from eidrive_scenario.export.tool_topics import add_topics
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, read_recording
@@ -36,6 +37,7 @@ __all__ = [
     "Simulation",
     "StationAction",
     "TickStart",
+    "add_topics",
     "check_scenario",
     "judge_recording",
     "limit_wall_time",

@@ -31,13 +31,17 @@ def export(
         Path | None,
         typer.Option(metavar="FILE", help="MCAP file for Foxglove or Lichtblick: 3D scene, cameras, log, plots."),
     ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The recording with the topics of --osi and --foxglove."),
+    ] = None,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as CSV.")] = None,
     parquet: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as Parquet.")] = None,
     table: Annotated[TableName, typer.Option(help="Table of --csv and --parquet.")] = TableName.actors,
 ) -> None:
     """Write a recorded run as files of other tools.
 
-    Example: eidrive export reports/scenario_1 --osi trace.mcap --foxglove run.mcap --csv motion.csv
+    Example: eidrive export reports/scenario_1 --mcap run.mcap --csv motion.csv
     """
     from functools import partial
 
@@ -47,10 +51,12 @@ def export(
     from eidrive_scenario.export.osi.trace import write_osi
     from eidrive_scenario.export.recorded_run import open_run
     from eidrive_scenario.export.table_files import write_csv, write_parquet
+    from eidrive_scenario.export.tool_topics import write_with_topics
 
     writers: dict[str, tuple[Path | None, Callable[..., None]]] = {
         "--osi": (osi, write_osi),
         "--foxglove": (foxglove, write_foxglove),
+        "--mcap": (mcap, write_with_topics),
         "--csv": (csv, partial(write_csv, table=table.value)),
         "--parquet": (parquet, partial(write_parquet, table=table.value)),
     }

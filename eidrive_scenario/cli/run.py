@@ -99,6 +99,10 @@ def run(
     record: Annotated[
         Keep | None, rare(help="Runs whose recording and images --out keeps.", show_default="always")
     ] = None,
+    topics: Annotated[
+        str | None,
+        rare(metavar="A,B", help="Tools whose topics the recording gets, too: foxglove, osi."),
+    ] = None,
     csv: Annotated[Path | None, rare(help="File for one row per actor and tick.")] = None,
     log: Annotated[
         str | None,
@@ -145,6 +149,13 @@ def run(
         message = f"--no-record and --record {record} contradict each other"
         raise SettingError(Diagnostic(message, "remove one of them"))
     kept = Keep.never.value if no_record else (record or Keep.always).value
+    wanted: tuple[str, ...] = ()
+    if topics is not None:
+        from eidrive_scenario.export.tool_topics import add_topics, check_topics
+
+        wanted = check_topics(name.strip() for name in topics.split(","))
+        if out is None or kept == Keep.never.value:
+            raise SettingError(Diagnostic("--topics is given, but no run is recorded", "give --out DIR, too"))
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
     for option, seconds in (("--dt", dt), ("--time-limit", time_limit), ("--wall-limit", wall_limit)):
         if seconds is not None:
@@ -210,6 +221,8 @@ def run(
                     observers=watching,
                     wall_limit=wall_limit,
                 )
+                if result.recording is not None and wanted:
+                    add_topics(result.recording, wanted)
             except InputError as error:
                 if not codes or isinstance(error, ConstraintError):
                     raise

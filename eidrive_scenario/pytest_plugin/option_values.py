@@ -9,6 +9,8 @@ NO_LIMIT = "none"
 """Value of the wall limit for no limit."""
 RECORD = ("always", "on-failure", "never")
 """Runs whose recording is kept."""
+TOPICS = ("foxglove", "osi")
+"""Tools whose topics a recording can contain."""
 _MOST_DIGITS = 18
 
 
@@ -54,6 +56,14 @@ def parse_record(text: str) -> str:
     if text not in RECORD:
         raise ArgumentTypeError(f"not one of {', '.join(RECORD)} (got {text!r})")
     return text
+
+
+def parse_topics(text: str) -> tuple[str, ...]:
+    """Return the listed tools. Raise ArgumentTypeError for an unknown one."""
+    names = tuple(name.strip() for name in text.split(","))
+    if not set(names) <= set(TOPICS):
+        raise ArgumentTypeError(f"not some of {', '.join(TOPICS)} (got {text!r})")
+    return names
 
 
 def parse_given(text: str) -> str:

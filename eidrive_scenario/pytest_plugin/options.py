@@ -22,6 +22,7 @@ from eidrive_scenario.pytest_plugin.option_values import (
     parse_record,
     parse_seconds,
     parse_seconds_or_none,
+    parse_topics,
 )
 
 _DEFAULT_MAX_RUNS = 100
@@ -36,6 +37,7 @@ _SHOWN = (
     "time_limit",
     "out",
     "record",
+    "topics",
     "report",
 )
 """Options that the header of a report lists."""
@@ -117,6 +119,12 @@ OPTIONS = (
         "always|on-failure|never",
         "runs whose recording and camera images --eidrive-out keeps (default: always)",
         parse_record,
+    ),
+    Option(
+        "topics",
+        "A,B",
+        "tools whose topics the recordings get, too: foxglove, osi; needs the extra `export`",
+        parse_topics,
     ),
     Option(
         "report",

@@ -130,6 +130,10 @@ def _run_and_report(
     )
     if result.folder is not None:
         record_of(item).folders.append(str(result.folder))
+    if result.recording is not None and (topics := option_value(config, "topics")):
+        from eidrive_scenario.export.tool_topics import add_topics
+
+        add_topics(result.recording, topics)
     return result
 
 

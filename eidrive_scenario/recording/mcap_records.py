@@ -38,6 +38,9 @@ _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 _FOOTER = struct.Struct("<QQI")
+_STATISTICS = struct.Struct("<QHIIIIQQ")
+"""Statistics before the numbers of messages by channel."""
+_COUNT = struct.Struct("<HQ")
 _ZSTD = struct.pack("<I", 4) + b"zstd"
 _KNOWN = range(1, 16)
 _BLOCK = 1 << 20
@@ -285,9 +288,12 @@ def attachment_of(body: bytes) -> tuple[str, bytes, bool]:
     return name, body[offset:-4], body[-4:] == struct.pack("<I", zlib.crc32(memoryview(body)[:-4]))
 
 
-def statistics_of(body: bytes) -> int:
-    """Return the number of messages according to the statistics record. Raise struct.error if it is too short."""
-    return int(struct.unpack_from("<Q", body)[0])
+def message_count(body: bytes, channel: int) -> int:
+    """Return the number of messages of a channel in a statistics record. Raise struct.error if it is too short."""
+    (length,) = struct.unpack_from("<I", body, _STATISTICS.size)
+    start = _STATISTICS.size + 4
+    counts = dict(_COUNT.iter_unpack(body[start : start + length // _COUNT.size * _COUNT.size]))
+    return int(counts.get(channel, 0))
 
 
 def _text(body: bytes, offset: int) -> tuple[str, int]:

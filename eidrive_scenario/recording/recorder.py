@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.files.atomic import create
@@ -14,6 +15,9 @@ from eidrive_scenario.recording.json_text import JsonText
 from eidrive_scenario.recording.seal import NAME as SEAL
 from eidrive_scenario.recording.seal import Seal
 from eidrive_scenario.resolved_settings import package_versions
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
 
 TOPIC = "/frame"
 FORMAT = "3"
@@ -26,6 +30,10 @@ _SPAN = 1_000_000_000
 """Simulated time after which a chunk of any size is written [ns]."""
 RUN = "run"
 """Name of the metadata record that describes the run."""
+TRACE_METADATA = "net.asam.osi.trace"
+"""Name of the metadata record of a recording that is an OSI trace, too."""
+FRAMES = 1
+"""Number of the channel of `/frame`; topics for other tools have other channels."""
 
 
 class Recorder:
@@ -57,7 +65,13 @@ class Recorder:
         self._text = JsonText(Frame)
         schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Frame", **codec(Frame).schema}
         schema_id = self._writer.register_schema("eidrive.Frame", "jsonschema", json.dumps(schema).encode())
-        self._channel = self._writer.register_channel(TOPIC, "json", schema_id)
+        channel = self._writer.register_channel(TOPIC, "json", schema_id)
+        assert channel == FRAMES, "the first channel of a file has the number 1"
+
+    @property
+    def writer(self) -> Writer:
+        """Writer of the file, for topics beside `/frame`."""
+        return self._writer
 
     def attach(self, name: str, data: bytes) -> None:
         """Append an attached file. Raise SimulationError if the recording is closed."""
@@ -70,7 +84,7 @@ class Recorder:
         """Append one frame. Raise SimulationError if the file is closed: each run needs its own recorder."""
         self._check_open()
         data, instant = self._text.encode(frame), round(frame.view.time * 1e9)
-        self._writer.add_message(self._channel, instant, data, instant, sequence=frame.view.tick)
+        self._writer.add_message(FRAMES, instant, data, instant, sequence=frame.view.tick)
         self._seal.add_frame(frame.view.tick, instant, data)
         if instant >= self._due:
             self._writer.flush()  # type: ignore[no-untyped-call]
@@ -80,11 +94,15 @@ class Recorder:
         if self._file.closed:
             raise SimulationError(f"{self._file.name}: the recording is closed; a second run needs a second Recorder")
 
-    def close(self) -> None:
-        """Finish the file. A second call has no effect."""
+    def close(self, *, sealed: bool = True) -> None:
+        """Finish the file. A second call has no effect.
+
+        sealed  False: without the seal, as for a run that did not end
+        """
         if self._file.closed:
             return
         with self._file:
             self._writer.flush()  # type: ignore[no-untyped-call]
-            self._writer.add_metadata(SEAL, self._seal.entries())
+            if sealed:
+                self._writer.add_metadata(SEAL, self._seal.entries())
             self._writer.finish()  # type: ignore[no-untyped-call]

@@ -15,7 +15,7 @@ from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.frame_check import check_frame
-from eidrive_scenario.recording.recorder import FORMAT, READABLE, RUN
+from eidrive_scenario.recording.recorder import FORMAT, FRAMES, READABLE, RUN, TRACE_METADATA
 from eidrive_scenario.recording.run_files import recording_in
 from eidrive_scenario.recording.seal import NAME as SEAL
 from eidrive_scenario.recording.seal import Seal
@@ -147,7 +147,7 @@ class _Reading:
         elif record.opcode in (mcap.CHUNK, mcap.MESSAGE):
             self._add_frames(record)
         elif record.opcode == mcap.STATISTICS:
-            self._stated = mcap.statistics_of(record.body)
+            self._stated = mcap.message_count(record.body, FRAMES)
 
     def _add_metadata(self, record: mcap.Record) -> None:
         if len(record.body) > _LARGEST_METADATA:
@@ -158,7 +158,7 @@ class _Reading:
             self._seal.add_metadata(entries)
         elif name == SEAL and self._stored is None:
             self._stored = entries
-        else:
+        elif name != TRACE_METADATA:
             self.damage.add("a metadata record is duplicated or unknown", f"byte {record.offset}")
 
     def _add_attachment(self, record: mcap.Record) -> None:
@@ -245,9 +245,10 @@ class _Ticks:
 
 
 def _messages(record: mcap.Record, damage: DamageReport | None = None) -> list[mcap.Message]:
-    """Return the frames of a record without frames beyond the maximum size."""
+    """Return the frames of a record without frames beyond the maximum size, and without messages of other topics."""
     damage = DamageReport() if damage is None else damage
-    found = [mcap.message_of(record.body)] if record.opcode == mcap.MESSAGE else mcap.chunk_messages(record, damage)
+    read = [mcap.message_of(record.body)] if record.opcode == mcap.MESSAGE else mcap.chunk_messages(record, damage)
+    found = [message for message in read if message.channel == FRAMES]
     kept = [message for message in found if len(message.data) <= LARGEST_FRAME]
     if len(kept) < len(found):
         damage.add(f"a frame is larger than {LARGEST_FRAME // 2**20} MiB", f"byte {record.offset}")

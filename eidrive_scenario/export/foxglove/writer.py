@@ -1,4 +1,4 @@
-"""MCAP file with the topics of Foxglove."""
+"""Topics of Foxglove in an MCAP file."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from eidrive_scenario.export.foxglove.topics import Entry, Topics
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
 from eidrive_scenario.optional_imports import optional_import
+from eidrive_scenario.recording.frame import Frame
 
 _JSON = {"/metrics/actors/": ("eidrive.ActorMetrics", ACTOR), "/metrics/stations/": ("eidrive.StationMetrics", STATION)}
 """Name and fields of the schemas of JSON messages, by the start of the topic."""
@@ -23,46 +24,69 @@ def write_foxglove(run: RecordedRun, path: Path) -> None:
 
     Raise SettingError if a library is missing, or if the file cannot be written.
     """
-    foxglove = Foxglove()
-    register = optional_import("mcap_protobuf.schema", "export").register_schema
+    check_foxglove()
     with atomic_output(path) as partial, create(partial) as stream:
-        _write(foxglove, run, stream, register)
+        _write(run, stream)
 
 
-def _write(foxglove: Foxglove, run: RecordedRun, stream: BinaryIO, register: Any) -> None:
+def check_foxglove() -> None:
+    """Raise SettingError if a library is missing."""
+    Foxglove()
+    _register_function()
+
+
+def _register_function() -> Any:
+    return optional_import("mcap_protobuf.schema", "export").register_schema
+
+
+def _write(run: RecordedRun, stream: BinaryIO) -> None:
     from mcap.writer import CompressionType, Writer
 
     writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(profile="", library="eidrive-scenario")
     metadata = run.recording.metadata
     writer.add_metadata("run", {name: metadata[name] for name in _METADATA if name in metadata})
-    file = _Channels(writer, register)
-    topics = Topics(foxglove, run)
-    time = 0.0
+    topics = FoxgloveTopics(writer, run)
     for frame in run.frames():
-        time = frame.view.time
-        for entry in run.converted(frame, topics.of_frame):
-            file.add(entry, time)
-    for entry in topics.at_end():
-        file.add(entry, time)
+        topics.add(frame)
+    topics.finish()
     writer.finish()  # type: ignore[no-untyped-call]
 
 
-class _Channels:
-    """Channels of a file, each registered with its first message."""
+class FoxgloveTopics:
+    """Topics of Foxglove in a file, each registered with its first message.
 
-    def __init__(self, writer: Any, register: Any) -> None:
+    writer  writer of an MCAP file
+    run     run whose frames are added in order
+
+    Raise SettingError if a library is missing.
+    """
+
+    def __init__(self, writer: Any, run: RecordedRun) -> None:
         self._writer = writer
-        self._register = register
+        self._run = run
+        self._register = _register_function()
+        self._topics = Topics(Foxglove(), run)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
+        self._time = 0.0
 
-    def add(self, entry: Entry, time: float) -> None:
-        """Add a message at a time [s]."""
+    def add(self, frame: Frame) -> None:
+        """Add the messages of a frame."""
+        self._time = frame.view.time
+        for entry in self._run.converted(frame, self._topics.of_frame):
+            self._add(entry)
+
+    def finish(self) -> None:
+        """Add the messages after the last frame."""
+        for entry in self._topics.at_end():
+            self._add(entry)
+
+    def _add(self, entry: Entry) -> None:
         data = entry.message if isinstance(entry.message, bytes) else entry.message.SerializeToString()
         if entry.topic not in self._channels:
             self._channels[entry.topic] = self._channel(entry)
-        instant = max(round(time * 1e9), 0)
+        instant = max(round(self._time * 1e9), 0)
         self._writer.add_message(self._channels[entry.topic], instant, data, instant)
 
     def _channel(self, entry: Entry) -> int:

@@ -17,6 +17,7 @@ from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.files.atomic import atomic_output, create
 from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import TRACE_METADATA
 
 MULTI_CHANNEL, SINGLE_CHANNEL = ".mcap", ".osi"
 """Suffixes of the two formats of the standard."""
@@ -24,8 +25,7 @@ GROUND_TRUTH = "ground_truth"
 """Topic of the GroundTruth messages."""
 _FIRST_SENSOR = 2**32 + 1
 """First identifier of sensors. Identifiers of the ground truth are below it, equal in both formats."""
-_FILE = "net.asam.osi.trace"
-_CHANNEL = "net.asam.osi.trace.channel"
+_CHANNEL = f"{TRACE_METADATA}.channel"
 _LISTS: Mapping[str, str] = {"detections": "own detections", "fused": "objects after fusion"}
 """Object lists of a station, with their descriptions."""
 _CONVENTIONS = (
@@ -51,6 +51,12 @@ def write_osi(run: RecordedRun, path: Path) -> None:
             _write_multi_channel(osi, run, stream)
 
 
+def check_osi() -> None:
+    """Raise SettingError if a library is missing."""
+    Osi()
+    optional_import("mcap_protobuf.schema", "export")
+
+
 def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
     builder = GroundTruthBuilder(osi, run.roads, Identifiers())
     for frame in run.frames():
@@ -61,33 +67,60 @@ def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
 def _write_multi_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
     from mcap.writer import CompressionType, Writer
 
-    register_schema = optional_import("mcap_protobuf.schema", "export").register_schema
-    protobuf = optional_import("google.protobuf", "export").__version__
     writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(profile="", library="eidrive-scenario")
-    source = f"eidrive-scenario {run.recording.metadata.get('eidrive-scenario', 'unknown')}"
-    metadata = {
-        f"{edge}_{name}_version": version
-        for edge in ("min", "max")
-        for name, version in (("osi", osi.version), ("protobuf", protobuf))
-    }
-    description = {"description": f"{run.title}; {_CONVENTIONS}", "data_sources": source}
-    writer.add_metadata(_FILE, {"version": osi.version, **metadata, **description})
-    schemas: dict[str, int] = {}
-    channels: dict[str, int] = {}
-    traces = _Traces(osi, run)
+    topics = OsiTopics(writer, run, osi)
     for frame in run.frames():
-        for topic, text, message in run.converted(frame, traces.messages):
-            kind = type(message).DESCRIPTOR.full_name
-            if kind not in schemas:
-                schemas[kind] = register_schema(writer, type(message))
-            if topic not in channels:
-                entries = {"osi_version": osi.version, "protobuf_version": protobuf, "description": text}
-                about = {f"{_CHANNEL}.{key}": value for key, value in entries.items()}
-                channels[topic] = writer.register_channel(topic, "protobuf", schemas[kind], about)
-            instant = nanoseconds(frame.view.time)
-            writer.add_message(channels[topic], instant, message.SerializeToString(), instant)
+        topics.add(frame)
     writer.finish()  # type: ignore[no-untyped-call]
+
+
+class OsiTopics:
+    """Topics of OSI's multi-channel format in a file, each registered with its first message.
+
+    writer  writer of an MCAP file, which gets the metadata of a trace
+    run     run whose frames are added in order
+
+    Raise SettingError if a library is missing.
+    """
+
+    def __init__(self, writer: Any, run: RecordedRun, osi: Osi | None = None) -> None:
+        self._writer = writer
+        self._run = run
+        self._osi = osi = osi or Osi()
+        self._register = optional_import("mcap_protobuf.schema", "export").register_schema
+        self._protobuf = optional_import("google.protobuf", "export").__version__
+        self._traces = _Traces(osi, run)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        source = f"eidrive-scenario {run.recording.metadata.get('eidrive-scenario', 'unknown')}"
+        metadata = {
+            f"{edge}_{name}_version": version
+            for edge in ("min", "max")
+            for name, version in (("osi", osi.version), ("protobuf", self._protobuf))
+        }
+        description = {"description": f"{run.title}; {_CONVENTIONS}", "data_sources": source}
+        writer.add_metadata(TRACE_METADATA, {"version": osi.version, **metadata, **description})
+
+    def add(self, frame: Frame) -> None:
+        """Add the messages of a frame."""
+        instant = nanoseconds(frame.view.time)
+        for topic, text, message in self._run.converted(frame, self._traces.messages):
+            if topic not in self._channels:
+                self._channels[topic] = self._channel(topic, text, type(message))
+            self._writer.add_message(self._channels[topic], instant, message.SerializeToString(), instant)
+
+    def finish(self) -> None:
+        """Do nothing: a trace has no messages after the last frame."""
+
+    def _channel(self, topic: str, text: str, kind: Any) -> int:
+        name = kind.DESCRIPTOR.full_name
+        if name not in self._schemas:
+            self._schemas[name] = self._register(self._writer, kind)
+        entries = {"osi_version": self._osi.version, "protobuf_version": self._protobuf, "description": text}
+        about = {f"{_CHANNEL}.{key}": value for key, value in entries.items()}
+        number: int = self._writer.register_channel(topic, "protobuf", self._schemas[name], about)
+        return number
 
 
 class _Traces:

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive
+from mcap.reader import make_reader
 from osi3trace.osi_trace import OSITrace
+
+from eidrive_scenario.recording import read_recording
 
 
 @pytest.fixture
@@ -60,3 +63,34 @@ def test_export_writes_several_files_at_once(eidrive: Eidrive, recorded: Path, t
     same = eidrive("export", recorded, "--osi", osi, "--foxglove", osi)
     assert same.exit_code == 2
     assert "--osi and --foxglove name the same file" in same.stderr
+
+
+def test_run_with_topics_records_them_for_other_tools(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    result = eidrive("run", passing_by, "--out", tmp_path / "run", "--topics", "osi, foxglove")
+    assert result.exit_code == 0
+    assert eidrive("export", tmp_path / "run", "--mcap", tmp_path / "copy.mcap").exit_code == 0
+    (path,) = (tmp_path / "run").glob("*/recording.mcap")
+    assert read_recording(path).damage == ()
+    for file in (path, tmp_path / "copy.mcap"):
+        with file.open("rb") as stream:
+            summary = make_reader(stream).get_summary()
+        assert summary is not None
+        assert {channel.topic for channel in summary.channels.values()} >= {"/frame", "/tf", "ground_truth"}
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        (("--topics", "osi"), "no run is recorded; give --out DIR"),
+        (("--topics", "osi", "--out", "run", "--no-record"), "no run is recorded; give --out DIR"),
+        (("--topics", "", "--out", "run"), "there are no topics ''; give foxglove or osi"),
+        (("--topics", "osi,rviz", "--out", "run"), "there are no topics 'rviz'; give foxglove or osi"),
+    ],
+)
+def test_invalid_topics_are_reported_before_the_run(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, options: tuple[str, ...], error: str
+) -> None:
+    result = eidrive("run", passing_by, *options)
+    assert result.exit_code == 2
+    assert error in result.stderr
+    assert not (tmp_path / "run").exists()

@@ -11,6 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from mcap.reader import make_reader
 
 pytest_plugins = ["pytester"]
 
@@ -82,6 +83,18 @@ def test_record_option_keeps_recordings_of_failed_runs(project: pytest.Pytester)
         ("near", "recording.mcap"),
         ("near", "result.json"),
     ]
+
+
+def test_topics_option_adds_topics_of_other_tools(project: pytest.Pytester) -> None:
+    arguments = ("xosc/far.xosc", "--eidrive-out", "runs", "--eidrive-topics", "osi,foxglove")
+    project.runpytest_subprocess(*arguments, "-p", "no:cacheprovider").assert_outcomes(passed=1)
+    (recording,) = project.path.glob("runs/**/recording.mcap")
+    with recording.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    assert {channel.topic for channel in summary.channels.values()} >= {"/frame", "/tf", "ground_truth"}
+    wrong = project.runpytest_subprocess("xosc/far.xosc", "--eidrive-topics", "rviz")
+    wrong.stderr.fnmatch_lines(["*--eidrive-topics: not some of foxglove, osi (got 'rviz')*"])
 
 
 def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> None:

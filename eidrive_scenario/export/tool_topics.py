@@ -1,0 +1,82 @@
+"""Topics for other tools in a recording: one MCAP file for this package, Foxglove and tools of ASAM OSI."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.export.foxglove.writer import FoxgloveTopics, check_foxglove
+from eidrive_scenario.export.osi.trace import OsiTopics, check_osi
+from eidrive_scenario.export.recorded_run import RecordedRun, open_run
+from eidrive_scenario.files.atomic import atomic_output
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import Recorder
+
+
+class ToolTopics(Protocol):
+    """Topics of one tool in a file."""
+
+    def add(self, frame: Frame) -> None:
+        """Add the messages of a frame."""
+        ...
+
+    def finish(self) -> None:
+        """Add the messages after the last frame."""
+        ...
+
+
+_TOPICS: Mapping[str, tuple[Callable[[], None], Callable[[Any, RecordedRun], ToolTopics]]] = {
+    "foxglove": (check_foxglove, FoxgloveTopics),
+    "osi": (check_osi, OsiTopics),
+}
+"""Check for the libraries, and topics of a file, by name."""
+ALL_TOPICS = tuple(_TOPICS)
+"""Names of the topics for other tools."""
+
+
+def check_topics(names: Iterable[str]) -> tuple[str, ...]:
+    """Return these names of topics, each once. Raise SettingError if one is unknown, or if its library is missing."""
+    found = tuple(dict.fromkeys(names))
+    for name in found:
+        if name not in _TOPICS:
+            raise SettingError(Diagnostic(f"there are no topics {name!r}", f"give {' or '.join(_TOPICS)}"))
+        _TOPICS[name][0]()
+    return found
+
+
+def add_topics(recording: str | Path, topics: Iterable[str] = ALL_TOPICS) -> tuple[str, ...]:
+    """Add topics for other tools to a recording, given as its file or as the folder of a run.
+
+    topics  `foxglove` and `osi`, all by default; former topics are replaced
+
+    The file is replaced when it is complete, and remains a recording. Return the damage of the recording, and what
+    could not be written because of it. Raise InputError if the recording cannot be read, and SettingError for unknown
+    topics, a missing library, and a file that cannot be written.
+    """
+    chosen = check_topics(topics)
+    run = open_run(recording)
+    write_with_topics(run, run.recording.path, chosen)
+    return tuple(dict.fromkeys(run.warnings))
+
+
+def write_with_topics(run: RecordedRun, path: Path, topics: Iterable[str] = ALL_TOPICS) -> None:
+    """Write a recording with topics for other tools as one MCAP file, which is a recording, too.
+
+    The copy of a damaged recording contains its readable frames, and has no seal. Raise SettingError as `add_topics`.
+    """
+    chosen = check_topics(topics)
+    source = run.recording
+    with atomic_output(path) as partial:
+        recorder = Recorder(partial, metadata=source.metadata, attachments=source.attachments)
+        try:
+            written = [_TOPICS[name][1](recorder.writer, run) for name in chosen]
+            for frame in run.frames():
+                recorder.observe(frame)
+                for one in written:
+                    one.add(frame)
+            for one in written:
+                one.finish()
+        finally:
+            recorder.close(sealed=not source.damage)
