@@ -4,14 +4,18 @@ Each figure is measured in a separate process. Processor times count where a fig
 since other load changes them least; sweeps count by the clock. `EIDRIVE_MAPS` names the folder of CARLA's Town04.xodr;
 the figures of traffic are omitted without it.
 
-    python benchmarks/figures.py [NAME ...] [--repeats 3] [--json]
+`--profile` prints the share of time of each package and the functions that take most.
+
+    python benchmarks/figures.py [NAME ...] [--repeats 3] [--json | --profile]
 """
 
 from __future__ import annotations
 
 import argparse
+import cProfile
 import json
 import os
+import pstats
 import resource
 import subprocess
 import sys
@@ -216,15 +220,33 @@ def line(name: str, value: float | None) -> str:
     return f"{name:20}{shown:>10}  {figure.unit:24}{aim:16}{before}"
 
 
+def print_profile(name: str) -> None:
+    """Print where a figure spends its time in this process; other processes are not measured."""
+    from timing import print_shares
+
+    FIGURES[name].measure()  # the second measurement imports no modules
+    profile = cProfile.Profile()
+    value = profile.runcall(FIGURES[name].measure)
+    print(f"{name}, {value:.4g} {FIGURES[name].unit} with the profiler")
+    print_shares(profile)
+    pstats.Stats(profile).strip_dirs().sort_stats("tottime").print_stats(12)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help=f"figures, of {', '.join(FIGURES)} (default: all)")
     parser.add_argument("--repeats", type=int, default=1, help="number of measurements, of which the best counts")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--profile", action="store_true", help="print where the time of each figure goes")
     parser.add_argument("--here", action="store_true", help="measure in this process, and print only the number")
     options = parser.parse_args()
     names = available(options.names)
+    if options.profile:
+        os.environ.update(SINGLE_THREAD)
+        for name in names:
+            print_profile(name)
+        return
     if options.here:
         print(*(FIGURES[name].measure() for name in names))
         return

@@ -12,6 +12,8 @@ from typing import Any
 
 PACKAGE = "eidrive_scenario"
 Function = tuple[str, int, str]
+_DEEPEST = 6
+"""Maximum number of functions of libraries between a function and the package that it counts for."""
 
 
 def timed(task: Callable[[], object]) -> float:
@@ -46,6 +48,8 @@ def shares_by_package(profile: cProfile.Profile) -> dict[str, float]:
             return {package: 1.0}
         if function in owners:
             return owners[function]
+        if len(above) > _DEEPEST:
+            return {"python": 1.0}
         callers = {caller: entry[2] for caller, entry in stats[function][4].items() if caller not in above}
         total = sum(callers.values())
         found: dict[str, float] = defaultdict(float)

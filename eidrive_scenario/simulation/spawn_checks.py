@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -47,13 +48,20 @@ def overlapping_spawns(
     """
     present = [name for name in scenario.entities if name in view.rows and (among is None or name in among)]
     boxes = {name: _core(view.plain_boxes[view.rows[name]]) for name in present}
+    table = np.reshape([boxes[name] for name in present], (-1, 7))
+    reach = np.hypot(table[:, 3], table[:, 4]) / 2.0
     trains = _trains(scenario)
     done: set[str] = set()
     for name in names:
         done.add(name)
         train = trains.get(name, name)
-        candidates = [other for other in present if other not in done and trains.get(other, other) != train]
-        others = [other for other in candidates if overlap(boxes[name], boxes[other])]
+        x, y, _, length, width, *_ = boxes[name]
+        within = math.hypot(length, width) / 2.0 + reach + _TOUCH
+        near = np.flatnonzero(~(np.hypot(table[:, 0] - x, table[:, 1] - y) > within)).tolist()
+        candidates = [other for other in (present[row] for row in near) if other not in done]
+        others = [
+            other for other in candidates if trains.get(other, other) != train and overlap(boxes[name], boxes[other])
+        ]
         if others:
             x, y, *_ = boxes[others[0]]
             more = f", and of {len(others) - 1} more" if len(others) > 1 else ""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
+from operator import itemgetter
 
 import msgspec
 import numpy as np
@@ -13,6 +15,7 @@ from eidrive_scenario.world.physics.bullet import bullet
 GROUND, NOTHING = -1, -2
 """Rows of rays that ended at the ground or a building, and of rays without a hit."""
 
+_HANDLE, _FRACTION, _NORMAL = itemgetter(0), itemgetter(2), itemgetter(4)
 _BATCH = 16_000
 _STEP_IN = 0.01
 """Distance by which a ray continues inside a skipped body [m].
@@ -77,7 +80,8 @@ def _cast(client: int, origins: Array, targets: Array) -> tuple[Integers, Array,
     for start in range(0, count, _BATCH):
         part = slice(start, start + _BATCH)
         hits = bullet.rayTestBatch(origins[part], targets[part], numThreads=1, physicsClientId=client)
-        handles[part] = [hit[0] for hit in hits]
-        fraction[part] = [hit[2] for hit in hits]
-        normal[part] = [hit[4] for hit in hits]
+        handles[part] = np.fromiter(map(_HANDLE, hits), np.int64, len(hits))
+        fraction[part] = np.fromiter(map(_FRACTION, hits), float, len(hits))
+        normals = np.fromiter(chain.from_iterable(map(_NORMAL, hits)), float, 3 * len(hits))
+        normal[part] = normals.reshape(-1, 3)
     return handles, fraction, normal
