@@ -91,9 +91,8 @@ class OwnBody:
         The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
         """
         place = self._at(detections.time)
-        if place.trailers:
-            detections = without_rows(detections, rows_on_bodies(detections, place.trailers))
-        return without_rows(detections, rows_on_bodies(detections, [place.body]))
+        detections = _without_bodies(detections, place.trailers)
+        return _without_bodies(detections, [place.body])
 
     def without_perceived(
         self,
@@ -115,8 +114,7 @@ class OwnBody:
         pose_covariance  (3, 3) of the own x, y and yaw; None: the pose is exact
         """
         place = self._at(detections.time)
-        if place.trailers:
-            detections = without_rows(detections, rows_on_bodies(detections, place.trailers))
+        detections = _without_bodies(detections, place.trailers)
         inside = rows_on_bodies(detections, [place.body])
         if inside:
             if len(inside) == 1 and detections.tracks:
@@ -166,6 +164,10 @@ class OwnBody:
             if not _explained(position, covariance, detections.time, cost, own):
                 best = cost, row
         return None if best is None else best[1]
+
+
+def _without_bodies(detections: Detections, bodies: Sequence[Outline]) -> Detections:
+    return without_rows(detections, rows_on_bodies(detections, bodies)) if bodies else detections
 
 
 def _explained(position: Array, covariance: Array, time: float, cost: float, own: Detections | None) -> bool:
