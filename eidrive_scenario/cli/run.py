@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -222,7 +223,8 @@ def run(
                     wall_limit=wall_limit,
                 )
                 if result.recording is not None and wanted:
-                    add_topics(result.recording, wanted)
+                    added = add_topics(result.recording, wanted)
+                    result = replace(result, warnings=(*result.warnings, *added))
             except InputError as error:
                 if not codes or isinstance(error, ConstraintError):
                     raise

@@ -57,7 +57,8 @@ def add_topics(recording: str | Path, topics: Iterable[str] = ALL_TOPICS) -> tup
     """
     chosen = check_topics(topics)
     run = open_run(recording)
-    write_with_topics(run, run.recording.path, chosen)
+    # A link would be written directly, while it is read
+    write_with_topics(run, run.recording.path.resolve(), chosen)
     return tuple(dict.fromkeys(run.warnings))
 
 

@@ -133,7 +133,7 @@ def _run_and_report(
     if result.recording is not None and (topics := option_value(config, "topics")):
         from eidrive_scenario.export.tool_topics import add_topics
 
-        add_topics(result.recording, topics)
+        result = replace(result, warnings=(*result.warnings, *add_topics(result.recording, topics)))
     return result
 
 

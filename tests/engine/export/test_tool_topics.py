@@ -17,6 +17,7 @@ from eidrive_scenario.export.foxglove.writer import write_foxglove
 from eidrive_scenario.export.osi.trace import write_osi
 from eidrive_scenario.export.recorded_run import open_run
 from eidrive_scenario.export.tool_topics import ALL_TOPICS, write_with_topics
+from eidrive_scenario.pytest_plugin.option_values import TOPICS
 from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings
@@ -90,6 +91,21 @@ def test_added_topics_replace_former_ones(recording: Path, complete: Path, tmp_p
     add_topics(path, [])
     assert messages(path) == messages(recording)
     assert read_recording(path).damage == ()
+
+
+def test_topics_are_added_to_the_file_behind_a_link(recording: Path, complete: Path, tmp_path: Path) -> None:
+    path = tmp_path / "kept" / "recording.mcap"
+    path.parent.mkdir()
+    path.write_bytes(recording.read_bytes())
+    link = tmp_path / "link.mcap"
+    link.symlink_to(path)
+    assert add_topics(link) == ()
+    assert link.is_symlink()
+    assert path.read_bytes() == complete.read_bytes()
+
+
+def test_pytest_option_has_the_same_topics() -> None:
+    assert sorted(TOPICS) == sorted(ALL_TOPICS)
 
 
 def test_unknown_topics_leave_the_recording_unchanged(recording: Path, tmp_path: Path) -> None:
