@@ -57,7 +57,7 @@ def lane_edges(section: LaneSection, lane: Lane | None) -> Iterator[LaneEdge]:
     starts = [section.s + max(mark.s_offset, 0.0) for mark in marks]
     if not marks or starts[0] > section.s:
         yield LaneEdge(section.s, starts[0] if marks else section.end, "NO_LINE", "none")
-    for mark, start, end in zip(marks, starts, [*starts[1:], section.end], strict=True):
+    for mark, start, end in zip(marks, starts, [*starts, section.end][1:], strict=True):
         if end > start:
             color = mark.color if mark.color in _COLORS else "white"
             yield LaneEdge(start, end, _MARKS.get(mark.type, "SOLID_LINE"), color)

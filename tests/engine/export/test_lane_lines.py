@@ -1,0 +1,42 @@
+"""Edges of lanes by their road marks; OpenDRIVE does not require a mark."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from written_recording import view, write_run
+
+from eidrive_scenario.export.lane_lines import lane_edges
+from eidrive_scenario.export.tool_topics import write_with_topics
+from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.roads import RoadNetwork
+
+ROAD = """<OpenDRIVE><header revMajor="1" revMinor="7"/><road id="1" length="100" junction="-1"><planView>
+<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView><lanes><laneSection s="0"><center>
+<lane id="0" type="none"/></center><right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>
+{marks}</lane></right></laneSection></lanes></road></OpenDRIVE>"""
+MARK = '<roadMark sOffset="{0}" type="{1}" weight="standard" color="yellow" width="0.1"/>'
+
+
+@pytest.mark.parametrize(
+    ("marks", "edges"),
+    [
+        ((), [(0.0, 100.0, "NO_LINE")]),
+        (((0.0, "solid"),), [(0.0, 100.0, "SOLID_LINE")]),
+        (((40.0, "broken"),), [(0.0, 40.0, "NO_LINE"), (40.0, 100.0, "DASHED_LINE")]),
+        (((0.0, "solid"), (60.0, "none")), [(0.0, 60.0, "SOLID_LINE"), (60.0, 100.0, "NO_LINE")]),
+        (((100.0, "solid"),), [(0.0, 100.0, "NO_LINE")]),
+    ],
+)
+def test_edges_of_lane_follow_its_road_marks(
+    marks: tuple[tuple[float, str], ...], edges: list[tuple[float, float, str]], tmp_path: Path
+) -> None:
+    path = tmp_path / "road.xodr"
+    path.write_text(ROAD.format(marks="".join(MARK.format(*mark) for mark in marks)))
+    (section,) = RoadNetwork.load(path).roads["1"].sections
+    assert [(edge.start, edge.end, edge.type) for edge in lane_edges(section, section.lanes[-1])] == edges
+    assert list(lane_edges(section, None)) == []
+    write_with_topics(write_run(tmp_path, [Frame(view({"A": {}}))], road=path), tmp_path / "all.mcap")
+    assert read_recording(tmp_path / "all.mcap").damage == ()
