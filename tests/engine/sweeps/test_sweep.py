@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
@@ -205,17 +205,16 @@ def test_killed_worker_is_a_row_and_others_are_unharmed(
 
 
 def test_killed_sweep_continues_to_the_same_results(scenario: Path, tmp_path: Path) -> None:
-    """SIGKILL of the command twice, at any moment; then all rows are those of an uninterrupted sweep."""
+    """SIGKILL of the command at 4 and at 20 rows; then all rows are those of an uninterrupted sweep."""
     store = tmp_path / "s.db"
-    command = [sys.executable, "-m", "eidrive_scenario", "sweep", str(scenario), "--store", str(store)]
-    command += ["--vary", "Speed=1:20:1", "--seeds", "1-8", "--workers", "2"]
+    arguments = ["sweep", str(scenario), "--store", str(store)]
+    arguments += ["--vary", "Speed=1:20:1", "--seeds", "1-8", "--workers", "2"]
     for rows in (4, 20):
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while process.poll() is None and _count(store) < rows:
-            time.sleep(0.02)
-        process.kill()
-        process.wait()
-    assert 20 <= _count(store) < 160
+        killed = [sys.executable, str(Path(__file__).with_name("sweep_tasks.py")), str(rows), *arguments]
+        code = subprocess.call(killed, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        assert code == -signal.SIGKILL
+        assert _count(store) == rows
+    command = [sys.executable, "-m", "eidrive_scenario", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     plan = plan_of(scenario, points_of(parse_axes(["Speed=1:20:1"]), "grid", None, 1), RunSettings(), seeds=range(1, 9))
