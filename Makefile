@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce docs check-docs bench bench-compare bench-history eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
+.PHONY: help install demo test lint reproduce docs check-docs check-standards bench bench-compare bench-history eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -35,6 +35,9 @@ docs: install   ## update the coverage table of docs/openscenario.md, and build 
 
 check-docs: install  ## execute the commands of the documentation in a new environment with a wheel of the project
 	$(BIN)/python tests/document_commands.py
+
+check-standards: install  ## check scenarios, road files and OSI traces by the checkers of ASAM and by omega-prime
+	$(BIN)/python tests/standard_checkers.py
 
 reproduce: install  ## repeat the experiments of the paper, and compare trends with expected ones: reports/paper, reports/trends
 	OPENBLAS_NUM_THREADS=1 $(BIN)/eidrive reproduce all --out reports/paper

@@ -34,7 +34,7 @@ def write_objects_and_signals(road: Element, arms: Sequence[Arm], described: Roa
     for number, arm in enumerate(arms):
         _write_markings(objects, arm, 40 * number)
         if described.houses is not None:
-            _write_houses(objects, arm, described.houses)
+            _write_houses(objects, arm, described.houses, 40 * number)
     if not len(objects):
         road.remove(objects)
     if any(arm.control for arm in arms):
@@ -49,6 +49,11 @@ def signal_ids(arms: Sequence[Arm], junction: Junction) -> list[str]:
     return [f"{arm.road.id}{number}" for number, arm in enumerate(arms) if arm.control and arm in junction.arms]
 
 
+def _object_id(road: Road, number: int) -> str:
+    """Return the id of an object, unique in the file."""
+    return f"{road.id}{number:02}"
+
+
 def _edge(arm: Arm, side: int) -> float:
     """Return t of the edge of the last driving lane on one side, of the innermost lane 0 if there is none."""
     street = arm.street
@@ -61,13 +66,14 @@ def _write_markings(objects: Element, arm: Arm, first: int) -> None:
     if arm.crosswalk:
         curbs = [_edge(arm, side) + side * street.verge(side) for side in (-1, 1)]
         near, far = CROSSWALK
-        _write_area(objects, f"{first}", "crosswalk", arm.s + back * near, arm.s + back * far, curbs[0], curbs[1])
+        number = _object_id(arm.road, first)
+        _write_area(objects, number, "crosswalk", arm.s + back * near, arm.s + back * far, curbs[0], curbs[1])
     if arm.control:
         lane = street.driving(sign)[0]
         inner = arm.offset + street.center_of(lane) - sign * street.lane(lane).width / 2
         start = arm.line + (LINE_BEFORE_SIGNAL if arm.crosswalk else 0.0)
         s, s_end = arm.s + back * start, arm.s + back * (start + LINE_WIDTH)
-        _write_area(objects, f"{first + 1}", "roadMark", s, s_end, inner, _edge(arm, sign))
+        _write_area(objects, _object_id(arm.road, first + 1), "roadMark", s, s_end, inner, _edge(arm, sign))
 
 
 def _write_signal(signals: Element, arm: Arm, number: str) -> None:
@@ -97,7 +103,7 @@ def _write_signal(signals: Element, arm: Arm, number: str) -> None:
     add(signal, "validity", fromLane=min(lanes), toLane=max(lanes))
 
 
-def _write_houses(objects: Element, arm: Arm, clearance: float) -> None:
+def _write_houses(objects: Element, arm: Arm, clearance: float, first: int) -> None:
     """Add a row of houses on each side, set back from the sidewalk and away from the corners of the junction."""
     for side in (-1, 1):
         curb = sum(spec.width for spec in arm.street.side(side))
@@ -107,7 +113,7 @@ def _write_houses(objects: Element, arm: Arm, clearance: float) -> None:
             add(
                 objects,
                 "object",
-                id=f"{2 if side > 0 else 3}{number}",
+                id=_object_id(arm.road, first + (20 if side > 0 else 30) + number),
                 name=f"house {arm.name} {'left' if side > 0 else 'right'} {number + 1}",
                 type="building",
                 s=arm.s - middle if arm.contact == "end" else middle,
@@ -130,9 +136,10 @@ def _write_tunnel(objects: Element, road: Road, tunnel: Tunnel) -> None:
         wall = add(
             objects,
             "object",
-            id=f"{8 if side > 0 else 9}0",
+            id=_object_id(road, 80 if side > 0 else 90),
             name=f"tunnel wall {'left' if side > 0 else 'right'}",
-            type="wall",
+            type="barrier",
+            subtype="wall",
             s=tunnel.s,
             t=t,
             zOffset=0.0,
@@ -162,7 +169,7 @@ def _write_tunnel(objects: Element, road: Road, tunnel: Tunnel) -> None:
         "tunnel",
         s=tunnel.s,
         length=tunnel.length,
-        id="70",
+        id=_object_id(road, 95),
         name="tunnel",
         type="underpass",
         lighting=0.5,
@@ -187,6 +194,6 @@ def _write_area(objects: Element, number: str, kind: str, s: float, s_end: float
         height=0.0,
         **FLAT,
     )
-    outline = add(add(item, "outlines"), "outline", id=0, fillType="paint", closed="true")
+    outline = add(add(item, "outlines"), "outline", id=0, closed="true")
     for i, (corner_s, corner_t) in enumerate(((s, t), (s_end, t), (s_end, t_end), (s, t_end))):
         add(outline, "cornerRoad", id=i, s=corner_s, t=corner_t, dz=0.0, height=0.0)

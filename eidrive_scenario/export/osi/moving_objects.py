@@ -10,7 +10,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.export.bodies import rotations
 from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.schemas import Osi, set_vector
+from eidrive_scenario.export.osi.schemas import Osi, set_orientation, set_vector
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.view import WorldView
@@ -63,8 +63,7 @@ def add_moving_objects(osi: Osi, message: Any, frame: Frame, ids: Identifiers, l
         base = found.base
         base.dimension.length, base.dimension.width, base.dimension.height = view.size[row].tolist()
         set_vector(base.position, centers[row])
-        angles = view.yaw[row], view.pitch[row], view.roll[row]
-        base.orientation.yaw, base.orientation.pitch, base.orientation.roll = map(float, angles)
+        set_orientation(base.orientation, view.yaw[row], view.pitch[row], view.roll[row])
         set_vector(base.velocity, velocity[row])
         set_vector(base.acceleration, acceleration[row])
         base.orientation_rate.yaw = float(view.yaw_rate[row])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from eidrive_scenario.optional_imports import optional_import
@@ -49,3 +50,10 @@ def nanoseconds(time: float) -> int:
 def set_vector(vector: Any, values: Any) -> None:
     """Set a Vector3d."""
     vector.x, vector.y, vector.z = (float(value) for value in values)
+
+
+def set_orientation(orientation: Any, yaw: float, pitch: float = 0.0, roll: float = 0.0) -> None:
+    """Set an Orientation3d [rad] to the equivalent angles in the range that OSI prefers, from -pi to pi."""
+    orientation.yaw, orientation.pitch, orientation.roll = (
+        math.remainder(float(angle), math.tau) for angle in (yaw, pitch, roll)
+    )

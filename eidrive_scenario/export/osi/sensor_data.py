@@ -12,7 +12,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.export.bodies import rotations
 from eidrive_scenario.export.osi.identifiers import Identifiers
 from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type
-from eidrive_scenario.export.osi.schemas import Osi, set_time, set_vector
+from eidrive_scenario.export.osi.schemas import Osi, set_orientation, set_time, set_vector
 from eidrive_scenario.recording.frame import Frame
 
 
@@ -49,8 +49,7 @@ class SensorDataBuilder:
         message.sensor_id.value = self._sensor
         # The sensor is a virtual one in the origin of the vehicle
         set_vector(message.mounting_position.position, (0.0, 0.0, 0.0))
-        orientation = message.mounting_position.orientation
-        orientation.yaw, orientation.pitch, orientation.roll = 0.0, 0.0, 0.0
+        set_orientation(message.mounting_position.orientation, 0.0)
         if math.isfinite(objects.time):
             set_time(message.last_measurement_time, objects.time)
             set_time(message.moving_object_header.measurement_time, objects.time)
@@ -75,7 +74,7 @@ class SensorDataBuilder:
         base.dimension.length, base.dimension.width, base.dimension.height = box[3:6].tolist()
         position = origin.turn.T @ (box[:3] - origin.position)
         set_vector(base.position, position)
-        base.orientation.yaw = math.remainder(float(box[6]) - origin.yaw, math.tau)
+        set_orientation(base.orientation, float(box[6]) - origin.yaw)
         velocity = np.append(objects.velocity[row], 0.0)
         if np.isfinite(velocity).all():
             spin = origin.yaw_rate * np.array([-position[1], position[0], 0.0])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from eidrive_scenario.export.osi.identifiers import Identifiers
-from eidrive_scenario.export.osi.schemas import Osi
+from eidrive_scenario.export.osi.schemas import Osi, set_orientation
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.signal_states import FLASHING, ON, lamp_colors, lamps
 from eidrive_scenario.world.road_objects import signal_heads
@@ -38,7 +38,7 @@ class TrafficLights:
                 base.position.x, base.position.y = head.pose.x, head.pose.y
                 base.position.z = head.pose.z + (len(shown) - index - 0.5) * height
                 base.dimension.length, base.dimension.width, base.dimension.height = _DEPTH, head.width, height
-                base.orientation.yaw, base.orientation.pitch, base.orientation.roll = head.pose.h, 0.0, 0.0
+                set_orientation(base.orientation, head.pose.h)
                 lamp.classification.color = kinds.Color.Value(f"COLOR_{color.upper()}")
                 lamp.classification.icon = kinds.Icon.Value("ICON_NONE")
                 lamp.classification.mode = kinds.Mode.Value(_mode(mode))

@@ -95,6 +95,17 @@ def test_box_center_of_inclined_body_follows_all_angles(tmp_path: Path) -> None:
     assert vector(truth.moving_object[0].base.position) == pytest.approx([10.0 - 0.75, 5.0, 1.0 + 1.4])
 
 
+@pytest.mark.parametrize("angles", [(3 * np.pi / 2, 0.1, -0.2), (-7.0, 0.0, 4.0), (2 * np.pi, -6.2, 9.0)])
+def test_angles_are_in_the_range_that_osi_prefers(tmp_path: Path, angles: tuple[float, float, float]) -> None:
+    """Orientation3d: "The preferred angular range is (-pi, pi]"; scenarios may write other angles."""
+    (truth,) = exported(tmp_path, Frame(view({"A": {"angles": angles}})))
+    found = truth.moving_object[0].base.orientation
+    written = [found.yaw, found.pitch, found.roll]
+    assert np.abs(written).max() <= np.pi
+    expected = Rotation.from_euler("ZYX", angles)
+    assert (Rotation.from_euler("ZYX", written).inv() * expected).magnitude() < 1e-12
+
+
 def test_velocity_of_turning_body_is_that_of_its_center(tmp_path: Path) -> None:
     """A body that turns in place with 0.5 rad/s moves its center, 1.4 m ahead, to the left and accelerates it back."""
     (truth,) = exported(tmp_path, Frame(view({"A": {"yaw_rate": 0.5}})))

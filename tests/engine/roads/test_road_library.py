@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lxml import etree
 
 from eidrive_scenario.roads import RoadNetwork, placed_objects
 from xosc.roads.courses import connect
@@ -16,6 +17,8 @@ COOP_SITES = ("coop_1", "coop_2")
 NAMES = tuple(layout.name for layout in LAYOUTS)
 INSIDE = 1e-9
 """Distance from the end of a lane section [m]."""
+OBJECT_TYPES = {"barrier", "building", "crosswalk", "roadMark"}
+"""Types of the library's objects, all in e_objectType of ASAM OpenDRIVE 1.6."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -53,6 +56,16 @@ def test_every_road_file_has_a_description(library: Path) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_road_file_has_no_diagnostics(library: Path, name: str) -> None:
     assert not RoadNetwork.load(library / f"{name}.xodr").map_warnings
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_objects_agree_with_the_schema_of_opendrive(library: Path, name: str) -> None:
+    """The schema of version 1.6 requires unique ids in a file, and has neither walls nor paint as a fill."""
+    objects = list(etree.parse(library / f"{name}.xodr").iter("object"))
+    numbers = [item.get("id") for item in objects]
+    assert len(set(numbers)) == len(numbers)
+    assert {item.get("type") for item in objects} <= OBJECT_TYPES
+    assert not [outline for item in objects for outline in item.iter("outline") if outline.get("fillType")]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -169,7 +182,7 @@ def test_crest_has_its_height_and_radius(library: Path) -> None:
 
 def test_tunnel_walls_follow_the_edges_of_the_road(library: Path) -> None:
     network = RoadNetwork.load(library / "tunnel_road.xodr")
-    walls = [placed for placed in placed_objects(network) if placed.object.type == "wall"]
+    walls = [placed for placed in placed_objects(network) if placed.object.name.startswith("tunnel wall")]
     assert {round(placed.height, 3) for placed in walls} == {4.7}
     assert sum(placed.length for placed in walls) == pytest.approx(2 * 320.0)
     middle = network.road_pose_at("1", 282.5, 0.0)
