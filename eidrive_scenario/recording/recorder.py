@@ -24,10 +24,10 @@ FORMAT = "3"
 """Version of the recording format, stored in the metadata."""
 READABLE = ("2", FORMAT)
 """Versions that are read. Version 2 lacks the commands of frames and the outcome of the run."""
-_CHUNK = 256 * 2**10
+CHUNK_SIZE = 256 * 2**10
 """Uncompressed size at which a chunk is written [bytes]."""
-_SPAN = 1_000_000_000
-"""Simulated time after which a chunk of any size is written [ns]."""
+CHUNK_SPAN = 1.0
+"""Simulated time after which a chunk of any size is written [s]."""
 RUN = "run"
 """Name of the metadata record that describes the run."""
 TRACE_METADATA = "net.asam.osi.trace"
@@ -54,7 +54,8 @@ class Recorder:
 
         self._file = create(path)
         self._seal = Seal()
-        self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        zstd = CompressionType.ZSTD
+        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=zstd, enable_data_crcs=True)
         self._writer.start(profile="", library="eidrive-scenario")
         entries = {"format": FORMAT, **package_versions(), **metadata}
         self._writer.add_metadata(RUN, entries)
@@ -75,22 +76,28 @@ class Recorder:
 
     def attach(self, name: str, data: bytes) -> None:
         """Append an attached file. Raise SimulationError if the recording is closed."""
-        self._check_open()
+        self.check_open()
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._writer.add_attachment(0, 0, name, "application/octet-stream", data)
         self._seal.add_attachment(name, data)
 
     def observe(self, frame: Frame) -> None:
         """Append one frame. Raise SimulationError if the file is closed: each run needs its own recorder."""
-        self._check_open()
+        self.check_open()
+        self.write(frame)
+
+    def write(self, frame: Frame) -> int:
+        """Append one frame to the open file, and return the size of its text [bytes]."""
         data, instant = self._text.encode(frame), round(frame.view.time * 1e9)
         self._writer.add_message(FRAMES, instant, data, instant, sequence=frame.view.tick)
         self._seal.add_frame(frame.view.tick, instant, data)
         if instant >= self._due:
             self._writer.flush()  # type: ignore[no-untyped-call]
-            self._due = instant + _SPAN
+            self._due = instant + round(CHUNK_SPAN * 1e9)
+        return len(data)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raise SimulationError if the recording is closed."""
         if self._file.closed:
             raise SimulationError(f"{self._file.name}: the recording is closed; a second run needs a second Recorder")
 

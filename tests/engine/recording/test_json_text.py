@@ -69,6 +69,43 @@ def test_numbers_keep_all_bits(make_frame: MakeFrame, number: float) -> None:
     assert plan.points[0, 0].tobytes() == np.float64(number).tobytes()
 
 
+def test_array_that_changes_between_records_is_encoded_anew(make_frame: MakeFrame) -> None:
+    points = np.array([[1.0, 2.0], [3.0, 4.0]])
+    frame = with_plan(make_frame(0), points=points, speeds=points[:, 0])
+    first = check(frame)
+    points[0, 1] = 5.0
+    assert check(frame)["steps"]["Ego"]["plan"]["points"] == [[1.0, 5.0], [3.0, 4.0]]
+    assert first["steps"]["Ego"]["plan"]["points"] == [[1.0, 2.0], [3.0, 4.0]]
+
+
+@pytest.mark.parametrize(
+    "speeds",
+    [
+        np.array([0.0, 0.0]),
+        np.array([0.0, -0.0]),
+        np.array([0, 0]),
+        np.array([False, False]),
+        np.array([[0.0, 0.0]]),
+        np.array([0.0, 9.0, 0.0, 9.0])[::2],
+        np.zeros(2, dtype=">f8"),
+        np.frombuffer(np.array([1.5, 0.0]).tobytes(), dtype=">f8"),
+        np.array([0.0, 1.5], dtype=np.float32),
+        np.linspace(0.0, 1.0, 5000),
+    ],
+)
+def test_arrays_of_other_type_or_shape_are_distinguished(make_frame: MakeFrame, speeds: Any) -> None:
+    check(with_plan(make_frame(0), speeds=np.array([1.5, 0.0]), points=np.zeros((1, 2))))
+    check(with_plan(make_frame(0), speeds=speeds, points=np.zeros((1, 2))))
+
+
+def test_number_of_kept_texts_is_bounded(make_frame: MakeFrame) -> None:
+    """6,000 different arrays in one encoder: the texts of all would take some megabytes."""
+    text = JsonText(Frame)
+    for number in range(6000):
+        text.encode(with_plan(make_frame(0), speeds=np.array([float(number)])))
+    assert len(text._arrays._by_content) < 4096
+
+
 def test_other_mappings_and_scalars_of_numpy_are_encoded(make_frame: MakeFrame) -> None:
     signals: Mapping[str, str] = MappingProxyType({"1": "red", "Ä": "grün \u2028 \U0001f6a6"})
     light = Appearance({"lowBeam": LightState("lowBeam", "on", color=(0.5, 0.25, 0.0))})

@@ -12,12 +12,14 @@ from eidrive_scenario.errors import InputError, SettingError, SimulationError
 from eidrive_scenario.recording import Recorder, TraceHash, read_recording
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation.recorded_outcome import RunRecorder
 
 MakeFrame = Callable[..., Frame]
+RECORDERS = (Recorder, RunRecorder)
 
 
-def record(path: Path, frames: list[Frame]) -> Path:
-    recorder = Recorder(path, metadata={"scenario": "cut_in", "seed": "7"}, attachments={"road.xodr": b"<OpenDRIVE/>"})
+def record(path: Path, frames: list[Frame], kind: type[Recorder] = Recorder) -> Path:
+    recorder = kind(path, metadata={"scenario": "cut_in", "seed": "7"}, attachments={"road.xodr": b"<OpenDRIVE/>"})
     for frame in frames:
         recorder.observe(frame)
     recorder.close()
@@ -58,6 +60,28 @@ def test_recordings_of_equal_frames_are_equal_files(tmp_path: Path, make_frame: 
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+@pytest.mark.parametrize("count", [0, 1, 7, 45])
+def test_recorder_of_a_run_writes_the_same_file(tmp_path: Path, make_frame: MakeFrame, count: int) -> None:
+    frames = [make_frame(tick) for tick in range(count)]
+    files = [record(tmp_path / f"{kind.__name__}.mcap", frames, kind) for kind in RECORDERS]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_recorder_of_a_run_keeps_about_one_chunk_of_large_frames(tmp_path: Path, make_frame: MakeFrame) -> None:
+    """Frames of 0.2 MB every 0.01 s: a kill must not lose a whole second of them."""
+    recorder = RunRecorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
+    rng = np.random.default_rng(1)
+    for tick in range(40):
+        frame = make_frame(tick)
+        routes = {"Ego": rng.random((3500, 3))}
+        recorder.observe(replace(frame, routes=routes, view=replace(frame.view, time=0.01 * tick)))
+    left = (tmp_path / "run.mcap").read_bytes()
+    recorder.close()
+    (tmp_path / "left.mcap").write_bytes(left)
+    ticks = [frame.view.tick for frame in read_recording(tmp_path / "left.mcap").frames()]
+    assert ticks[-1] >= 36
+
+
 def test_recording_is_readable_by_mcap_library(tmp_path: Path, make_frame: MakeFrame) -> None:
     path = record(tmp_path / "run.mcap", [make_frame(3)])
     with path.open("rb") as stream:
@@ -81,9 +105,12 @@ def test_truncated_recording_returns_its_first_frames(tmp_path: Path, make_frame
     assert share < 0.9 or ticks
 
 
-def test_unclosed_recorder_loses_at_most_one_second(tmp_path: Path, make_frame: MakeFrame) -> None:
+@pytest.mark.parametrize("kind", RECORDERS)
+def test_unclosed_recorder_loses_at_most_one_second(
+    tmp_path: Path, make_frame: MakeFrame, kind: type[Recorder]
+) -> None:
     """Frames every 0.05 s up to 2.95 s; after a kill of the process, frames since 2.0 s may be missing."""
-    recorder = Recorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
+    recorder = kind(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
     for tick in range(60):
         recorder.observe(make_frame(tick))
     left = (tmp_path / "run.mcap").read_bytes()
@@ -94,8 +121,11 @@ def test_unclosed_recorder_loses_at_most_one_second(tmp_path: Path, make_frame: 
     assert recording.scenario == "cut_in"
 
 
-def test_closed_recorder_raises_error_for_second_run(tmp_path: Path, make_frame: MakeFrame) -> None:
-    recorder = Recorder(tmp_path / "run.mcap", metadata={})
+@pytest.mark.parametrize("kind", RECORDERS)
+def test_closed_recorder_raises_error_for_second_run(
+    tmp_path: Path, make_frame: MakeFrame, kind: type[Recorder]
+) -> None:
+    recorder = kind(tmp_path / "run.mcap", metadata={})
     recorder.observe(make_frame(0))
     recorder.close()
     with pytest.raises(SimulationError, match=r"run\.mcap: the recording is closed; a second run needs"):
@@ -103,11 +133,12 @@ def test_closed_recorder_raises_error_for_second_run(tmp_path: Path, make_frame:
     assert read_recording(tmp_path / "run.mcap").damage == ()
 
 
+@pytest.mark.parametrize("kind", RECORDERS)
 @pytest.mark.parametrize("step", [0.3, 1.0, 7.0])
 def test_unclosed_recorder_of_long_steps_loses_less_than_one_second(
-    tmp_path: Path, make_frame: MakeFrame, step: float
+    tmp_path: Path, make_frame: MakeFrame, step: float, kind: type[Recorder]
 ) -> None:
-    recorder = Recorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
+    recorder = kind(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
     frames = [
         replace(frame, view=replace(frame.view, time=frame.view.tick * step)) for frame in map(make_frame, range(9))
     ]
