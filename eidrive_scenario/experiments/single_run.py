@@ -19,6 +19,7 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording.run_files import RECORDING, ROAD_FILE, SCENARIO_FILE
 from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
+from eidrive_scenario.registry import third_party_files
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation import DEFAULT_SEED, Observer, RunResult, RunSettings, Simulation
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
@@ -116,7 +117,8 @@ def run_and_save(
                 recording = folder.recording
                 if limit is not None:
                     limit.add_note(f"recording: {recording}")
-                _record(simulation, folder, source, settings, command)
+                at_once = bool(observers) or bool(third_party_files())
+                _record(simulation, folder, source, settings, command, at_once=at_once)
             result = replace(simulation.run(), command=command)
             return result if folder is None else _keep(result, folder, kept)
     except InputError:
@@ -138,6 +140,8 @@ def _record(
     source: Scenario | Source | ConcreteRun,
     settings: RunSettings,
     command: str,
+    *,
+    at_once: bool,
 ) -> None:
     """Add a recorder and a writer of camera images to the observers."""
     from eidrive_scenario.recording import CameraImageWriter
@@ -155,7 +159,8 @@ def _record(
         CONTEXT: criteria_context_text(scenario),
     }
     text = scenario.text if scenario.text is not None else _text(source)
-    simulation.add_observer(RunRecorder(folder.recording, metadata=metadata, attachments=_attachments(text, scenario)))
+    attachments = _attachments(text, scenario)
+    simulation.add_observer(RunRecorder(folder.recording, metadata=metadata, attachments=attachments, at_once=at_once))
 
 
 def _text(source: Scenario | Source | ConcreteRun) -> bytes:

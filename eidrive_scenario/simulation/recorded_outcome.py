@@ -57,12 +57,20 @@ class RunRecorder(Recorder):
 
     Frames are written several at a time, after at most a second of simulated time or about one chunk of the file. This
     takes less time than to encode each frame in its tick, and a killed process loses no more than with `Recorder`.
+
+    at_once  write each frame in its tick, as necessary if code of others may change the arrays of a frame later
     """
 
     def __init__(
-        self, path: str | Path, *, metadata: Mapping[str, str], attachments: Mapping[str, bytes] | None = None
+        self,
+        path: str | Path,
+        *,
+        metadata: Mapping[str, str],
+        attachments: Mapping[str, bytes] | None = None,
+        at_once: bool = False,
     ) -> None:
         super().__init__(path, metadata=metadata, attachments=attachments)
+        self._at_once = at_once
         self._waiting: list[Frame] = []
         self._most, self._until = 1, 0.0
 
@@ -70,7 +78,7 @@ class RunRecorder(Recorder):
         """Append one frame. Raise SimulationError if the file is closed: each run needs its own recorder."""
         self.check_open()
         self._waiting.append(frame)
-        if len(self._waiting) >= self._most or frame.view.time >= self._until:
+        if self._at_once or len(self._waiting) >= self._most or frame.view.time >= self._until:
             self._until = frame.view.time + CHUNK_SPAN
             self._write_waiting()
 

@@ -1,7 +1,9 @@
 """Single runs and their output files."""
 
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from eidrive_scenario.errors import InputError
@@ -10,6 +12,7 @@ from eidrive_scenario.evaluation.criteria_parser import build_criteria, parse_cr
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import TraceHash, read_recording
 from eidrive_scenario.recording.run_files import read_result, result_paths
+from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
@@ -44,6 +47,22 @@ def test_recording_metadata_contain_given_settings(tmp_path: Path) -> None:
     assert given == ["passing_by", "4", "none", "none"]
     assert '"OtherY": "7"' in metadata["parameters"]
     assert "weather" not in metadata
+
+
+def test_recording_has_what_a_planner_returned_at_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The planner overwrites the points of its last plan; those of the route planner are other arrays."""
+    point = EntryPoint("buffered", "buffered_planner:BufferedPlanner", "eidrive_scenario.planners")
+    monkeypatch.setitem(registry("planners")._points, "buffered", point)
+    points = []
+    for planner in ("route", "buffered"):
+        settings = RunSettings(planner=planner, detector="oracle", time_limit=4.0)
+        result = run_and_save("coop/scenario_1", settings=settings, out=tmp_path / planner)
+        assert result.recording is not None
+        plans = [frame.steps["Ego"].plan for frame in read_recording(result.recording).frames()]
+        points.append([plan.points for plan in plans if plan is not None])
+    assert len(points[0]) > 50
+    assert all(map(np.array_equal, *points))
+    assert not np.array_equal(points[0][0], points[0][50])
 
 
 def test_recordings_of_equal_runs_are_equal_files(tmp_path: Path) -> None:
