@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -71,7 +72,7 @@ class RunRecorder(Recorder):
     ) -> None:
         super().__init__(path, metadata=metadata, attachments=attachments)
         self._at_once = at_once
-        self._waiting: list[Frame] = []
+        self._waiting: deque[Frame] = deque()
         self._most, self._until = 1, 0.0
 
     def observe(self, frame: Frame) -> None:
@@ -83,10 +84,12 @@ class RunRecorder(Recorder):
             self._write_waiting()
 
     def _write_waiting(self) -> None:
-        frames, self._waiting = self._waiting, []
-        size = sum(map(self.write, frames))
+        size, count = 0, len(self._waiting)
+        # One by one: an interruption loses one frame, and the others are written at the end
+        while self._waiting:
+            size += self.write(self._waiting.popleft())
         if size:
-            self._most = max(CHUNK_SIZE * len(frames) // size, 1)
+            self._most = max(CHUNK_SIZE * count // size, 1)
 
     def conclude(self, result: RunResult) -> None:
         """Attach the outcome."""

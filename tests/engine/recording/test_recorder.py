@@ -82,6 +82,28 @@ def test_recorder_of_a_run_keeps_about_one_chunk_of_large_frames(tmp_path: Path,
     assert ticks[-1] >= 36
 
 
+def test_interrupted_writing_loses_one_frame_of_a_run(
+    tmp_path: Path, make_frame: MakeFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An interruption while the frames of a second are written, as by Ctrl+C, does not lose the others."""
+    recorder = RunRecorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
+    write = RunRecorder.write
+
+    def interrupted(self: RunRecorder, frame: Frame) -> int:
+        if frame.view.tick == 9:
+            raise KeyboardInterrupt
+        return write(self, frame)
+
+    monkeypatch.setattr(RunRecorder, "write", interrupted)
+    for tick in range(20):
+        recorder.observe(make_frame(tick))
+    with pytest.raises(KeyboardInterrupt):
+        recorder.observe(make_frame(20))
+    recorder.close()
+    ticks = [frame.view.tick for frame in read_recording(tmp_path / "run.mcap").frames()]
+    assert ticks == [*range(9), *range(10, 21)]
+
+
 def test_recording_is_readable_by_mcap_library(tmp_path: Path, make_frame: MakeFrame) -> None:
     path = record(tmp_path / "run.mcap", [make_frame(3)])
     with path.open("rb") as stream:
