@@ -26,8 +26,8 @@ READABLE = ("2", FORMAT)
 """Versions that are read. Version 2 lacks the commands of frames and the outcome of the run."""
 CHUNK_SIZE = 256 * 2**10
 """Uncompressed size at which a chunk is written [bytes]."""
-CHUNK_SPAN = 1.0
-"""Simulated time after which a chunk of any size is written [s]."""
+_SPAN = 1_000_000_000
+"""Simulated time after which a chunk of any size is written [ns]."""
 RUN = "run"
 """Name of the metadata record that describes the run."""
 TRACE_METADATA = "net.asam.osi.trace"
@@ -88,13 +88,17 @@ class Recorder:
 
     def write(self, frame: Frame) -> int:
         """Append one frame to the open file, and return the size of its text [bytes]."""
-        data, instant = self._text.encode(frame), round(frame.view.time * 1e9)
+        data, instant = self._text.encode(frame), _nanoseconds(frame)
         self._writer.add_message(FRAMES, instant, data, instant, sequence=frame.view.tick)
         self._seal.add_frame(frame.view.tick, instant, data)
-        if instant >= self._due:
+        if self.is_due(frame):
             self._writer.flush()  # type: ignore[no-untyped-call]
-            self._due = instant + round(CHUNK_SPAN * 1e9)
+            self._due = instant + _SPAN
         return len(data)
+
+    def is_due(self, frame: Frame) -> bool:
+        """Return whether the chunk ends with this frame, whatever its size."""
+        return _nanoseconds(frame) >= self._due
 
     def check_open(self) -> None:
         """Raise SimulationError if the recording is closed."""
@@ -113,3 +117,7 @@ class Recorder:
             if sealed:
                 self._writer.add_metadata(SEAL, self._seal.entries())
             self._writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _nanoseconds(frame: Frame) -> int:
+    return round(frame.view.time * 1e9)

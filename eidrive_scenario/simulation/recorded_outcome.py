@@ -14,7 +14,7 @@ from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.recorder import CHUNK_SIZE, CHUNK_SPAN, Recorder
+from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.resolved_settings import canonical_json
@@ -73,14 +73,13 @@ class RunRecorder(Recorder):
         super().__init__(path, metadata=metadata, attachments=attachments)
         self._at_once = at_once
         self._waiting: deque[Frame] = deque()
-        self._most, self._until = 1, 0.0
+        self._most = 1
 
     def observe(self, frame: Frame) -> None:
         """Append one frame. Raise SimulationError if the file is closed: each run needs its own recorder."""
         self.check_open()
         self._waiting.append(frame)
-        if self._at_once or len(self._waiting) >= self._most or frame.view.time >= self._until:
-            self._until = frame.view.time + CHUNK_SPAN
+        if self._at_once or len(self._waiting) >= self._most or self.is_due(frame):
             self._write_waiting()
 
     def _write_waiting(self) -> None:
