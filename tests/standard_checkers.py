@@ -1,4 +1,4 @@
-"""Files of this project, checked by the checkers of others: `python tests/standard_checkers.py [--keep FOLDER]`.
+"""Files of this project, checked by the checkers of others: `python tests/standard_checkers.py`.
 
 - All scenarios and catalogs of the library and of `eidrive init`, by ASAM's checker of OpenSCENARIO XML.
 - All road files, by ASAM's checker of OpenDRIVE.
@@ -11,7 +11,6 @@ Prints a line per file; the exit status is 1 if a checker reports an issue.
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -130,11 +129,8 @@ def _report(name: str, read: str, issues: list[str]) -> int:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--keep", type=Path, help="existing folder for the files, which are deleted by default")
-    keep = parser.parse_args().keep
     with tempfile.TemporaryDirectory() as folder:
-        total = check(keep or Path(folder))
+        total = check(Path(folder))
     print(f"{total} issues")
     sys.exit(bool(total))
 
