@@ -131,7 +131,7 @@ class CatalogLibrary:
         except BudgetError as error:
             diagnostic = Diagnostic(str(error), "use fewer or smaller entries", reference.source, reference.line)
             raise ScenarioError([*self._collector.errors, diagnostic]) from error
-        reader = Reader(catalog.document.name, catalog.version, self._collector)
+        reader = Reader(catalog.document.name, catalog.version, self._collector, catalog.document.read)
         lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._collector.budget)
         entry = reader.read(node, rule.cls, _assignments(reference), lent)
         for name in sorted(lent.lent or ()):
@@ -253,7 +253,9 @@ def _read(path: Path, collector: DiagnosticCollector) -> CatalogFile | None:
     version = version_of(document, collector, older=VERSIONS[0])
     if version is None:
         return None
-    catalog = apply_workarounds(catalog, document.name, version, collector)
+    repaired = apply_workarounds(catalog, document.name, version, collector)
+    if repaired is not catalog:
+        catalog, document = repaired, msgspec.structs.replace(document, read=None)
     entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
     return CatalogFile(
         catalog.get("name", path.stem), document, version, entries, duplicate_entries(catalog, document.name)

@@ -35,6 +35,11 @@ class DiagnosticCollector:
     budget: Budget = field(default_factory=Budget)
     """Limits of the size to which the scenario may expand."""
 
+    @property
+    def count(self) -> int:
+        """Number of errors and warnings."""
+        return len(self.errors) + len(self.warnings) + self.unlisted_warnings
+
     def error(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
         """Store an error. Raise ScenarioError with all errors at error number MAX_DIAGNOSTICS."""
         self._add(Diagnostic(message, hint, source, line))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import msgspec
 from eidrive_scenario.files.bounded import read_regular_file
 from eidrive_scenario.openscenario.catalogs import CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.kept_files import KeptFiles
 from eidrive_scenario.openscenario.roadfile import find_road_file
 from eidrive_scenario.openscenario.scenario import Scenario, load_scenario
 from eidrive_scenario.openscenario.values.parameters import Assignment, as_assignments
@@ -24,14 +24,13 @@ Key = tuple[str, str, tuple[tuple[str, Assignment], ...]]
 
 
 class _Kept(msgspec.Struct, frozen=True):
-    """Scenario, the size of its file [byte], and the characters of its expressions before the first run."""
+    """Scenario, and the characters of its expressions before the first run."""
 
     scenario: Scenario
-    size: int
     concatenated: int
 
 
-_kept: OrderedDict[Key, _Kept] = OrderedDict()
+_kept: KeptFiles[Key, _Kept] = KeptFiles(MAX_KEPT)
 
 
 def load_kept(path: Path, parameters: Mapping[str, str | Assignment] | None = None) -> Scenario:
@@ -48,17 +47,13 @@ def load_kept(path: Path, parameters: Mapping[str, str | Assignment] | None = No
     key = str(path), sha256_of(content), tuple(assignments.items())
     kept = _kept.get(key)
     if kept is not None and _is_current(kept.scenario, path):
-        _kept.move_to_end(key)
         if kept.scenario.scope is not None:
             kept.scenario.scope.budget.concatenated = kept.concatenated  # Each run may use the whole limit
         return kept.scenario
     scenario = load_scenario(path, assignments)
     if scenario.catalog_files is not None and scenario.scope is not None:
         key = key[0], scenario.digest, key[2]  # The content that was read, if the file has changed since
-        _kept[key] = _Kept(scenario, len(content), scenario.scope.budget.concatenated)
-        _kept.move_to_end(key)
-        while sum(one.size for one in _kept.values()) > MAX_KEPT:
-            _kept.popitem(last=False)
+        _kept.put(key, _Kept(scenario, scenario.scope.budget.concatenated), len(content))
     return scenario
 
 

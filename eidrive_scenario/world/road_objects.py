@@ -96,6 +96,11 @@ class Building:
     yaw: float
     color: Vector3 | None = None
 
+    @property
+    def box(self) -> tuple[float, float, float, float, float, float, float]:
+        """Box x, y, z, length, width, height, heading."""
+        return (*self.center, *self.size, self.yaw)
+
 
 class SignalHead(NamedTuple):
     """Head of a signal: pose of the center of its lower edge, facing the traffic.

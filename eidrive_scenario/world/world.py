@@ -27,7 +27,7 @@ from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.ground import GroundUnder
 from eidrive_scenario.world.physics.rays import RayHits, cast_rays, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
-from eidrive_scenario.world.road_objects import signal_heads
+from eidrive_scenario.world.road_objects import Building, signal_heads
 from eidrive_scenario.world.view import Contact, WorldView
 from eidrive_scenario.world.weather import Weather
 
@@ -184,7 +184,7 @@ class World:
         self, name: str, center: Vector3, size: Vector3, yaw: float = 0.0, color: Vector3 | None = None
     ) -> None:
         """Add a building, a box around `center` [m] of length, width, height [m] that blocks vehicles and rays."""
-        self._scenery.add_building(name, center, size, yaw, color)
+        self._scenery.add_buildings([Building(name, center, size, yaw, color)])
         self._changed()
 
     def step(self, placements: Mapping[str, Placement], controls: Mapping[str, Control]) -> None:

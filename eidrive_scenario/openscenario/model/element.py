@@ -7,7 +7,7 @@ optional. `attribute`, `child` and `children` define differences between version
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, FrozenInstanceError, dataclass, field, fields
 from reprlib import recursive_repr
 from typing import Any, ClassVar, TypeVar, dataclass_transform
@@ -155,18 +155,21 @@ class Element:
 
     def children(self) -> Iterator[Element]:
         """Yield the child elements in the order of the fields."""
-        for name in field_names(type(self)):
-            value = getattr(self, name)
+        for value in vars(self).values():
             if isinstance(value, Element):
                 yield value
             elif isinstance(value, tuple):
                 yield from value
 
     def walk(self) -> Iterator[Element]:
-        """Yield this element and its descendants."""
-        yield self
-        for below in self.children():
-            yield from below.walk()
+        """Yield this element and its descendants, each before its children."""
+        ahead: list[Element] = [self]
+        while ahead:
+            element = ahead.pop()
+            yield element
+            below = list(element.children())
+            below.reverse()
+            ahead += below
 
     def chosen(self) -> Element:
         """Return the alternative that is set in an element with a choice.
@@ -201,6 +204,18 @@ def field_defaults(cls: type[Element]) -> dict[str, Any]:
     return known
 
 
+def incomplete_element(cls: type[Element], values: Mapping[str, Any]) -> Element:
+    """Return an element with these values and its defaults, without a check: None for missing required fields."""
+    defaults = _INCOMPLETE.get(cls)
+    if defaults is None:
+        given = field_defaults(cls)
+        defaults = _INCOMPLETE[cls] = {name: None if value is MISSING else value for name, value in given.items()}
+    element = object.__new__(cls)
+    element.__dict__.update(defaults)
+    element.__dict__.update(values)
+    return element
+
+
 def _compared_values(element: Element) -> tuple[Any, ...]:
     cls = type(element)
     names = _COMPARED.get(cls)
@@ -222,4 +237,5 @@ def alternatives(cls: type[Element]) -> tuple[str, ...]:
 
 _FIELD_NAMES: dict[type[Element], tuple[str, ...]] = {}
 _DEFAULTS: dict[type[Element], dict[str, Any]] = {}
+_INCOMPLETE: dict[type[Element], dict[str, Any]] = {}
 _COMPARED: dict[type[Element], tuple[str, ...]] = {}

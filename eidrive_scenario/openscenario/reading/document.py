@@ -50,8 +50,8 @@ def read_root(
     version = version_of(document, collector)
     if version is None:
         return None
-    reader = Reader(document.name, version, collector)
     tree = apply_workarounds(document.root, document.name, version, collector)
+    reader = Reader(document.name, version, collector, document.read if tree is document.root else None)
     root = cast(OpenScenario, reader.read(tree, OpenScenario, assignments))
     declared = reader.declared if root.parameter_declarations else None
     return ReadDocument(root, version, tuple(reader.references), declared.parameters if declared else {})

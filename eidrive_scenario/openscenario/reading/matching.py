@@ -34,11 +34,19 @@ class Automaton(msgspec.Struct):
 
     steps: list[dict[str, int]] = msgspec.field(default_factory=lambda: [{}])
     accepting: set[int] = msgspec.field(default_factory=set)
+    distances: dict[int, int] = msgspec.field(default_factory=dict)
+    """Minimum number of children from each state to an accepting state."""
+
+    def __post_init__(self) -> None:
+        self.distances = self._distances()
 
     def after(self, state: int, name: str) -> int:
         """Return the state after a child of that name; for a misplaced child, the next state that it may reach."""
+        following = self.steps[state].get(name)
+        if following is not None:
+            return following
         entrances = {step[name] for step in self.steps if name in step}
-        return self.steps[state].get(name, min((to for to in entrances if to > state), default=min(entrances)))
+        return min((to for to in entrances if to > state), default=min(entrances))
 
     def skipped(self, state: int, name: str) -> tuple[str, ...] | None:
         """Return the minimum children required before a child of that name; None if it is not allowed any more."""
@@ -56,7 +64,7 @@ class Automaton(msgspec.Struct):
 
     def missing(self, state: int) -> list[tuple[str, ...]]:
         """Return the alternatives for each of the minimum children that must follow."""
-        distance = self._distances()
+        distance = self.distances
         needed: list[tuple[str, ...]] = []
         while distance[state] > 0:
             nearer = {name: to for name, to in self.steps[state].items() if distance[to] == distance[state] - 1}
@@ -65,7 +73,6 @@ class Automaton(msgspec.Struct):
         return needed
 
     def _distances(self) -> dict[int, int]:
-        """Return the minimum number of children from each state to an accepting state."""
         into: dict[int, set[int]] = {}
         for state, step in enumerate(self.steps):
             for to in step.values():

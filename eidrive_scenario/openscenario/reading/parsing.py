@@ -13,6 +13,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
+from eidrive_scenario.openscenario.kept_files import KeptFiles
 from eidrive_scenario.resolved_settings import sha256_of
 
 
@@ -40,6 +41,7 @@ class Document(msgspec.Struct, frozen=True):
     folder  base of relative paths
     text    parsed text of a source without a file
     digest  SHA-256 of the content, as hexadecimal digits
+    read    elements that have the same content in each reading, by their nodes; None if the document is not kept
     """
 
     root: etree._Element
@@ -48,16 +50,35 @@ class Document(msgspec.Struct, frozen=True):
     folder: Path
     text: bytes | None = None
     digest: str = ""
+    read: dict[etree._Element, Any] | None = None
+
+
+MAX_KEPT = 2**18
+"""Maximum size of all files whose documents are kept [byte]."""
+_kept: KeptFiles[tuple[str, str], Document] = KeptFiles(MAX_KEPT)
+"""Documents by name and digest: a scenario is read again for each combination of parameter values."""
 
 
 def open_document(source: Source) -> Document:
     """Parse a file or its bytes, or wrap a parsed tree. Raise ScenarioError with file and line if it is invalid."""
     if isinstance(source, bytes):
-        return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source, sha256_of(source))
+        return _parsed(source, "<bytes>", None)
     if not isinstance(source, str | Path):
         return _from_tree(source)
-    path, content = Path(source), _content(source)
-    return Document(parse(content, str(source)), str(source), path, path.parent, digest=sha256_of(content))
+    return _parsed(_content(source), str(source), Path(source))
+
+
+def _parsed(content: bytes, name: str, path: Path | None) -> Document:
+    """Return the document of a content; the kept one from the second time on."""
+    key = name, sha256_of(content)
+    kept = _kept.get(key)
+    if kept is None:
+        folder, text = (Path(), content) if path is None else (path.parent, None)
+        kept = Document(parse(content, name), name, path, folder, text, key[1])
+    elif kept.read is None:
+        kept = msgspec.structs.replace(kept, read={})
+    _kept.put(key, kept, len(content))
+    return kept
 
 
 def text_of(source: Source) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, replace
+from dataclasses import replace
 from typing import Any, cast
 
 import msgspec
@@ -24,7 +24,7 @@ from eidrive_scenario.openscenario.model import (
     ParameterDeclarations,
     Property,
 )
-from eidrive_scenario.openscenario.model.element import field_defaults
+from eidrive_scenario.openscenario.model.element import incomplete_element
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
 from eidrive_scenario.openscenario.reading.structure import check_children
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
@@ -47,14 +47,27 @@ class FoundReference(msgspec.Struct, frozen=True):
     kinds: tuple[type[Element], ...]
 
 
+ReadElement = tuple[Element, tuple[FoundReference, ...]]
+"""Element and the catalog references in it."""
+
+
 class Reader:
     """Reader of the elements of one file.
 
     Invalid elements are built incompletely, so that all errors of a file are reported together. The result is valid
     only if `collector` has no errors.
+
+    read   elements of an earlier reading, by their nodes: those without parameters and diagnostics. They are used
+           again, and those of this reading are added; None to read all
     """
 
-    def __init__(self, source: str, version: Version, collector: DiagnosticCollector) -> None:
+    def __init__(
+        self,
+        source: str,
+        version: Version,
+        collector: DiagnosticCollector,
+        read: dict[etree._Element, ReadElement] | None = None,
+    ) -> None:
         self.source = source
         self.version = version
         self.collector = collector
@@ -62,6 +75,9 @@ class Reader:
         self.declared: Scope | None = None
         """Parameters that the root element declares."""
         self._error_count = 0
+        self._read = read
+        self._scope_uses = 0
+        """Number of values so far that depend on the visible parameters."""
         self._with_text: set[etree._Element] = set()
         self._with_space: set[etree._Element] = set()
 
@@ -80,8 +96,25 @@ class Reader:
         self._with_text = set(cast(list[etree._Element], _WITH_TEXT(node)))
         self._with_space = set(cast(list[etree._Element], _WITH_SPACE(node)))
         open_assignments = dict(assignments or {})
-        element = self._element(node, cls, lent or Scope(budget=self.collector.budget), open_assignments)
+        element = self._any_element(node, cls, lent or Scope(budget=self.collector.budget), open_assignments)
         self._unknown_parameters(open_assignments, ())
+        return element
+
+    def _any_element(
+        self, node: etree._Element, cls: type[Element], scope: Scope, assignments: dict[str, Assignment]
+    ) -> Element:
+        """Return the element of an earlier reading, or read it."""
+        if self._read is None:
+            return self._element(node, cls, scope, assignments)
+        known = self._read.get(node)
+        if known is not None and type(known[0]) is cls:
+            self.references += known[1]
+            return known[0]
+        before = self._scope_uses, self.collector.count
+        first_reference = len(self.references)
+        element = self._element(node, cls, scope, assignments)
+        if before == (self._scope_uses, self.collector.count):
+            self._read[node] = element, tuple(self.references[first_reference:])
         return element
 
     def _element(
@@ -93,13 +126,14 @@ class Reader:
         if "ParameterDeclarations" in known.children:
             declarations = next((child for child in children if child.tag == "ParameterDeclarations"), None)
             if declarations is not None:
+                self._scope_uses += 1
                 scope = scope.inner()
                 self.declared = self.declared or scope
                 values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
         self._attributes(node, known, scope, values)
         self._text(node, known, values)
         if cls is Property or cls is CustomCommandAction:
-            _keep_scope(node, scope, values)
+            self._keep_scope(node, scope, values)
         repeated: dict[str, list[Element]] = {}
         for child in children:
             self._child(node, child, known, scope, values, repeated)
@@ -110,7 +144,7 @@ class Reader:
             self._report_empty(node, cls, known)
         if "catalog_reference" in values:
             self._note_references(known, values["catalog_reference"])
-        return make(cls, values)
+        return incomplete_element(cls, values)
 
     def _attributes(self, node: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]) -> None:
         present = set()
@@ -153,6 +187,7 @@ class Reader:
     def _convert(self, text: str, rule: AttributeRule, scope: Scope) -> Any:
         if not text.startswith("$"):
             return rule.scalar.convert(text)
+        self._scope_uses += 1
         if rule.points_to == "parameter" and REFERENCE.fullmatch(text):
             return text[1:]
         if text.startswith("${") and self.version < (1, 1):
@@ -160,6 +195,16 @@ class Reader:
                 return text
             raise ExpressionError(f"{quoted(text)} is an expression", "expressions require OpenSCENARIO 1.1")
         return scope.resolve(text, rule.scalar)
+
+    def _keep_scope(self, node: etree._Element, scope: Scope, values: dict[str, Any]) -> None:
+        """Keep the visible parameters for references inside a text, or inside the file of a command.
+
+        A property whose value begins with a reference is already resolved.
+        """
+        text = node.get("value") or ""
+        if "content" in values or ("$" in text and not text.startswith("$")):
+            self._scope_uses += 1
+            values["scope"] = scope
 
     def _text(self, node: etree._Element, known: Rules, values: dict[str, Any]) -> None:
         if known.text_field:
@@ -190,7 +235,7 @@ class Reader:
             self._deprecated(f"{child.tag} in {node.tag}", rule.deprecated, child)
         if rule.cls is ParameterDeclarations:
             return
-        element = self._element(child, rule.cls, scope, {})
+        element = self._any_element(child, rule.cls, scope, {})
         if rule.many:
             repeated.setdefault(rule.field, []).append(element)
         else:
@@ -220,7 +265,7 @@ class Reader:
         values["parameter_declaration"] = tuple(declared)
         self._unknown_parameters(assignments, scope.parameters)
         assignments.clear()
-        return make(ParameterDeclarations, values)
+        return incomplete_element(ParameterDeclarations, values)
 
     def _declare(
         self, declaration: ParameterDeclaration, scope: Scope, assignments: dict[str, Assignment], is_valid: bool
@@ -268,29 +313,3 @@ class Reader:
     def _error(self, message: str, hint: str, node: etree._Element) -> None:
         self._error_count += 1
         self.collector.error(message, hint, source=self.source, line=line_of(node))
-
-
-def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> None:
-    """Keep the visible parameters for references inside a text, or inside the file of a command.
-
-    A property whose value begins with a reference is already resolved.
-    """
-    text = node.get("value") or ""
-    if "content" in values or ("$" in text and not text.startswith("$")):
-        values["scope"] = scope
-
-
-def make(cls: type[Element], values: Mapping[str, Any]) -> Element:
-    """Return an element with these values and its defaults; it may be incomplete, as errors are reported separately."""
-    defaults = _DEFAULTS.get(cls)
-    if defaults is None:
-        given = field_defaults(cls)
-        defaults = {name: None if value is MISSING else value for name, value in given.items()}
-        _DEFAULTS[cls] = defaults
-    element = object.__new__(cls)
-    element.__dict__.update(defaults)
-    element.__dict__.update(values)
-    return element
-
-
-_DEFAULTS: dict[type[Element], dict[str, Any]] = {}

@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.world.physics.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN
-from eidrive_scenario.world.physics.bullet import bullet
+from eidrive_scenario.world.physics.bodies import DRIVEN, RAYS, STATIC, TERRAIN
 from eidrive_scenario.world.physics.spatial_grid import SQUARE, SpatialGrid
+from eidrive_scenario.world.physics.static_body import create_static_body
 from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
 from eidrive_scenario.world.road_objects import RoadObjectBody
 
@@ -119,16 +119,12 @@ def _foliage(piece: RoadObjectBody) -> Box:
 
 
 def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterator[int]:
-    in_client = {"physicsClientId": client}
     for start in range(0, len(boxes), MAX_FACES // len(_FACES)):
         table = np.array(boxes[start : start + MAX_FACES // len(_FACES)])
         vertices = _corners(table)
         faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1, 3)
         shape = create_triangle_shape(client, vertices.reshape(-1, 3), faces)
-        handle = bullet.createMultiBody(0.0, shape, useMaximalCoordinates=1, **in_client)
-        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **in_client)
-        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **in_client)
-        yield handle
+        yield create_static_body(client, shape, group, meets)
 
 
 def _corners(boxes: Array) -> Array:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from functools import cached_property
+from collections.abc import Collection, Sequence
 
-import numpy as np
-
-from eidrive_scenario.roads import RoadNetwork, surface_meshes
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import Vector3
-from eidrive_scenario.world.physics.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN, quaternion
+from eidrive_scenario.world.physics.bodies import RAYS, TERRAIN
+from eidrive_scenario.world.physics.building_bodies import BuildingBodies
 from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.physics.ground import is_level
-from eidrive_scenario.world.physics.obstacles import MAX_FACES, Obstacles
+from eidrive_scenario.world.physics.obstacles import Obstacles
+from eidrive_scenario.world.physics.road_scenery import road_scenery
 from eidrive_scenario.world.physics.spatial_grid import SpatialGrid, grid_cells
+from eidrive_scenario.world.physics.static_body import create_static_body
 from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
-from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildings, road_object_bodies
+from eidrive_scenario.world.road_objects import Building, RoadObjectBody
 
 GROUND = "ground"
 
@@ -31,28 +31,27 @@ class Scenery:
 
     def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
         self.roads = roads
+        self._of_roads = road_scenery(roads, frozenset(entities)) if roads is not None else None
         self.buildings: list[Building] = []
         self._nearby: SpatialGrid[tuple[float, float, float]] = SpatialGrid()
         """Center and radius of each building in plan view [m]."""
         self._client = client
-        self._entities = frozenset(entities)
-        self._names: dict[int, str] = {}
+        self._ground: set[int] = set()
         self.level = is_level(roads)
         self._raised = False
         self._obstacles: Obstacles | None = None
         self._obstacle_handles: frozenset[int] = frozenset()
-        if roads is not None:
-            for building in buildings(roads, without=entities):
-                self.add_building(building.name, building.center, building.size, building.yaw)
+        self._building_bodies = BuildingBodies(client)
+        if self._of_roads is not None:
+            self.add_buildings(self._of_roads.buildings)
 
-    def add_building(self, name: str, center: Vector3, size: Vector3, yaw: float, color: Vector3 | None = None) -> None:
-        """Add a building that blocks vehicles and rays."""
-        self.buildings.append(Building(name, center, size, yaw, color))
-        radius = math.hypot(size[0], size[1]) / 2
-        self._nearby.add((center[0], center[1], radius), grid_cells(center[0], center[1], radius))
-        half = (size[0] / 2, size[1] / 2, size[2] / 2)
-        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
-        self._add_static(shape, center, yaw, STATIC, RAYS | DRIVEN, name)
+    def add_buildings(self, buildings: Sequence[Building]) -> None:
+        """Add buildings, which block vehicles and rays."""
+        for building in buildings:
+            self.buildings.append(building)
+            x, y, radius = building.center[0], building.center[1], math.hypot(building.size[0], building.size[1]) / 2
+            self._nearby.add((x, y, radius), grid_cells(x, y, radius))
+        self._building_bodies.add(buildings)
 
     def raise_ground(self) -> bool:
         """Create the ground for rays if it does not exist. Return True if it was created.
@@ -63,45 +62,40 @@ class Scenery:
             return False
         self._raised = True
         in_client = {"physicsClientId": self._client}
-        if self.level or self.roads is None:
+        if self.level or self._of_roads is None:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **in_client)
             # Without a visual shape pybullet loads a textured plane from a file, which takes 7 ms.
             shown = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), **in_client)
-            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND, shown)
+            self._ground.add(create_static_body(self._client, plane, TERRAIN, RAYS, shown))
             return True
-        for mesh in surface_meshes(self.roads, 4.0):
-            if mesh.kind.startswith("marking"):
-                continue
-            for start in range(0, len(mesh.faces), MAX_FACES):
-                used, faces = np.unique(mesh.faces[start : start + MAX_FACES], return_inverse=True)
-                shape = create_triangle_shape(self._client, mesh.vertices[used], faces)
-                self._add_static(shape, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND)
+        for vertices, faces in self._of_roads.ground:
+            shape = create_triangle_shape(self._client, vertices, faces)
+            self._ground.add(create_static_body(self._client, shape, TERRAIN, RAYS))
         return True
 
-    @cached_property
-    def road_objects(self) -> tuple[RoadObjectBody, ...]:
+    @property
+    def road_objects(self) -> Sequence[RoadObjectBody]:
         """Road objects except buildings."""
-        return tuple(road_object_bodies(self.roads, self._entities)) if self.roads is not None else ()
+        return self._of_roads.road_objects if self._of_roads is not None else ()
 
     def raise_obstacles(self) -> bool:
         """Create the bodies of road objects if they do not exist. Return True if they were created."""
-        if self._obstacles is not None:
+        if self._obstacles is not None or self._of_roads is None:
             return False
-        self._obstacles = Obstacles(self.road_objects)
-        handles = self._obstacles.raise_bodies(self._client)
-        self._obstacle_handles = frozenset(handles)
-        return bool(handles)
+        self._obstacles = self._of_roads.obstacles
+        self._obstacle_handles = frozenset(self._obstacles.raise_bodies(self._client))
+        return bool(self._obstacle_handles)
 
     def name_of(self, handle: int, position: Vector3) -> str:
         """Return the name of the object with this body in pybullet at a point of contact."""
         if handle in self._obstacle_handles and self._obstacles is not None:
             return self._obstacles.name_at(position[0], position[1])
-        return self._names[handle]
+        return GROUND if handle in self._ground else self._building_bodies.name_at(handle, position)
 
     @property
     def highest_handle(self) -> int:
         """Maximum handle of these bodies in pybullet; -1 without any."""
-        return max([*self._names, *self._obstacle_handles], default=-1)
+        return max([*self._ground, *self._building_bodies.handles, *self._obstacle_handles], default=-1)
 
     def clearance(self, x: float, y: float, most: float) -> float:
         """Return the distance of a point from the nearest static object, at most `most` [m]."""
@@ -109,15 +103,3 @@ class Scenery:
         for bx, by, radius in self._nearby.query(x, y, most):
             free = min(free, math.hypot(bx - x, by - y) - radius)
         return free
-
-    def _add_static(
-        self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str, shown: int = -1
-    ) -> None:
-        in_client = {"physicsClientId": self._client}
-        turn = quaternion(yaw, 0.0, 0.0)
-        handle = bullet.createMultiBody(
-            0.0, shape, shown, basePosition=at, baseOrientation=turn, useMaximalCoordinates=1, **in_client
-        )
-        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **in_client)
-        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **in_client)
-        self._names[handle] = name
