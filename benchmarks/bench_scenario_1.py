@@ -8,11 +8,11 @@ The bare loop is a pybullet program with the same bodies, steps and rays. In eac
 - read pose and velocity of every body;
 - cast the rays of the run.
 
-It has no vehicle model, storyboard, stations, messages or criteria. Its bodies are created by the same calls as in the
-run.
+It has no vehicle model, storyboard, stations, messages or criteria. Its bodies and rays are those of the run without
+the shortcuts of the world: one body for each building, and all rays between a sensor and an object.
 
-The run itself makes fewer pybullet calls, because a driven body that cannot touch anything does not need pybullet. The
-time of these calls alone is printed too.
+The run itself makes fewer pybullet calls: a driven body that cannot touch anything does not need pybullet, and an
+object with free space before it no rays. The time of these calls alone is printed too.
 
 All runs are equal, tick by tick, and other load of the machine only adds to the time of a tick. So the minimum time of
 each tick over all runs counts. The three variants are run in turn.
@@ -37,6 +37,8 @@ from timing import print_shares, sum_of_minima, timed
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
+from eidrive_scenario.world import World
+from eidrive_scenario.world.physics import building_bodies
 from eidrive_scenario.world.physics.bodies import quaternion
 from eidrive_scenario.world.physics.bullet import bullet, connect, disconnect
 from eidrive_scenario.world.view import ActorState
@@ -47,8 +49,9 @@ PHYSICS_RATE = 200.0
 
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 
-SETUP = frozenset({"setPhysicsEngineParameter", "createCollisionShape", "createVisualShape", "createMultiBody",
-                   "changeDynamics", "setCollisionFilterGroupMask", "removeBody"})  # fmt: skip
+SETUP = frozenset({"setPhysicsEngineParameter", "createCollisionShape", "createCollisionShapeArray",
+                   "createVisualShape", "createMultiBody", "changeDynamics", "setCollisionFilterGroupMask",
+                   "removeBody"})  # fmt: skip
 LOOP = frozenset({"resetBasePositionAndOrientation", "resetBaseVelocity", "stepSimulation", "performCollisionDetection",
                   "rayTestBatch", "getBasePositionAndOrientation", "getBaseVelocity", "getContactPoints"})  # fmt: skip
 
@@ -104,6 +107,18 @@ def record_calls(trace: Trace) -> Iterator[None]:
     finally:
         for name, function in originals.items():
             setattr(bullet, name, function)
+
+
+@contextmanager
+def without_shortcuts() -> Iterator[None]:
+    """Give each building a separate body, and cast all rays of sensors."""
+    is_free, most = World.is_free, building_bodies.MOST
+    World.is_free = lambda world, own, origin, target: False  # type: ignore[method-assign]
+    building_bodies.MOST = 1
+    try:
+        yield
+    finally:
+        World.is_free, building_bodies.MOST = is_free, most  # type: ignore[method-assign]
 
 
 def timed_run(simulation: Simulation) -> list[float]:
@@ -203,6 +218,7 @@ def at_client(calls: list[Call], client: int) -> list[Call]:
 class Measured:
     """Times of a run and of the bare loop.
 
+    trace       of the bare loop
     simulated   simulated time [s]
     loading     times of loading [s]
     run_time, bare_time, calls_time   of the run, of the bare loop and of the pybullet calls of the run [s]
@@ -224,21 +240,28 @@ def build(seed: int, channel: str, *observers: Any) -> Simulation:
     return Simulation(scenario, seed=seed, settings=settings, observers=observers)
 
 
-def measure(runs: int, seed: int, channel: str) -> Measured:
-    """Measure the run, the bare loop and the pybullet calls of the run in turn."""
+def traced(seed: int, channel: str) -> tuple[Trace, float, float]:
+    """Return the pybullet calls of a run, its simulated time, and the duration of a tick [s]."""
     trace = Trace()
     with record_calls(trace):
         simulation = build(seed, channel, trace)
         bodies, trace.driven = simulation.world._bodies, simulation.stack.drivers
         trace.handles = {name: body.handle for name, body in bodies.items()}
-        dt, simulated = simulation.settings.dt, simulation.run().simulated_s
+        return trace, simulation.run().simulated_s, simulation.settings.dt
+
+
+def measure(runs: int, seed: int, channel: str) -> Measured:
+    """Measure the run, the bare loop and the pybullet calls of the run in turn."""
+    with without_shortcuts():
+        trace, simulated, dt = traced(seed, channel)
+    own_trace, _, _ = traced(seed, channel)
     bare_loop(trace, dt)
     complete, loading, bare, repeated = [], [], [], []
     for _ in range(runs):
         loading.append(timed(lambda: build(seed, channel).close()))
         complete.append(timed_run(build(seed, channel)))
         bare.append(bare_loop(trace, dt))
-        repeated.append(repeated_calls(trace))
+        repeated.append(repeated_calls(own_trace))
     run_time, bare_time, calls_time = (sum_of_minima(part) for part in (complete, bare, repeated))
     return Measured(simulated, loading, run_time, bare_time, calls_time, trace, dt)
 

@@ -14,18 +14,31 @@ def time_to_contact(a: Sequence[float], b: Sequence[float], velocity: Sequence[f
     axis overlap during one interval. The boxes touch when the last interval begins, if no interval has ended before
     (Ericson, Real-Time Collision Detection, 2005, section 5.5.8, for upright boxes).
     """
-    enter, leave = 0.0, math.inf
-    for x, y, z in separating_axes(a, b):
-        gap = x * (b[0] - a[0]) + y * (b[1] - a[1]) + z * (b[2] - a[2])
-        reach = half_projection(a, x, y, z) + half_projection(b, x, y, z)
-        rate = x * velocity[0] + y * velocity[1] + z * velocity[2]
-        if rate == 0.0:
-            if abs(gap) > reach:
-                return math.inf
-            continue
-        first, last = sorted(((-reach - gap) / rate, (reach - gap) / rate))
-        enter, leave = max(enter, first), min(leave, last)
+    dx, dy, vx, vy = b[0] - a[0], b[1] - a[1], velocity[0], velocity[1]
+    enter, leave = _overlap_time(b[2] - a[2], a[5] / 2 + b[5] / 2, velocity[2])
+    ca, sa, cb, sb = math.cos(a[6]), math.sin(a[6]), math.cos(b[6]), math.sin(b[6])
+    for x, y in ((ca, sa), (-sa, ca), (cb, sb), (-sb, cb)):
+        if enter > leave:
+            return math.inf
+        # Both are `half_projection`, with the same sines and cosines for all axes
+        half_a = (abs(ca * x + sa * y) * a[3] + abs(ca * y - sa * x) * a[4]) / 2
+        half_b = (abs(cb * x + sb * y) * b[3] + abs(cb * y - sb * x) * b[4]) / 2
+        first, last = _overlap_time(x * dx + y * dy, half_a + half_b, x * vx + y * vy)
+        if first > enter:
+            enter = first
+        if last < leave:
+            leave = last
     return enter if enter <= leave else math.inf
+
+
+def _overlap_time(gap: float, reach: float, rate: float) -> tuple[float, float]:
+    """Return the interval, not before 0, in which a gap that changes at this rate is within the reach [s]."""
+    if rate == 0.0:
+        return (0.0, math.inf) if abs(gap) <= reach else (math.inf, 0.0)
+    first, last = (-reach - gap) / rate, (reach - gap) / rate
+    if first > last:
+        first, last = last, first
+    return (first if first > 0.0 else 0.0), last
 
 
 def separating_axes(a: Sequence[float], b: Sequence[float]) -> list[tuple[float, float, float]]:

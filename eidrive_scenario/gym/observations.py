@@ -46,15 +46,23 @@ class ObservationEncoder:
         self._newest: dict[str, float] = {}
         self._route: Array = np.empty((0, 2))
         self._control = Control()
-        self._parts: dict[str, tuple[Part, Array, NDArray[Any], NDArray[Any]]] = {}
+        self._parts: dict[str, tuple[Part, slice, tuple[int, ...]]] = {}
+        """Conversion, place among all values, and shape of each part."""
         parts: dict[str, spaces.Space[Any]] = {}
+        scales, lows, highs, start = [], [], [], 0
         for name, (encode, low, high) in sorted(self._selected().items()):
             scale = high if settings.normalized else np.ones_like(high)
             low32, high32 = (low / scale).astype(np.float32), (high / scale).astype(np.float32)
-            self._parts[name] = encode, scale, low32, high32
             parts[name] = spaces.Box(low32, high32, dtype=np.float32)
-        self._space = spaces.Dict(parts)
-        self.space: spaces.Space[Any] = spaces.flatten_space(self._space) if settings.flat else self._space
+            self._parts[name] = encode, slice(start, start + high.size), high.shape
+            start += high.size
+            scales.append(scale.ravel())
+            lows.append(low32.ravel())
+            highs.append(high32.ravel())
+        self._scale = np.concatenate([*scales, []])
+        self._low, self._high = (np.concatenate([*each, []], dtype=np.float32) for each in (lows, highs))
+        space = spaces.Dict(parts)
+        self.space: spaces.Space[Any] = spaces.flatten_space(space) if settings.flat else space
 
     def _selected(self) -> Mapping[str, tuple[Part, Array, Array]]:
         """Return conversion, lower and upper bounds in SI units of the selected parts."""
@@ -99,16 +107,22 @@ class ObservationEncoder:
         control  control of the last step; None if there is none
         """
         self._route, self._control = _in_frame(route, perceived.ego), control or Control()
-        found: dict[str, NDArray[Any]] = {}
-        for name, (encode, scale, low, high) in self._parts.items():
-            values = (encode(perceived) / scale).astype(np.float32)
-            found[name] = values.clip(low, high, out=values)
-        return spaces.flatten(self._space, found) if self.settings.flat else found
+        values = np.empty(len(self._scale))
+        for encode, place, _ in self._parts.values():
+            values[place] = encode(perceived).ravel()
+        values /= self._scale
+        found = values.astype(np.float32)
+        return self._in_parts(found.clip(self._low, self._high, out=found))
 
     def zeros(self) -> Any:
         """Return the observation of a station that is not present."""
-        empty = {name: np.zeros(low.shape, np.float32) for name, (_, _, low, _) in self._parts.items()}
-        return spaces.flatten(self._space, empty) if self.settings.flat else empty
+        return self._in_parts(np.zeros(len(self._scale), np.float32))
+
+    def _in_parts(self, values: NDArray[np.float32]) -> Any:
+        """Return values as the space has them; flat ones are in the order of the parts already."""
+        if self.settings.flat:
+            return values
+        return {name: values[place].reshape(shape) for name, (_, place, shape) in self._parts.items()}
 
     def _ego(self, perceived: StationPerception) -> Array:
         ego, control = perceived.ego, self._control

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.station_action import StationAction
@@ -139,8 +138,7 @@ class StationInterface:
         if self._planner is None:
             return NO_ROUTE
         if self._route[0] != perceived.time:
-            plan = self._planner.plan(perceived.ego, Detections(perceived.time), perceived.goal, perceived.time)
-            self._route = perceived.time, plan.points
+            self._route = perceived.time, self._planner.points_ahead(perceived.ego, perceived.goal)
         return self._route[1]
 
 

@@ -57,6 +57,9 @@ class Scene(Protocol):
     def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> Sequence[int]:
         """Return the same rows as `raycast`, for a few rays in scalar arithmetic."""
 
+    def is_free(self, own: int, origin: Point, target: int) -> bool:
+        """Return True if certainly nothing is between a point of an actor and the box of another, by their rows."""
+
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """Return the light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""
 

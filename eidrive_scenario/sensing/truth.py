@@ -186,19 +186,27 @@ def few_visibilities(
     boxes = view.plain_boxes
     starts: list[Point] = []
     points: list[Point] = []
+    free: list[bool] = []
     for sensor, station, rows in zip(sensors, own, targets, strict=True):
         if rows:
             origin, body = sensor.mounting.position(view, station), boxes[station]
             for row in rows:
+                free.append(scene.is_free(station, origin, row))
+                if free[-1]:
+                    continue
                 aims = _few_points(boxes[row])
                 starts += (
                     [origin] * len(aims) if _above(origin, body, boxes[row]) else few_ray_starts(origin, aims, body)
                 )
                 points += aims
-    met = scene.first_hit(starts, points)
-    shares, number = [], len(SAMPLES)
-    for index, row in enumerate([row for rows in targets for row in rows]):
-        part = met[index * number : (index + 1) * number]
+    met = scene.first_hit(starts, points) if points else ()
+    shares, number, start = [], len(SAMPLES), 0
+    for row, sees_all in zip([row for rows in targets for row in rows], free, strict=True):
+        if sees_all:
+            shares.append(1.0)
+            continue
+        part = met[start : start + number]
+        start += number
         shares.append((part.count(row) + part.count(NOTHING)) / number)
     return shares
 

@@ -82,6 +82,12 @@ class RoutePlanner(Planner):
         acceleration = goal.acceleration if goal is not None and free else 0.0
         return Plan(path.points[part], speeds, reason, acceleration)
 
+    def points_ahead(self, ego: EgoState, goal: Goal | None) -> Array:
+        """Return the points (M, 2) of `plan` without its speeds [m]."""
+        x, y, _ = ego.position.tolist()
+        path = self._advanced_path(x, y, ego.yaw, goal)
+        return path.points[self._progress : self._progress + HORIZON]
+
     def _advanced_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> PlannedPath:
         """Return the path of the goal after setting the progress of the vehicle on it; extended where it continues."""
         path = self._current_path(x, y, yaw, goal)

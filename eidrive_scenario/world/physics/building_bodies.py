@@ -14,7 +14,7 @@ from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.physics.static_body import create_static_body
 from eidrive_scenario.world.road_objects import Building
 
-_MOST = 16
+MOST = 16
 """Maximum number of boxes of a shape in pybullet."""
 
 
@@ -53,5 +53,5 @@ class BuildingBodies:
 
 
 def _groups(buildings: Sequence[Building]) -> Iterator[Sequence[Building]]:
-    for start in range(0, len(buildings), _MOST):
-        yield buildings[start : start + _MOST]
+    for start in range(0, len(buildings), MOST):
+        yield buildings[start : start + MOST]

@@ -44,11 +44,19 @@ class Obstacles:
         for piece in self._solid:
             self._nearby.add(piece, _cells(piece))
 
+    @property
+    def boxes(self) -> list[Box]:
+        """Boxes of all bodies."""
+        return [*self._solid_boxes(), *map(_foliage, self._soft)]
+
     def raise_bodies(self, client: int) -> list[int]:
         """Create the bodies in pybullet and return their handles."""
-        solid = [box for piece in self._solid for box in _solid_boxes(piece)]
-        soft = [_foliage(piece) for piece in self._soft]
+        solid, soft = list(self._solid_boxes()), list(map(_foliage, self._soft))
         return [*_meshes(client, solid, STATIC, RAYS | DRIVEN), *_meshes(client, soft, TERRAIN, RAYS)]
+
+    def _solid_boxes(self) -> Iterator[Box]:
+        for piece in self._solid:
+            yield from _solid_boxes(piece)
 
     def clearance(self, x: float, y: float, most: float) -> float:
         """Return the distance of a point from the nearest solid object, at most `most` [m]."""

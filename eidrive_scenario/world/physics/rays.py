@@ -8,6 +8,7 @@ from operator import itemgetter
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.world.physics.bullet import bullet
@@ -42,11 +43,15 @@ class RayHits(msgspec.Struct, frozen=True):
     normal: Array
 
 
-def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Integers, passed: Integers) -> RayHits:
-    """Cast rays (M, 3) to (M, 3). Bodies whose rows are in `passed` are skipped.
+def cast_rays(
+    client: int, origins: ArrayLike, targets: ArrayLike, row_of_handle: Integers, passed: Integers
+) -> RayHits:
+    """Cast rays (M, 3) to (M, 3), or from or to one point. Bodies whose rows are in `passed` are skipped.
 
     The last entry of `row_of_handle`, for handle -1, is NOTHING.
     """
+    ends = (np.reshape(np.asarray(points, dtype=float), (-1, 3)) for points in (origins, targets))
+    origins, targets = (np.ascontiguousarray(points) for points in np.broadcast_arrays(*ends))
     handles, fraction, normal = _cast(client, origins, targets)
     rows = row_of_handle[handles]
     if len(passed):

@@ -14,6 +14,8 @@ from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildi
 
 _SPACING = 4.0
 """Distance of the points of the ground along a road [m]."""
+_SHORTEST = 4.0
+"""Minimum length of a part of a body that has a separate circle [m]."""
 _MAX_KEPT = 2
 """Maximum number of road networks whose objects stay in the process."""
 
@@ -44,6 +46,12 @@ class RoadScenery:
         return Obstacles(self.road_objects)
 
     @cached_property
+    def circles(self) -> Array:
+        """Circles (3, K) in plan view that cover all bodies: center x, y and radius [m]."""
+        extents = [(x, y, length, width, yaw) for x, y, _, length, width, _, yaw in self.obstacles.boxes]
+        return covering_circles([*extents, *map(plan_extent, self.buildings)])
+
+    @cached_property
     def ground(self) -> Sequence[tuple[Array, Integers]]:
         """Meshes of the ground: vertices (N, 3) [m], faces (M, 3) of rows in them."""
         parts = []
@@ -54,6 +62,27 @@ class RoadScenery:
                 used, faces = np.unique(mesh.faces[start : start + MAX_FACES], return_inverse=True)
                 parts.append((mesh.vertices[used], faces))
         return tuple(parts)
+
+
+def covering_circles(extents: Sequence[tuple[float, float, float, float, float]]) -> Array:
+    """Return circles (3, K) that cover rectangles: center x, y, length, width [m], heading [rad].
+
+    A row of circles covers a long rectangle.
+    """
+    x, y, length, width, yaw = np.reshape(extents, (-1, 5)).T
+    long, wide = np.maximum(length, width), np.minimum(length, width)
+    yaw = np.where(length >= width, yaw, yaw + np.pi / 2.0)
+    count = np.ceil(long / np.maximum(wide, _SHORTEST)).clip(1.0).astype(int)
+    of = np.arange(len(count)).repeat(count)
+    number = np.arange(len(of)) - (np.cumsum(count) - count)[of]
+    part = (long / count)[of]
+    along = (number + 0.5) * part - long[of] / 2.0
+    return np.stack([x[of] + along * np.cos(yaw[of]), y[of] + along * np.sin(yaw[of]), np.hypot(part, wide[of]) / 2.0])
+
+
+def plan_extent(building: Building) -> tuple[float, float, float, float, float]:
+    """Return center x, y, length, width [m] and heading [rad] of a building."""
+    return (*building.center[:2], *building.size[:2], building.yaw)
 
 
 @lru_cache(maxsize=_MAX_KEPT)

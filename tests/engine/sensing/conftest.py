@@ -58,6 +58,9 @@ class BoxScene:
         rows: list[int] = self.raycast(np.array(origins), np.array(targets)).rows.tolist()
         return rows
 
+    def is_free(self, own: int, origin: tuple[float, ...], target: int) -> bool:
+        return False
+
     def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> PlainImage:
         self.images.append((pose, pinhole))
         return PlainImage((pinhole.height, pinhole.width))
