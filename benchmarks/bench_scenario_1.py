@@ -113,7 +113,7 @@ def record_calls(trace: Trace) -> Iterator[None]:
 def without_shortcuts() -> Iterator[None]:
     """Give each building a separate body, and cast all rays of sensors."""
     is_free, most = World.is_free, building_bodies.MOST
-    World.is_free = lambda world, own, origin, target: False  # type: ignore[method-assign]
+    World.is_free = lambda world, own, origin, target: False  # type: ignore[assignment, method-assign]
     building_bodies.MOST = 1
     try:
         yield
