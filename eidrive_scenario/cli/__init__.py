@@ -80,3 +80,6 @@ def main() -> None:
         # Help and usage errors are printed before a command runs.
         print_error(error)
         raise SystemExit(ABORTED) from error
+    finally:
+        # The process ends, and the system frees its memory. A last search for garbage would take 0.1 s.
+        gc.freeze()
