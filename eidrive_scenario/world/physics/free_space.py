@@ -56,15 +56,22 @@ class FreeSpace:
             return False
         if not self._is_clear_of_scenery((view.names[own], view.names[target]), x, y, other[0], other[1], width):
             return False
+        length = math.sqrt(square)
+        ux, uy, sin = dx / length, dy / length, width / length
+        cos = math.sqrt(1.0 - sin * sin)
         for row, box in enumerate(boxes):
             if row in (own, target):
                 continue
-            px, py, reach = box[0] - x, box[1] - y, width + _radius(box)
-            share = (px * dx + py * dy) / square
-            if share > 0.0:
-                share = min(share, 1.0)
-                px, py = px - share * dx, py - share * dy
-            if px * px + py * py <= reach * reach:
+            px, py, reach = box[0] - x, box[1] - y, _radius(box) + MARGIN
+            ahead = px * ux + py * uy
+            # Distance from the tangents to the target, and from the ends of the line
+            if abs(py * ux - px * uy) * cos - ahead * sin > reach or (
+                ahead <= 0.0 and px * px + py * py > reach * reach
+            ):
+                continue
+            if ahead > length and (px - dx) ** 2 + (py - dy) ** 2 > (reach + width) ** 2:
+                continue
+            if not _is_separate(x, y, other, box):
                 return False
         return True
 
@@ -99,6 +106,47 @@ class FreeSpace:
         px, py, dx, dy = center_x - x, center_y - y, to_x - x, to_y - y
         share = ((px * dx + py * dy) / (dx * dx + dy * dy)).clip(0.0, 1.0)
         return float((np.hypot(px - share * dx, py - share * dy) - radius).min())
+
+
+def _is_separate(x: float, y: float, seen: Sequence[float], box: Sequence[float]) -> bool:
+    """Return whether a line in plan view separates a box from a point and another box that is seen from there.
+
+    The sides of the box and the tangents from the point to the other box are tried.
+    """
+    cos, sin = math.cos(box[6]), math.sin(box[6])
+    offsets = [(px - box[0], py - box[1]) for px, py in ((x, y), *_corners(seen, 0.0))]
+    for half, along in (
+        (box[3] / 2.0 + MARGIN, [cos * dx + sin * dy for dx, dy in offsets]),
+        (box[4] / 2.0 + MARGIN, [cos * dy - sin * dx for dx, dy in offsets]),
+    ):
+        if min(along) > half or max(along) < -half:
+            return True
+    ahead_x, ahead_y = seen[0] - x, seen[1] - y
+    # Tangent of the angle of each corner from the direction to the center, which is ahead of the point
+    sides = [
+        ((ahead_x * (py - y) - ahead_y * (px - x)) / (ahead_x * (px - x) + ahead_y * (py - y)), px - x, py - y)
+        for px, py in _corners(seen, MARGIN)
+    ]
+    corners = _corners(box, MARGIN)
+    _, right_x, right_y = min(sides)
+    if all(right_x * (py - y) - right_y * (px - x) < 0.0 for px, py in corners):
+        return True
+    _, left_x, left_y = max(sides)
+    return all(left_x * (py - y) - left_y * (px - x) > 0.0 for px, py in corners)
+
+
+def _corners(box: Sequence[float], margin: float) -> list[tuple[float, float]]:
+    """Return the corners of the footprint of a box with a margin [m]."""
+    x, y, _, length, width, _, yaw = box
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    ahead_x, ahead_y = cos * (length / 2.0 + margin), sin * (length / 2.0 + margin)
+    left_x, left_y = -sin * (width / 2.0 + margin), cos * (width / 2.0 + margin)
+    return [
+        (x + ahead_x + left_x, y + ahead_y + left_y),
+        (x + ahead_x - left_x, y + ahead_y - left_y),
+        (x - ahead_x - left_x, y - ahead_y - left_y),
+        (x - ahead_x + left_x, y - ahead_y + left_y),
+    ]
 
 
 def _radius(box: Sequence[float]) -> float:

@@ -10,6 +10,8 @@ from opendrive_xml import elevation_xml, map_xml, road_xml
 from sample_car import CarFactory
 
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.settings import Mount, TruthSettings
+from eidrive_scenario.sensing.truth import TruthSensor, few_visibilities
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
 
@@ -95,6 +97,39 @@ def test_a_target_behind_a_building_is_not_in_free_space(world: World, car: CarF
     assert not seen[-1]
     assert not any(free and met for free, met in zip(seen, blocked, strict=True))
     assert sum(seen) > 0.5 * blocked.index(True)
+
+
+class RaysOnly:
+    """World without knowledge of free space."""
+
+    def __init__(self, world: World) -> None:
+        self.first_hit = world.first_hit
+
+    def is_free(self, own: int, origin: tuple[float, float, float], target: int) -> bool:
+        return False
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_visibility_is_that_of_rays_alone(car: CarFactory, seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    reach = float(rng.choice([20.0, 60.0, 120.0]))
+    with World() as world:
+        for number in range(int(rng.choice([0, 3, 20]))):
+            (x, y), yaw = rng.uniform(-reach, reach, 2), rng.uniform(-4.0, 4.0)
+            world.add_building(f"House {number}", (x, y, 4.0), (*rng.uniform(1.0, 20.0, 2), 8.0), yaw)
+        for number in range(7):
+            (x, y), yaw = rng.uniform(-reach, reach, 2), rng.choice([0.0, math.pi / 2.0, rng.uniform(-4.0, 4.0)])
+            world.add(car(f"Car {number}"), Placement(x, y, yaw=yaw))
+        view = world.view()
+        sensors = [
+            TruthSensor(TruthSettings(mount=Mount(x=1.35, y=0.0, z=float(z))), world.spec(name))
+            for name, z in zip(world.names, rng.choice([0.4, 1.0, 1.5], 7), strict=True)
+        ]
+        own = list(range(7))
+        targets = [[row for row in own if row != station] for station in own]
+        shares = few_visibilities(sensors, own, targets, world, view)
+        assert shares == few_visibilities(sensors, own, targets, RaysOnly(world), view)  # type: ignore[arg-type]
+    assert 0.0 < sum(shares) < len(shares)
 
 
 @pytest.mark.parametrize("kind", ["pole", "tree", "vegetation"])
