@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.crossing import crossing, ray_starts
 from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
@@ -57,17 +57,12 @@ class Lidar(Sensor):
         rays = directions @ pose[:3, :3].T
         origin = np.broadcast_to(pose[:3, 3], directions.shape)
         targets = origin + settings.range * rays
-        own = view.boxes[row][None]
-        if self._on_mast:
-            starts, clear = ray_starts(origin[None], targets[None], own)[0], np.arange(len(origin))
-        else:
-            enter, leave = crossing(origin[None], targets[None], own)
-            starts, clear = origin, np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])
+        clear, starts, near = self._beyond_own_body(origin, targets, view.boxes[row])
         sensor_name = {"sensor": self.name} if view.unseen_by else {}
-        hits = scene.raycast(np.ascontiguousarray(starts[clear]), targets[clear], **sensor_name)
+        hits = scene.scan(row, pose[:3, 3], starts, targets[clear], near, **sensor_name)
         rows = np.asarray(hits.rows)
         hit = rows != NOTHING
-        begin = np.linalg.norm(starts[clear] - pose[:3, 3], axis=1) if self._on_mast else 0.0
+        begin = np.linalg.norm(starts - pose[:3, 3], axis=1) if self._on_mast else 0.0
         distance = np.where(hit, begin + np.asarray(hits.fraction) * (settings.range - begin), np.inf)
         weather = scene.weather
         facing = np.abs(np.einsum("mi,mi->m", np.asarray(hits.normal), rays[clear]))
@@ -89,6 +84,19 @@ class Lidar(Sensor):
         return LidarReading(
             directions[selected] * length[:, None], back.intensity[kept], pose, ring[selected], azimuth[selected]
         )
+
+    def _beyond_own_body(self, origin: Array, targets: Array, own: Array) -> tuple[Integers, Array, NDArray[np.bool_]]:
+        """Return the rows (K,) of rays that do not hit the ego body, their starts, and whether they pass near it."""
+        if self._on_mast:
+            starts = ray_starts(origin[None], targets[None], own[None])[0]
+            return np.arange(len(origin)), starts, np.zeros(len(origin), dtype=bool)
+        around = own + np.array([0.0, 0.0, 0.0, *(2.0 * _NEAR,) * 3, 0.0])
+        near = np.flatnonzero(_meets(origin, targets, around))
+        hit = near[_meets(origin[near], targets[near], own)]
+        passes = np.zeros(len(origin), dtype=bool)
+        passes[near] = True
+        clear = np.delete(np.arange(len(origin)), hit)
+        return clear, np.ascontiguousarray(origin[clear]), passes[clear]
 
     def _columns(self, time: float) -> NDArray[np.int64]:
         """Return the numbers of the columns since the last reading."""
@@ -122,4 +130,12 @@ class Lidar(Sensor):
         return np.asarray(draws.random(len(intensity)) >= lost)
 
 
+def _meets(origins: Array, targets: Array, box: Array) -> NDArray[np.bool_]:
+    """Return whether rays (M, 3) meet a box (7,)."""
+    enter, leave = crossing(origins[None], targets[None], box[None])
+    return np.asarray(((enter < leave) & (leave > 0.0))[0])
+
+
+_NEAR = 0.02
+"""Distance from the ego body within which only ray casts tell whether a ray hits it [m]."""
 _CLEAR = Weather(visual_range=1e12)

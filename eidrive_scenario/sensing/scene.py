@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
@@ -53,6 +54,14 @@ class Scene(Protocol):
 
     def raycast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHitsView:
         """Cast rays from (M, 3) to (M, 3) [m] for the sensor of this name, from which some actors may be hidden."""
+
+    def scan(
+        self, own: int, apex: Array, origins: Array, targets: Array, near: NDArray[np.bool_], *, sensor: str = ""
+    ) -> RayHitsView:
+        """Return the same as `raycast` for many rays on lines through one point (3,) of the actor in the row `own`.
+
+        near  (M,) rays that may hit this actor
+        """
 
     def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> Sequence[int]:
         """Return the same rows as `raycast`, for a few rays in scalar arithmetic."""

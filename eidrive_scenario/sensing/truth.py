@@ -71,7 +71,7 @@ def read_truth(
         return []
     if view.unseen_by:
         return [_read_single(sensor, row, scene, view) for sensor, row in zip(sensors, rows, strict=True)]
-    unseen = [view.rows[name] for name in view.unseen if name in view.rows]
+    unseen = view.hidden_rows()
     select = few_candidates if len(sensors) * len(view.names) <= FEW_PAIRS else candidates
     targets = select(sensors, rows, view, unseen)
     shares: Sequence[float] = ()
@@ -86,7 +86,7 @@ def read_truth(
 
 
 def _read_single(sensor: TruthSensor, row: int, scene: Scene, view: WorldView) -> TruthReading:
-    unseen = [view.rows[name] for name in view.hidden_from(sensor.name) if name in view.rows]
+    unseen = view.hidden_rows(sensor.name)
     targets = candidates([sensor], [row], view, unseen)
     shares = visibilities([sensor], [row], targets, scene, view, sensor.name) if targets[0] else []
     return _reading(sensor, targets[0], shares, view)

@@ -87,3 +87,12 @@ class Appearance:
         """Motion of a pedestrian by the standard; empty if it is not specified."""
         held = self.animations.get("motion")
         return held.what if held is not None else ""
+
+
+def hidden_actors(appearances: Mapping[str, Appearance]) -> tuple[tuple[str, ...], dict[str, tuple[str, ...]]]:
+    """Return the actors that are hidden from sensors in general, and those for sensors with separate values."""
+    by_sensor = {
+        sensor: tuple(name for name, look in appearances.items() if not look.visibility.by(sensor))
+        for sensor in dict.fromkeys(name for look in appearances.values() for name in look.visibility.named)
+    }
+    return tuple(name for name, look in appearances.items() if not look.visibility.sensors), by_sensor

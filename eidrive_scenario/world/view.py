@@ -86,6 +86,10 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
         """Return the actors that the scenario hides from the sensor of this name."""
         return self.unseen_by.get(sensor, self.unseen)
 
+    def hidden_rows(self, sensor: str = "") -> list[int]:
+        """Return the rows of the present actors among them."""
+        return [self.rows[name] for name in self.hidden_from(sensor) if name in self.rows]
+
     @cached_property
     def rows(self) -> Mapping[str, int]:
         """Row by name."""

@@ -15,7 +15,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import render, scene
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.actor_table import ActorTable
-from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.appearance import Appearance, hidden_actors
 from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
 from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
 from eidrive_scenario.world.physics.bullet import connect, disconnect
@@ -25,7 +25,7 @@ from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.free_space import FreeSpace
 from eidrive_scenario.world.physics.ground import GroundUnder
-from eidrive_scenario.world.physics.rays import RayHits, cast_rays, first_hits
+from eidrive_scenario.world.physics.rays import RayHits, cast_rays, cast_some, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.road_objects import Building, signal_heads
 from eidrive_scenario.world.view import Contact, WorldView
@@ -165,12 +165,7 @@ class World:
         self._signals = signals
         if appearances is not self._appearances:
             self._appearances = appearances
-            self._unseen = tuple(name for name, look in appearances.items() if not look.visibility.sensors)
-            sensors = dict.fromkeys(name for look in appearances.values() for name in look.visibility.named)
-            self._unseen_by = {
-                sensor: tuple(name for name, look in appearances.items() if not look.visibility.by(sensor))
-                for sensor in sensors
-            }
+            self._unseen, self._unseen_by = hidden_actors(appearances)
             self._view = None
 
     @property
@@ -229,17 +224,23 @@ class World:
         `sensor` is its name. Without a sensor, the visibility for sensors in general is used.
         """
         self._refresh()
-        rows = self.view().rows
-        unseen = [rows[name] for name in self._unseen_by.get(sensor, self._unseen) if name in rows]
-        passed = np.array([*(rows[name] for name in ignore), *unseen], dtype=np.int64)
+        passed = [*map(self.view().row, ignore), *self.view().hidden_rows(sensor)]
         return cast_rays(self._client, origins, targets, self._actors.row_of_handle, passed)
+
+    def scan(
+        self, own: int, apex: Array, origins: Array, targets: Array, near: NDArray[np.bool_], *, sensor: str = ""
+    ) -> RayHits:
+        """Return the same as `raycast` for many rays on lines through one point of the actor `own`; see `Scene`."""
+        self._refresh()
+        view, table = self.view(), self._actors.row_of_handle
+        cast = near | self._free_space.may_meet(view, own, apex, targets)
+        return cast_some(self._client, origins, targets, table, view.hidden_rows(sensor), cast)
 
     def first_hit(self, origins: Sequence[Sequence[float]], targets: Sequence[Sequence[float]]) -> list[int]:
         """Return the rows of the first hits of rays as `raycast` does, but faster for up to a thousand rays."""
         self._refresh()
         if self._unseen:
-            rows: list[int] = self.raycast(origins, targets).rows.tolist()
-            return rows
+            return list(self.raycast(origins, targets).rows.tolist())
         return first_hits(self._client, origins, targets, self._actors.row_in_list)
 
     def is_free(self, own: int, origin: Vector3, target: int) -> bool:
@@ -248,8 +249,7 @@ class World:
 
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
         """Return whether the line of sight from the origin (3,) to each target (M, 3) is free, except for `ignore`."""
-        clear: NDArray[np.bool_] = self.raycast(origin, targets, ignore).fraction >= 1.0
-        return clear
+        return np.asarray(self.raycast(origin, targets, ignore).fraction >= 1.0)
 
     def camera(
         self,

@@ -6,13 +6,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.world.physics.scan import may_meet
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.view import WorldView
 
 Point = tuple[float, float, float]
 
+FEW = 500
+"""Number of rays below which a search for objects in their directions takes longer than to cast them."""
 MARGIN = 0.1
 """Minimum distance of an object from free space [m]."""
 APART = 1.0
@@ -75,6 +79,24 @@ class FreeSpace:
                 return False
         return True
 
+    def may_meet(self, view: WorldView, own: int, apex: Array, targets: Array) -> NDArray[np.bool_]:
+        """Return whether rays from a point (3,) to targets (M, 3) may meet anything but the plane z = 0.
+
+        own  row of an actor that is ignored
+
+        All are True if few rays are given, if roads are not in the plane, or if an actor is not upright.
+        """
+        if len(targets) < FEW or apex[2] <= 0.0 or not (self._scenery.level and self._is_upright(view)):
+            return np.ones(len(targets), dtype=bool)
+        x, y, z, length, width, height, _ = np.delete(view.boxes, own, axis=0).T
+        actors = np.stack([x, y, np.hypot(length, width) / 2.0, z + height / 2.0])
+        return may_meet(apex, targets, np.concatenate([actors, self._static()], axis=1))
+
+    def _static(self) -> Array:
+        if self._circles is None:
+            self._circles = self._scenery.circles()
+        return self._circles
+
     def _is_upright(self, view: WorldView) -> bool:
         """Whether the pitch and roll of all actors are 0, so that their bodies are in their bounding boxes."""
         if self._upright is None or self._upright[0] is not view:
@@ -98,9 +120,7 @@ class FreeSpace:
 
     def _gap(self, x: float, y: float, to_x: float, to_y: float) -> float:
         """Return the distance of a line from the nearest static object [m]."""
-        if self._circles is None:
-            self._circles = self._scenery.circles()
-        center_x, center_y, radius = self._circles
+        center_x, center_y, radius, _ = self._static()
         if not len(radius):
             return math.inf
         px, py, dx, dy = center_x - x, center_y - y, to_x - x, to_y - y

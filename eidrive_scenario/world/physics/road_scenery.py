@@ -9,7 +9,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
-from eidrive_scenario.world.physics.obstacles import MAX_FACES, Obstacles
+from eidrive_scenario.world.physics.obstacles import MAX_FACES, Box, Obstacles
 from eidrive_scenario.world.road_objects import Building, RoadObjectBody, buildings, road_object_bodies
 
 _SPACING = 4.0
@@ -47,9 +47,8 @@ class RoadScenery:
 
     @cached_property
     def circles(self) -> Array:
-        """Circles (3, K) in plan view that cover all bodies: center x, y and radius [m]."""
-        extents = [(x, y, length, width, yaw) for x, y, _, length, width, _, yaw in self.obstacles.boxes]
-        return covering_circles([*extents, *map(plan_extent, self.buildings)])
+        """Circles (4, K) in plan view that cover all bodies: center x, y, radius, and top of the body [m]."""
+        return covering_circles([*self.obstacles.boxes, *map(standing_box, self.buildings)])
 
     @cached_property
     def ground(self) -> Sequence[tuple[Array, Integers]]:
@@ -64,12 +63,9 @@ class RoadScenery:
         return tuple(parts)
 
 
-def covering_circles(extents: Sequence[tuple[float, float, float, float, float]]) -> Array:
-    """Return circles (3, K) that cover rectangles: center x, y, length, width [m], heading [rad].
-
-    A row of circles covers a long rectangle.
-    """
-    x, y, length, width, yaw = np.reshape(extents, (-1, 5)).T
+def covering_circles(boxes: Sequence[Box]) -> Array:
+    """Return circles (4, K) that cover boxes: center x, y, radius, and top [m]. A row of them covers a long box."""
+    x, y, bottom, length, width, height, yaw = np.reshape(boxes, (-1, 7)).T
     long, wide = np.maximum(length, width), np.minimum(length, width)
     yaw = np.where(length >= width, yaw, yaw + np.pi / 2.0)
     count = np.ceil(long / np.maximum(wide, _SHORTEST)).clip(1.0).astype(int)
@@ -77,12 +73,14 @@ def covering_circles(extents: Sequence[tuple[float, float, float, float, float]]
     number = np.arange(len(of)) - (np.cumsum(count) - count)[of]
     part = (long / count)[of]
     along = (number + 0.5) * part - long[of] / 2.0
-    return np.stack([x[of] + along * np.cos(yaw[of]), y[of] + along * np.sin(yaw[of]), np.hypot(part, wide[of]) / 2.0])
+    center_x, center_y = x[of] + along * np.cos(yaw[of]), y[of] + along * np.sin(yaw[of])
+    return np.stack([center_x, center_y, np.hypot(part, wide[of]) / 2.0, (bottom + height)[of]])
 
 
-def plan_extent(building: Building) -> tuple[float, float, float, float, float]:
-    """Return center x, y, length, width [m] and heading [rad] of a building."""
-    return (*building.center[:2], *building.size[:2], building.yaw)
+def standing_box(building: Building) -> Box:
+    """Return the box of a building, with the height of its lower end."""
+    x, y, z = building.center
+    return x, y, z - building.size[2] / 2.0, *building.size, building.yaw
 
 
 @lru_cache(maxsize=_MAX_KEPT)

@@ -15,7 +15,7 @@ from eidrive_scenario.world.physics.building_bodies import BuildingBodies
 from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.physics.ground import is_level
 from eidrive_scenario.world.physics.obstacles import Obstacles
-from eidrive_scenario.world.physics.road_scenery import covering_circles, plan_extent, road_scenery
+from eidrive_scenario.world.physics.road_scenery import covering_circles, road_scenery, standing_box
 from eidrive_scenario.world.physics.spatial_grid import SpatialGrid, grid_cells
 from eidrive_scenario.world.physics.static_body import create_static_body
 from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
@@ -90,10 +90,10 @@ class Scenery:
         return bool(self._obstacle_handles)
 
     def circles(self) -> Array:
-        """Return circles (3, K) in plan view that cover all buildings and road objects: center x, y and radius [m]."""
+        """Return circles (4, K) in plan view that cover all static objects: center x, y, radius, and top [m]."""
         if self._of_roads is None:
-            return covering_circles([plan_extent(building) for building in self.buildings])
-        added = [plan_extent(building) for building in self.buildings[len(self._of_roads.buildings) :]]
+            return covering_circles([standing_box(building) for building in self.buildings])
+        added = [standing_box(building) for building in self.buildings[len(self._of_roads.buildings) :]]
         return np.concatenate([self._of_roads.circles, covering_circles(added)], axis=1)
 
     def name_of(self, handle: int, position: Vector3) -> str:

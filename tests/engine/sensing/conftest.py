@@ -54,6 +54,9 @@ class BoxScene:
             normals.append(normal)
         return Hits(np.array(rows, dtype=np.int64), np.array(fractions), np.array(normals).reshape(-1, 3))
 
+    def scan(self, own: int, apex: Array, origins: Array, targets: Array, near: Array) -> Hits:
+        return self.raycast(origins, targets)
+
     def first_hit(self, origins: Sequence[tuple[float, ...]], targets: Sequence[tuple[float, ...]]) -> list[int]:
         rows: list[int] = self.raycast(np.array(origins), np.array(targets)).rows.tolist()
         return rows
