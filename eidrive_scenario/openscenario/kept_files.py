@@ -27,7 +27,9 @@ class KeptFiles(Generic[K, V]):
 
     def put(self, key: K, value: V, size: int) -> None:
         """Store the value of a file of this size [byte]. Larger files than the maximum are not kept."""
+        if size > self._max_size:
+            return
         self._kept[key] = value, size
         self._kept.move_to_end(key)
-        while self._kept and sum(each for _, each in self._kept.values()) > self._max_size:
+        while sum(each for _, each in self._kept.values()) > self._max_size:
             self._kept.popitem(last=False)

@@ -87,7 +87,7 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
         return self.unseen_by.get(sensor, self.unseen)
 
     def hidden_rows(self, sensor: str = "") -> list[int]:
-        """Return the rows of the present actors among them."""
+        """Return the rows of the actors of `hidden_from` that are present."""
         return [self.rows[name] for name in self.hidden_from(sensor) if name in self.rows]
 
     @cached_property
