@@ -96,7 +96,7 @@ class Lidar(Sensor):
         passes = np.zeros(len(origin), dtype=bool)
         passes[near] = True
         clear = np.delete(np.arange(len(origin)), hit)
-        return clear, np.ascontiguousarray(origin[clear]), passes[clear]
+        return clear, origin[clear], passes[clear]
 
     def _columns(self, time: float) -> NDArray[np.int64]:
         """Return the numbers of the columns since the last reading."""

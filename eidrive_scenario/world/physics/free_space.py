@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.world.physics.scan import may_meet
+from eidrive_scenario.world.actor import Vector3
+from eidrive_scenario.world.physics.scan import MARGIN, may_meet
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.view import WorldView
 
-Point = tuple[float, float, float]
-
 FEW = 500
 """Number of rays below which a search for objects in their directions takes longer than to cast them."""
-MARGIN = 0.1
-"""Minimum distance of an object from free space [m]."""
 APART = 1.0
 """Minimum distance between two actors with free space between them [m]."""
 
@@ -42,7 +39,7 @@ class FreeSpace:
         self._circles = None
         self._gaps.clear()
 
-    def is_free(self, view: WorldView, own: int, origin: Point, target: int) -> bool:
+    def is_free(self, view: WorldView, own: int, origin: Vector3, target: int) -> bool:
         """Return True if certainly nothing is between a point of one actor and the bounding box of another.
 
         own, target  rows of the actors in the view

@@ -11,8 +11,8 @@ from eidrive_scenario.arrays import Array
 
 _BINS = 720
 """Number of directions in plan view in which objects are searched."""
-_MARGIN = 0.1
-"""Minimum distance of a ray from an object that it does not meet [m]."""
+MARGIN = 0.1
+"""Minimum distance of an object from free space, or from a ray that does not meet it [m]."""
 
 
 def may_meet(apex: Array, targets: Array, circles: Array) -> NDArray[np.bool_]:
@@ -30,15 +30,15 @@ def may_meet(apex: Array, targets: Array, circles: Array) -> NDArray[np.bool_]:
     near, top = near[direction], top[direction]
     # Height of the ray at the nearest object in its direction
     height = apex[2] + rise * np.minimum(near / np.maximum(length, 1e-9), 1.0)
-    met: NDArray[np.bool_] = (near <= length + _MARGIN) & (height >= -_MARGIN) & ((rise <= 0.0) | (height <= top))
-    met |= length < _MARGIN
+    met: NDArray[np.bool_] = (near <= length + MARGIN) & (height >= -MARGIN) & ((rise <= 0.0) | (height <= top))
+    met |= length < MARGIN
     return met
 
 
 def _nearest_and_highest(apex: Array, circles: Array) -> tuple[Array, Array]:
     """Return the distance of the nearest object in each direction, infinite without one, and the top of the highest."""
     x, y, radius, top = circles
-    x, y, radius, top = x - apex[0], y - apex[1], radius + _MARGIN, top + _MARGIN
+    x, y, radius, top = x - apex[0], y - apex[1], radius + MARGIN, top + MARGIN
     away = np.hypot(x, y)
     half = np.where(away > radius, np.arcsin(np.minimum(radius / np.maximum(away, radius), 1.0)), math.pi)
     center, scale = np.arctan2(y, x) + math.pi, _BINS / (2.0 * math.pi)
