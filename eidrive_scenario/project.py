@@ -39,6 +39,19 @@ def select_project(folder: Path) -> None:
         os.environ[VARIABLE] = str(path.parent)
 
 
+def unused_project(path: Path) -> Path | None:
+    """Return the folder of the project that contains a file, if it is another one than the selected project."""
+    path = path.absolute()
+    file = next((file for above in path.parents if (file := above / _FILE).is_file()), None)
+    selected = os.environ.get(VARIABLE)
+    try:
+        if file is None or _table(file) is None or (selected and Path(selected).resolve() == file.parent.resolve()):
+            return None
+    except (OSError, SettingError):
+        return None
+    return file.parent
+
+
 def project_entry_points() -> dict[str, tuple[EntryPoint, ...]]:
     """Return the entry points of the selected project by kind, and put its folders on the path of imports.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.added_options import Criteria, Drive, Planner
-from eidrive_scenario.cli.error_output import print_error
+from eidrive_scenario.cli.error_output import print_error, print_unused_projects
 from eidrive_scenario.cli.hung_check import HungCheck
 from eidrive_scenario.cli.option_values import check_seconds
 from eidrive_scenario.cli.supervision import supervise
@@ -79,6 +79,7 @@ def check(
             printed[level].update(dict.fromkeys(found))
         if isinstance(report, DistributionCheckReport) and report.runs:
             typer.echo(f"{path}: {_count(report.runs, 'run')}")
+    print_unused_projects(printed["error"])
     counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in printed.items())]
     typer.echo(", ".join(counts if printed["note"] else counts[:-1]))
     if aborted:

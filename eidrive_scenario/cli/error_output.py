@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import traceback
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
-from eidrive_scenario.errors import EidriveError, ExtensionError, InputError, SimulationError
+from eidrive_scenario.errors import Diagnostic, EidriveError, ExtensionError, InputError, SimulationError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
+from eidrive_scenario.project import VARIABLE, unused_project
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
 """Exit codes of shells: 128 + SIGINT, 128 + SIGPIPE."""
@@ -28,6 +31,7 @@ class Guarded(TyperGroup):
         except InputError as error:
             for diagnostic in error.diagnostics:
                 typer.echo(str(diagnostic), err=True)
+            print_unused_projects(error.diagnostics)
             raise typer.Exit(INVALID_INPUT) from error
         except KeyboardInterrupt as error:
             typer.echo("interrupted", err=True)
@@ -66,6 +70,21 @@ def print_error(error: BaseException, what: str = "run", file: object = None) ->
     typer.echo(f"{prefix}internal error: {type(error).__name__}: {error}", err=True)
     typer.echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) prints the traceback; please report it", err=True)
     print_notes(error)
+
+
+def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
+    """Print on stderr which projects may define unknown extensions, if the extensions of these projects are not used.
+
+    They are not imported for their files alone, because scenarios of others must not execute code.
+    """
+    from eidrive_scenario.registry import GROUPS, singular
+
+    unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model", "command"))
+    sources = dict.fromkeys(one.source for one in diagnostics if one.source and one.message.startswith(unknown))
+    for folder in dict.fromkeys(unused_project(Path(source)) for source in sources):
+        if folder is not None:
+            where = f"in {folder}, or with {VARIABLE}={shlex.quote(str(folder))}"
+            typer.echo(f"extensions of the project of this file are used {where}", err=True)
 
 
 def show_traceback(error: BaseException) -> None:

@@ -186,8 +186,8 @@ class World:
 
         A placement of a driven actor is a teleport. Raise SimulationError if a name is not present.
         """
-        for name in placements.keys() | controls.keys():
-            self._body(name)
+        if absent := {*placements, *controls} - self._bodies.keys():
+            self._body(min(absent))
         for name, body in self._bodies.items():
             placement = placements.get(name)
             if isinstance(body, ScriptedBody):

@@ -36,7 +36,7 @@ class Body(ABC):
         """Whether the pose of the rigid body is outdated. It is updated before pybullet is used."""
         self.yaw_rate = 0.0
         self.acceleration: Vector3 = (0.0, 0.0, 0.0)
-        self._dt = dt
+        self._dt, self._offset = dt, spec.offset
         self._stand(placement)
         self.velocity = self._along_heading(placement.speed)
         self.velocity_before = self.velocity
@@ -72,15 +72,15 @@ class Body(ABC):
 
     def _pose(self, x: float, y: float, z: float, yaw: float, pitch: float, roll: float) -> None:
         self.x, self.y, self.z, self.yaw, self.pitch, self.roll = x, y, z, yaw, pitch, roll
-        ox, oy, oz = self.spec.offset
-        cos, sin = math.cos(yaw), math.sin(yaw)
+        ox, oy, oz = self._offset
+        self._cos, self._sin = cos, sin = math.cos(yaw), math.sin(yaw)
         self.center_x, self.center_y, self.center_z = x + cos * ox - sin * oy, y + sin * ox + cos * oy, z + oz
 
     def _along_heading(self, speed: float) -> Vector3:
         if self.pitch == 0.0:
-            return speed * math.cos(self.yaw), speed * math.sin(self.yaw), 0.0
+            return speed * self._cos, speed * self._sin, 0.0
         level = speed * math.cos(self.pitch)
-        return level * math.cos(self.yaw), level * math.sin(self.yaw), -speed * math.sin(self.pitch)
+        return level * self._cos, level * self._sin, -speed * math.sin(self.pitch)
 
     def _accelerate_to(self, velocity: Vector3) -> None:
         old, dt = self.velocity, self._dt
@@ -164,28 +164,29 @@ class ScriptedBody(Body):
 
         The velocity along the heading is the given speed. The lateral one follows from the distance if there is any.
         """
-        p = placement
-        if self._resting and p.speed == 0.0 and self._from == (p.x, p.y, p.z, p.yaw, p.pitch, p.roll):
+        p, dt = placement, self._dt
+        px, py, pz, pyaw, pitch, speed = p.x, p.y, p.z, p.yaw, p.pitch, p.speed
+        if self._resting and speed == 0.0 and self._from == (px, py, pz, pyaw, pitch, p.roll):
             return
         x, y, z, yaw = self.x, self.y, self.z, self.yaw
-        self._from = (x, y, z, yaw, self.pitch, self.roll)
+        self._from = before = (x, y, z, yaw, self.pitch, self.roll)
         was_moving = self.yaw_rate != 0.0 or self.velocity != STILL
-        self._stand(placement)
-        self.moved = self._from != (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
-        along = self._along_heading(placement.speed)
-        if placement.teleport:
-            self._from = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
+        self._pose(px, py, pz, pyaw, pitch, p.roll)
+        self.speed = speed
+        self.moved = before != (px, py, pz, pyaw, pitch, p.roll)
+        along = self._along_heading(speed)
+        if p.teleport:
+            self._from = (px, py, pz, pyaw, pitch, p.roll)
             self.velocity = self.velocity_before = along
             self.acceleration, self.yaw_rate = STILL, 0.0
         else:
-            dt = self._dt
-            if placement.across:
-                vx, vy, vz = (self.x - x) / dt, (self.y - y) / dt, (self.z - z) / dt
+            if p.across:
+                vx, vy, vz = (px - x) / dt, (py - y) / dt, (pz - z) / dt
                 fx, fy, fz = self._along_heading(1.0)
-                excess = placement.speed - (vx * fx + vy * fy + vz * fz)
+                excess = speed - (vx * fx + vy * fy + vz * fz)
                 along = vx + excess * fx, vy + excess * fy, vz + excess * fz
             self._accelerate_to(along)
-            self.yaw_rate = wrap_angle(self.yaw - yaw) / dt if self.yaw != yaw else 0.0
+            self.yaw_rate = wrap_angle(pyaw - yaw) / dt if pyaw != yaw else 0.0
         is_moving = self.moved or self.velocity != STILL
         self.stale = self.stale or was_moving or is_moving
         self._resting, self._resting_state = not is_moving and self.acceleration == STILL, None

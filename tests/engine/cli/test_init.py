@@ -123,10 +123,13 @@ def test_commands_use_criterion_of_project_without_installation(eidrive: Eidrive
         done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False, env=environment)
         assert done.returncode == 0, done.stdout + done.stderr
         assert ("keep_gap        passed" in done.stdout) == (arguments[0] == "run")
-    outside = [sys.executable, "-m", "eidrive_scenario", "check", str(folder / "scenarios")]
-    done = subprocess.run(outside, cwd=tmp_path, capture_output=True, text=True, check=False, env=environment)
-    assert done.returncode == 2
-    assert "unknown criterion 'keep_gap'" in done.stdout
+    for command_name, named in (("check", False), ("run", False), ("check", True)):
+        outside = [sys.executable, "-m", "eidrive_scenario", command_name, str(folder / "scenarios" / "cut_in.xosc")]
+        given = {**environment, "EIDRIVE_PROJECT": str(folder)} if named else environment
+        done = subprocess.run(outside, cwd=tmp_path, capture_output=True, text=True, check=False, env=given)
+        assert done.returncode == (0 if named else 2)
+        assert ("unknown criterion 'keep_gap'" in done.stdout + done.stderr) is not named
+        assert (f"or with EIDRIVE_PROJECT={folder}" in done.stderr) is not named
 
 
 @pytest.mark.parametrize(
