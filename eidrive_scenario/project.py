@@ -41,13 +41,12 @@ def select_project(folder: Path) -> None:
 
 def unused_project(path: Path) -> Path | None:
     """Return the folder of the project that contains a file, if it is another one than the selected project."""
-    path = path.absolute()
-    file = next((file for above in path.parents if (file := above / _FILE).is_file()), None)
     selected = os.environ.get(VARIABLE)
     try:
+        file = next((file for above in path.absolute().parents if (file := above / _FILE).is_file()), None)
         if file is None or _table(file) is None or (selected and Path(selected).resolve() == file.parent.resolve()):
             return None
-    except (OSError, SettingError):
+    except (OSError, ValueError, SettingError):
         return None
     return file.parent
 
