@@ -15,7 +15,6 @@ from typer.core import TyperGroup
 
 from eidrive_scenario.errors import Diagnostic, EidriveError, ExtensionError, InputError, SimulationError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
-from eidrive_scenario.project import VARIABLE, unused_project
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
 """Exit codes of shells: 128 + SIGINT, 128 + SIGPIPE."""
@@ -77,6 +76,7 @@ def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
 
     They are not imported for their files alone, because scenarios of others must not execute code.
     """
+    from eidrive_scenario.project import VARIABLE, unused_project
     from eidrive_scenario.registry import GROUPS, singular
 
     unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model", "command"))

@@ -31,7 +31,7 @@ def satisfies_rule(value: float, rule: model.Rule, limit: float) -> bool:
     """Compare `value` with `limit` by a Rule of the standard; NaN fulfills no rule."""
     if value != value:
         return False
-    match rule.value:
+    match rule._value_:
         case "greaterThan":
             return value > limit + EPSILON
         case "greaterOrEqual":
@@ -132,8 +132,12 @@ class EntityCondition(Condition):
     def holds(self, context: ConditionContext) -> bool:
         """Evaluate all entities and combine them by the rule; each is evaluated so that histories are complete."""
         holds_for, view = self._checked_holds_for if self.third_party else self.holds_for, context.view
-        self.fulfilled = tuple([name for name in self.entities if name in view and holds_for(context, name)])
-        return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
+        fulfilled = []
+        for name in self.entities:
+            if name in view and holds_for(context, name):
+                fulfilled.append(name)
+        self.fulfilled = tuple(fulfilled)
+        return len(fulfilled) == len(self.entities) if self.rule == "all" else bool(fulfilled)
 
     def _checked_holds_for(self, context: ConditionContext, entity: str) -> bool:
         held: object = self.holds_for(context, entity)

@@ -75,23 +75,19 @@ class StoryElement(Composite):
         A stop trigger is evaluated from the tick after the start on, that of the storyboard from the first tick on.
         """
         record = self.record
-        if record.state is ElementState.COMPLETE:
+        state = record.state
+        if state is ElementState.COMPLETE:
             return
-        has_changed = self._tried_at == self.context.progress.tick
-        if (
-            record.state is ElementState.RUNNING
-            and not has_changed
-            and self.stop_leaf is not None
-            and self.stop_leaf.is_fired()
-        ):
-            self.stop_element(self.stop_leaf.trigger.why)
-            return
-        if (
-            record.state is ElementState.STANDBY
-            and not has_changed
-            and (self.start_leaf is None or self.start_leaf.is_fired())
-        ):
-            self.start(NO_TRIGGER if self.start_leaf is None else self.start_leaf.trigger.why)
+        if self._tried_at != self.context.progress.tick:
+            if state is ElementState.RUNNING:
+                stop = self.stop_leaf
+                if stop is not None and stop.is_fired():
+                    self.stop_element(stop.trigger.why)
+                    return
+            elif state is ElementState.STANDBY:
+                start = self.start_leaf
+                if start is None or start.is_fired():
+                    self.start(NO_TRIGGER if start is None else start.trigger.why)
         if record.state is ElementState.RUNNING:
             for element in self.elements:
                 if element.record.state is not ElementState.COMPLETE:

@@ -50,17 +50,22 @@ class ConditionEvaluator:
 
     def evaluate(self, context: RuntimeContext) -> bool:
         """Evaluate the condition with edge and delay; repeatedly within a tick only if its value can change."""
-        is_repeated = self._evaluated_at == context.progress.tick
-        if is_repeated and not self.condition.instant:
+        tick, condition = context.progress.tick, self.condition
+        is_repeated = self._evaluated_at == tick
+        if is_repeated and not condition.instant:
             return self.result
-        self._evaluated_at = context.progress.tick
+        self._evaluated_at = tick
         self.evaluations += 1
-        held: object = self.condition.holds(context)
-        result = self._apply_edge(held if held is True or held is False else truth(self.condition, held))
-        if is_repeated and self.edge != "none" and self._edge_in_tick:
-            return self.result
-        self._edge_in_tick = result
-        before, self._fulfilled = self._fulfilled, getattr(self.condition, "fulfilled", ())
+        held: object = condition.holds(context)
+        result = held if held is True or held is False else truth(condition, held)
+        if self.edge == "none":
+            self.value = result
+        else:
+            result = self._apply_edge(result)
+            if is_repeated and self._edge_in_tick:
+                return self.result
+            self._edge_in_tick = result
+        before, self._fulfilled = self._fulfilled, getattr(condition, "fulfilled", ())
         entities = self._fulfilled if self.value else before
         if self.delay <= 0.0:
             self.result, self.triggering = result, entities
@@ -87,8 +92,6 @@ class ConditionEvaluator:
 
     def _apply_edge(self, value: bool) -> bool:
         before, self.value = self.value, value
-        if self.edge == "none":
-            return value
         if before is None or before == value:
             return False
         return self.edge == "risingOrFalling" or (self.edge == "rising") == value
@@ -114,8 +117,11 @@ class ConditionGroup:
 
     def evaluate(self, context: RuntimeContext) -> bool:
         """Whether all conditions are true. Each is evaluated, as edges and delays depend on earlier values."""
-        results = [monitor.evaluate(context) for monitor in self.monitors]
-        return bool(results) and all(results)
+        holds = bool(self.monitors)
+        for monitor in self.monitors:
+            if not monitor.evaluate(context):
+                holds = False
+        return holds
 
 
 class TriggerObserver(Protocol):
@@ -140,7 +146,10 @@ class Trigger:
 
     def evaluate(self, context: RuntimeContext) -> bool:
         """Whether the trigger fires; `why` then describes the reason."""
-        fired = [group for group in self.groups if group.evaluate(context)]
+        fired = []
+        for group in self.groups:
+            if group.evaluate(context):
+                fired.append(group)
         if fired:
             self.why = " and ".join(monitor.why(context) for monitor in fired[0].monitors)
             names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
@@ -179,6 +188,8 @@ class WaitForTrigger(py_trees.behaviour.Behaviour):
 
     def is_fired(self) -> bool:
         """Tick without the generator of `tick_once`, as triggers are evaluated in every tick; True if it fires."""
-        self.initialise()
-        self.status = self.update()
-        return self.status is Status.SUCCESS
+        if self.status is Status.INVALID:
+            self.trigger.reset()
+        is_fired = self.trigger.evaluate(self.context)
+        self.status = Status.SUCCESS if is_fired else Status.RUNNING
+        return is_fired
