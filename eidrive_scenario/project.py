@@ -34,21 +34,26 @@ def select_project(folder: Path) -> None:
     """
     if VARIABLE in os.environ:
         return
-    path = next((path for above in (folder, *folder.parents) if (path := above / _FILE).is_file()), None)
-    if path is not None and _table(path) is not None:
-        os.environ[VARIABLE] = str(path.parent)
+    project = _project_of(folder)
+    if project is not None:
+        os.environ[VARIABLE] = str(project)
 
 
 def unused_project(path: Path) -> Path | None:
     """Return the folder of the project that contains a file, if it is another one than the selected project."""
     selected = os.environ.get(VARIABLE)
     try:
-        file = next((file for above in path.absolute().parents if (file := above / _FILE).is_file()), None)
-        if file is None or _table(file) is None or (selected and Path(selected).resolve() == file.parent.resolve()):
-            return None
+        project = _project_of(path.absolute().parent)
+        is_used = project is not None and selected and Path(selected).resolve() == project.resolve()
     except (OSError, ValueError, SettingError):
         return None
-    return file.parent
+    return None if is_used else project
+
+
+def _project_of(folder: Path) -> Path | None:
+    """Return the folder of the nearest pyproject.toml there or above, if it has the table `tool.eidrive`."""
+    path = next((path for above in (folder, *folder.parents) if (path := above / _FILE).is_file()), None)
+    return path.parent if path is not None and _table(path) is not None else None
 
 
 def project_entry_points() -> dict[str, tuple[EntryPoint, ...]]:
@@ -98,6 +103,8 @@ def _table(path: Path) -> dict[str, Any] | None:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _error(path, f"is not TOML: {error}", "correct it") from error
+    except RecursionError as error:
+        raise _error(path, "is nested too deeply", "correct it") from error
     tools = content.get("tool")
     return content if isinstance(tools, dict) and isinstance(tools.get("eidrive"), dict) else None
 

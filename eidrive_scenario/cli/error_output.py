@@ -83,8 +83,8 @@ def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
     sources = dict.fromkeys(one.source for one in diagnostics if one.source and one.message.startswith(unknown))
     for folder in dict.fromkeys(unused_project(Path(source)) for source in sources):
         if folder is not None:
-            where = f"in {folder}, or with {VARIABLE}={shlex.quote(str(folder))}"
-            typer.echo(f"extensions of the project of this file are used {where}", err=True)
+            setting = f"{VARIABLE}={shlex.quote(str(folder))}"
+            typer.echo(f"{folder}: extensions of this project are used only there, or with {setting}", err=True)
 
 
 def show_traceback(error: BaseException) -> None:

@@ -171,8 +171,7 @@ class ScriptedBody(Body):
         x, y, z, yaw = self.x, self.y, self.z, self.yaw
         self._from = before = (x, y, z, yaw, self.pitch, self.roll)
         was_moving = self.yaw_rate != 0.0 or self.velocity != STILL
-        self._pose(px, py, pz, pyaw, pitch, p.roll)
-        self.speed = speed
+        self._stand(p)
         self.moved = before != (px, py, pz, pyaw, pitch, p.roll)
         along = self._along_heading(speed)
         if p.teleport:

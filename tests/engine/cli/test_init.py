@@ -138,9 +138,10 @@ def test_commands_use_criterion_of_project_without_installation(eidrive: Eidrive
         ("[tool.eidrive]\npythonpath = 3\n", "tool.eidrive.pythonpath"),
         ('[tool.eidrive]\n[project.entry-points."eidrive_scenario.criteria"]\ngap = "no object"\n', "entry point gap"),
         ("[tool.eidrive\n", "is not TOML"),
+        ("eidrive = " + "[" * 100_000, "is nested too deeply"),
         ("[project]\nname = 3\n", ""),
     ],
-    ids=["pythonpath", "entry point", "syntax", "other"],
+    ids=["pythonpath", "entry point", "syntax", "nesting", "other"],
 )
 def test_invalid_table_of_project_is_reported(tmp_path: Path, text: str, expected: str) -> None:
     (tmp_path / "pyproject.toml").write_text(text)
