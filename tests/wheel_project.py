@@ -1,8 +1,8 @@
 """A new project with an installed wheel, without network: `python tests/wheel_project.py WHEEL [--packages FOLDER]`.
 
 Installs the wheel into an empty environment, writes a project with `eidrive init` into an empty folder, and executes
-its tests and commands where no connection can be made. The dependencies, and pytest, come from the package folder (by
-default, that of this Python). Prints the commands; the exit status is 1 if one of them fails.
+its tests and commands where no connection can be made. The dependencies come from the package folder (by default, that
+of this Python). Prints the commands; the exit status is 1 if one of them fails.
 """
 
 from __future__ import annotations

@@ -89,6 +89,8 @@ class ResultStore:
     def open(cls, path: Path, versions: Mapping[str, str]) -> Iterator[Self]:
         """Open a store for writing, and create it if there is none; other processes may read it.
 
+        An InputError of the caller deletes a new store again if it has no runs.
+
         versions  versions of the packages that affect results: a store contains results of one set of them
 
         Raise SettingError if the file cannot be written, is not a store, or is one of other versions, or if another
@@ -102,12 +104,18 @@ class ResultStore:
             except OSError as error:
                 raise _error(f"cannot write: {error.strerror}", "choose another file", path) from error
             stack.enter_context(exclusive(path))
+            is_new = not path.exists()
             connection = _checked(path, lambda: _connect(path))
             stack.callback(connection.close)
             store = cls(path, connection)
             _checked(path, store._create)
             store._check_versions(versions)
-            yield store
+            try:
+                yield store
+            except InputError:
+                if is_new and not store.statuses():
+                    path.unlink(missing_ok=True)
+                raise
 
     @classmethod
     @contextmanager

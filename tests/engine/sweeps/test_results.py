@@ -153,6 +153,7 @@ def test_invalid_commands_are_clear_errors(
     done = eidrive(*given)
     assert done.exit_code == 2
     assert expected in done.stderr
+    assert not Path("s.db").exists()
 
 
 def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 from sweep_runs import RUN, VERSIONS, opened
 
-from eidrive_scenario.errors import SettingError, SimulationError
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
 from eidrive_scenario.experiments.sweeps.store import ResultStore
 
 
@@ -46,6 +46,29 @@ def test_open_of_store_of_other_versions_raises(tmp_path: Path) -> None:
         pass
     with opened(path) as store:
         assert len(store.statuses()) == 1
+
+
+def test_input_error_deletes_new_store_without_runs(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
+    with pytest.raises(SettingError, match="no axes"), opened(path):
+        raise SettingError(Diagnostic("no axes"))
+    assert not path.exists()
+    with pytest.raises(SettingError, match="no axes"), opened(path) as store:
+        store.add(RUN)
+        raise SettingError(Diagnostic("no axes"))
+    with pytest.raises(SettingError, match="no axes"), opened(path):
+        raise SettingError(Diagnostic("no axes"))
+    with ResultStore.read(path) as store:
+        assert list(store.runs()) == [RUN]
+
+
+def test_input_error_keeps_existing_store_without_runs(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
+    with opened(path):
+        pass
+    with pytest.raises(SettingError, match="no axes"), opened(path):
+        raise SettingError(Diagnostic("no axes"))
+    assert path.exists()
 
 
 def test_open_of_other_format_raises(tmp_path: Path) -> None:
