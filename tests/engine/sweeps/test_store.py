@@ -48,16 +48,19 @@ def test_open_of_store_of_other_versions_raises(tmp_path: Path) -> None:
         assert len(store.statuses()) == 1
 
 
+def add_and_raise(path: Path) -> None:
+    with opened(path) as store:
+        store.add(RUN)
+        raise SettingError(Diagnostic("no axes"))
+
+
 def test_input_error_deletes_new_store_without_runs(tmp_path: Path) -> None:
     path = tmp_path / "s.db"
     with pytest.raises(SettingError, match="no axes"), opened(path):
         raise SettingError(Diagnostic("no axes"))
     assert not path.exists()
-    with pytest.raises(SettingError, match="no axes"), opened(path) as store:
-        store.add(RUN)
-        raise SettingError(Diagnostic("no axes"))
-    with pytest.raises(SettingError, match="no axes"), opened(path):
-        raise SettingError(Diagnostic("no axes"))
+    with pytest.raises(SettingError, match="no axes"):
+        add_and_raise(path)
     with ResultStore.read(path) as store:
         assert list(store.runs()) == [RUN]
 
