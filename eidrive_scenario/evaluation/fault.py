@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from eidrive_scenario.evaluation.lane_tracking import LaneTracker, corners
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.view import ActorState, WorldView
 
 STOPPED = 0.05
 """Maximum speed of a stopped actor [m/s]."""
 BEHIND = math.radians(150.0)
-"""Angle at the reference point between the heading and the center of an actor beyond which that actor is behind."""
+"""Angle at the reference point between the direction of travel and the center of an actor beyond which that actor is
+behind."""
 
 CORNER = 0.1
 """Maximum distance of a contact at a corner from both faces [m]."""
@@ -109,11 +110,12 @@ def judge_impact(
     if other not in view.rows or _speed(view, before, other) <= STOPPED:
         return Impact(side, True, "the other one had stopped")
     state, there = view.states[row], view.plain_boxes[view.rows[other]]
-    bearing = math.atan2(there[1] - state.y, there[0] - state.x) - state.yaw
+    reverses = _longitudinal_speed(view, before, of) < 0.0
+    bearing = math.atan2(there[1] - state.y, there[0] - state.x) - state.yaw - (math.pi if reverses else 0.0)
     if abs(math.remainder(bearing, math.tau)) > BEHIND:
-        return Impact(side, False, "it was hit from behind")
-    if side == "front":
-        return Impact(side, True, "it hit with its front")
+        return Impact(side, False, "it was driving away from it in reverse" if reverses else "it was hit from behind")
+    if side == ("rear" if reverses else "front"):
+        return Impact(side, True, f"it {'reversed and ' if reverses else ''}hit with its {side}")
     if lanes is None:
         return Impact(side, False, "it was hit at the side")
     if leaves_lane(view, row, lanes):
@@ -134,6 +136,16 @@ def leaves_lane(view: WorldView, row: int, lanes: LaneTracker) -> bool:
 
 def _speed(view: WorldView, before: WorldView | None, name: str) -> float:
     """Return the speed of an actor before the contact, which changes it [m/s]."""
-    source = before if before is not None and name in before.rows else view
-    state = source.states[source.rows[name]]
+    state = _state(view, before, name)
     return math.hypot(state.velocity_x, state.velocity_y)
+
+
+def _longitudinal_speed(view: WorldView, before: WorldView | None, name: str) -> float:
+    """Return the speed of an actor along its heading before the contact, negative in reverse [m/s]."""
+    state = _state(view, before, name)
+    return math.cos(state.yaw) * state.velocity_x + math.sin(state.yaw) * state.velocity_y
+
+
+def _state(view: WorldView, before: WorldView | None, name: str) -> ActorState:
+    source = before if before is not None and name in before.rows else view
+    return source.states[source.rows[name]]

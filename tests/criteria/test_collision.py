@@ -82,6 +82,10 @@ def test_collision_actor_may_be_added_later(frame: Any, car: Any) -> None:
         (5.0, (0.0, -2.0, 0.0, 9.0), (0.5, -1), "right", False),
         (5.0, (4.0, 0.1, 0.0, 3.0), (2.03, 0.99), "front", True),  # into a slower car, with a corner
         (5.0, (3.9, 1.99, 0.0, 3.0), (1.97, 0.99), "left", False),  # along the side of a slower car
+        (-5.0, (-4.0, 0.0, 0.0, -3.0), (-2, 0), "rear", True),  # reverse into a slower car
+        (-5.0, (-4.0, 0.0, 90.0, 1.0), (-2, 0), "rear", True),  # reverse into a crossing car
+        (-5.0, (4.0, 0.0, 0.0, -9.0), (2, 0), "front", False),  # hit at the front by a faster car
+        (-5.0, (0.0, 2.0, 0.0, 9.0), (0.5, 1), "left", False),  # at the side
     ],
 )
 def test_collision_side_and_fault_by_the_rules_of_nuplan(
