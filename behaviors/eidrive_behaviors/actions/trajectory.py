@@ -26,8 +26,10 @@ from eidrive_scenario.api.actions import (
     resolve_position,
     sample_trajectory,
 )
-from eidrive_scenario.api.common import EPSILON, Pose, wrap_angle
+from eidrive_scenario.api.common import EPSILON, Array, Pose, wrap_angle
 
+ARRIVED = 2.0
+"""Maximum distance to the end along the trajectory at which a driven vehicle has arrived [m]."""
 TELEPORT_DISTANCE = 1.0
 """Minimum distance to the start on the trajectory at which an actor is teleported there [m]."""
 
@@ -90,7 +92,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         if not present and spline is not None and spline.clothoid_spline_segment[0].position_start is None:
             raise EntityAbsentError(self.actor.name)
         self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolve_pose, motion.pose)
-        self._s = self._offset()
+        self._s = self._driver_s = self._offset()
         self._progress = TrajectoryProgress(self._layout, self._s)
         self._followed = self._progress
         self.actor.set_progress(self._progress)
@@ -103,8 +105,8 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._heading = motion.pose.h if present else None
         """Heading before the action [rad]; None for an actor that the trajectory adds to the world."""
         self._put: Pose | None = None
-        self._driver_path: tuple[float, np.ndarray[tuple[int, int], np.dtype[np.float64]]] | None = None
-        """Start on the trajectory [m], and points (M, 3) from there, which a driven vehicle follows."""
+        self._driver_path: Array | None = None
+        """Points (M, 3) that a driven vehicle follows; `_driver_s` is its last place on the trajectory [m]."""
         self._pursuit = self._run = None
         self._begun = self._direction_known = self._teleports = False
         if self._timing is not None and not (self._follows_limits and present):
@@ -278,16 +280,26 @@ class FollowTrajectoryAction(ActionBehaviour):
         return back._replace(h=wrap_angle(back.h))
 
     def _set_driver_goal(self) -> Status:
-        if self._driver_path is None or self._driver_path[0] != self._s:
-            check_way(self, self._layout.length)
-            count = max(2, math.ceil(self._layout.length / POINTS_APART) + 1)
-            places = np.linspace(self._s, self._layout.length, count).tolist()
-            self._driver_path = self._s, np.array([self._layout.at(s)[:3] for s in places])
-        points = self._driver_path[1]
-        goal = self.actor.goal
-        self.actor.set_goal(replace(goal or Goal(), path=points, lap=None))
-        here = self.actor.motion.pose
-        return Status.SUCCESS if math.hypot(points[-1, 0] - here.x, points[-1, 1] - here.y) < 2.0 else Status.RUNNING
+        layout = self._layout
+        if self._driver_path is None or self._driver_s != self._s:
+            check_way(self, layout.length)
+            self._driver_path = self._points(self._s)
+            self._driver_lap = self._points(0.0) if layout.closed else None
+        if self.actor.present:
+            here = self.actor.motion.pose
+            place = layout.track(here.x, here.y, self._s)
+            self._progress.move(self.context.view.tick, place, place)
+            self._s = place if layout.closed else min(max(place, 0.0), layout.length)
+        else:
+            self._enter(self._pose(self._s))
+        self._driver_s = self._s
+        self.actor.set_goal(replace(self.actor.goal or Goal(), path=self._driver_path, lap=self._driver_lap))
+        return Status.RUNNING if layout.closed or layout.length - self._s > ARRIVED else Status.SUCCESS
+
+    def _points(self, start: float) -> Array:
+        """Return points of the trajectory (M, 3) from an arc length [m] to its end, for a driven vehicle."""
+        count = max(2, math.ceil(self._layout.length / POINTS_APART) + 1)
+        return np.array([self._layout.at(s)[:3] for s in np.linspace(start, self._layout.length, count).tolist()])
 
     def _resolve_pose(self, position: model.Position) -> Pose:
         return resolve_position(position, self.context, self.actor.name).pose

@@ -16,6 +16,8 @@ from eidrive_scenario.roads import Pose
 
 SAME_PLACE = 1e-3
 """Tolerance of distances at which a trajectory passes a point several times [m]."""
+REACH = 10.0
+"""Maximum distance along a trajectory between two successive places of an actor that was not teleported [m]."""
 
 
 @dataclass(frozen=True)
@@ -138,14 +140,8 @@ class TrajectoryCurve:
         An open trajectory is extended along its tangents. If it passes the point several times, the first time after
         `ahead_of` counts.
         """
-        vertices, vectors, lengths = self._segments
-        to = np.array([x, y]) - vertices
-        along = np.einsum("ni,ni->n", to, vectors)
-        clipped = np.clip(along, 0.0, lengths)
-        if not self.closed:
-            clipped[0], clipped[-1] = min(along[0], clipped[0]), max(along[-1], clipped[-1])
-        perpendicular = to - clipped[:, None] * vectors
-        square = np.einsum("ni,ni->n", perpendicular, perpendicular)
+        _, vectors, _ = self._segments
+        to, clipped, square = self._nearest_of_segments(x, y)
         nearest = int(np.argmin(square))
         if ahead_of is not None:
             candidates = np.flatnonzero(np.sqrt(square) <= math.sqrt(square[nearest]) + SAME_PLACE)
@@ -153,6 +149,45 @@ class TrajectoryCurve:
             nearest = later[0] if later else nearest
         (ahead, left), (dx, dy) = vectors[nearest].tolist(), to[nearest].tolist()
         return self.s[nearest] + float(clipped[nearest]), ahead * dy - left * dx
+
+    def track(self, x: float, y: float, before: float) -> float:
+        """Return the arc length nearest to an actor that was at `before` [m] a time step ago.
+
+        Where the trajectory passes a place several times, it is the one within REACH of `before`. An open trajectory is
+        extended along its tangents.
+        """
+        _, clipped, square = self._nearest_of_segments(x, y)
+        places = self._starts + clipped
+        apart = places - before
+        if self.closed and self.length > 0.0:
+            apart -= self.length * np.round(apart / self.length)
+        nearest = int(np.argmin(square))
+        close = np.flatnonzero(np.abs(apart) <= REACH)
+        if len(close):
+            local = int(close[np.argmin(square[close])])
+            if math.sqrt(square[local]) <= math.sqrt(square[nearest]) + REACH:
+                nearest = local
+        return float(places[nearest])
+
+    def _nearest_of_segments(
+        self, x: float, y: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return vectors to a point from the start of each segment (N, 2), and of its place nearest to the point:
+        distance from the start (N,) [m], squared distance to the point (N,) [m²].
+        """
+        vertices, vectors, lengths = self._segments
+        to = np.array([x, y]) - vertices
+        along = np.einsum("ni,ni->n", to, vectors)
+        clipped = np.clip(along, 0.0, lengths)
+        if not self.closed:
+            clipped[0], clipped[-1] = min(along[0], clipped[0]), max(along[-1], clipped[-1])
+        perpendicular = to - clipped[:, None] * vectors
+        return to, clipped, np.einsum("ni,ni->n", perpendicular, perpendicular)
+
+    @cached_property
+    def _starts(self) -> NDArray[np.float64]:
+        """Arc length at the start of each segment (N,) [m]."""
+        return np.array(self.s[:-1])
 
     @cached_property
     def _segments(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

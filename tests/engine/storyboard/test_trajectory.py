@@ -169,3 +169,27 @@ def test_time_of_control_point_holds_at_peak_of_its_basis_function() -> None:
     way = sample_trajectory(trajectory(nurbs=shape), resolve)
     assert way.at_time(2.0) == pytest.approx(10.0, abs=1.0)
     assert (way.at_time(0.0), way.at_time(6.0)) == pytest.approx((0.0, 20.0))
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_track_stays_on_its_branch_where_a_trajectory_crosses_itself(closed: bool) -> None:
+    """A figure of eight, driven 0.4 m beside its line."""
+    count = 400
+    eight = [(60.0 * math.sin(a), 30.0 * math.sin(2.0 * a)) for a in (math.tau * n / count for n in range(count))]
+    way = polyline(*((x, y, None, None) for x, y in eight), closed=closed)
+    s = 0.0
+    for expected in (0.5 * n for n in range(int(2.0 * way.length) - 4)):
+        pose, direction = way.at(expected), way.tangent(expected)
+        s = way.track(pose.x - 0.4 * math.sin(direction), pose.y + 0.4 * math.cos(direction), s)
+        assert s == pytest.approx(expected, abs=0.2)
+
+
+def test_track_follows_a_teleported_actor_and_extends_open_trajectories() -> None:
+    way = polyline((0, 0, None, None), (100, 0, None, None), (100, 100, None, None))
+    assert way.track(101.0, 70.0, 5.0) == pytest.approx(170.0)
+    assert way.track(-3.0, 1.0, 5.0) == pytest.approx(-3.0)
+    assert way.track(100.0, 104.0, 199.0) == pytest.approx(204.0)
+    around = polyline(
+        (0, 0, None, None), (100, 0, None, None), (100, 100, None, None), (0, 100, None, None), closed=True
+    )
+    assert around.track(0.5, 2.0, 1.0) == pytest.approx(398.0)
