@@ -100,3 +100,9 @@ def test_vehicle_whose_controller_is_deactivated_continues_from_its_place(run: R
     x = played.x("Ego")
     assert max(abs(later - earlier) for earlier, later in pairwise(x)) < 0.7
     assert x[-1] > 145.0
+
+
+def test_negative_speed_of_a_driven_vehicle_is_a_warning(run: Run) -> None:
+    played = run(3.0, ("Ego", speed_xml(-2.0)), ego=(-1, 100.0, 5.0))
+    assert any("'Ego' stops instead of reversing" in warning for warning in played.result.warnings)
+    assert row(played, 3.0, "Ego")[2] == pytest.approx(0.0, abs=0.01)

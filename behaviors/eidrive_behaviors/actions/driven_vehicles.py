@@ -1,4 +1,4 @@
-"""Actions that have no effect on a driven vehicle."""
+"""Actions that have no effect on a driven vehicle, or not the whole one."""
 
 from __future__ import annotations
 
@@ -9,3 +9,11 @@ def warn_without_effect(behaviour: ActionBehaviour) -> None:
     """Add a warning to the result: the driving stack of the actor has no goal for the action."""
     what = f"no effect on {behaviour.actor.name!r}, which a driving stack drives"
     behaviour.context.warn(*behaviour.error(what, "command its speed, route, lane or trajectory").diagnostics)
+
+
+def warn_of_reverse(behaviour: ActionBehaviour, speed: float) -> None:
+    """Add a warning to the result if a target speed is negative [m/s]: driving stacks plan forward motion only."""
+    if speed < 0.0:
+        what = f"{behaviour.actor.name!r} stops instead of reversing: a driving stack drives forwards only"
+        hint = "drive it in reverse by the storyboard, without a driving stack"
+        behaviour.context.warn(*behaviour.error(what, hint).diagnostics)

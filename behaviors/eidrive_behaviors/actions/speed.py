@@ -7,6 +7,7 @@ import math
 from msgspec.structs import replace
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
 from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, speed_limiter
 from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
@@ -102,6 +103,7 @@ class SpeedAction(ActionBehaviour):
     def _set_driver_goal(self) -> Status:
         """Set the goal to speed and slope of the transition. It is complete when the vehicle has that speed."""
         transition = self._transition
+        warn_of_reverse(self, transition.target)
         before = transition.value
         speed = transition.advance(self.context.dt)
         slope = 0.0 if transition.done or self.context.dt == 0.0 else (speed - before) / self.context.dt

@@ -10,6 +10,7 @@ from itertools import pairwise
 from msgspec.structs import replace
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
 from eidrive_behaviors.actions.speed import slope_limit
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, model
 from eidrive_scenario.api.common import EPSILON
@@ -62,6 +63,7 @@ class SpeedProfileAction(ActionBehaviour):
         done = index == len(self._segments) - 1
         speed = self._segments[-1].speed if done else self._segments[index].at(self._elapsed)
         if self.actor.driven:
+            warn_of_reverse(self, speed)
             slope = 0.0 if done else self._segments[index].slope
             self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=slope))
         else:
