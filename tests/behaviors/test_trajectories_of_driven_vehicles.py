@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from openscenario_xml import round_car_xml
-from storyboard_xml import private_xml, speed_xml
+from storyboard_xml import private_xml, speed_xml, teleport_xml
 from street_scene import AGENT, after
-from trajectories import curve, follow, world
+from trajectories import RELATIVE, curve, follow, world
 from whole_run import RecordedRun, Run
 
 STRAIGHT = curve(world(100.0, -2.0), world(220.0, -2.0))
@@ -100,6 +100,19 @@ def test_vehicle_whose_controller_is_deactivated_continues_from_its_place(run: R
     x = played.x("Ego")
     assert max(abs(later - earlier) for earlier, later in pairwise(x)) < 0.7
     assert x[-1] > 145.0
+
+
+@pytest.mark.parametrize("teleported", [True, False])
+def test_driven_vehicle_has_the_speeds_of_a_timed_trajectory(run: Run, teleported: bool) -> None:
+    """15 m/s for 4 s, a stop of 6 s, and 10 m/s for 10 s: 60 m and 160 m, less the way to reach the second speed."""
+    way = curve(*(world(x, -2.0) for x in (300.0, 360.0, 360.0, 460.0)), times=(0.0, 4.0, 10.0, 20.0))
+    actions = (teleport_xml(world(300.0, -2.0)) if teleported else "", follow(way, reference=RELATIVE))
+    init = f'<Private entityRef="Second">{"".join(actions)}</Private>'
+    played = run(18.0, ego=(-1, 600.0, 20.0), more=round_car_xml("Second", AGENT), init=init)
+    assert row(played, 0.0, "Second") == pytest.approx((300.0, -2.0, 15.0), abs=1e-6)
+    assert row(played, 3.9, "Second") == pytest.approx((358.5, -2.0, 15.0), abs=1.0)
+    assert row(played, 9.9, "Second")[2] == pytest.approx(0.0, abs=0.01)
+    assert row(played, 18.0, "Second")[2] == pytest.approx(10.0, abs=0.3)
 
 
 def test_negative_speed_of_a_driven_vehicle_is_a_warning(run: Run) -> None:

@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from functools import partial
 
-import numpy as np
-from msgspec.structs import replace
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.driven_trajectory import DrivenTrajectory
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
-from eidrive_behaviors.actions.routing import POINTS_APART, check_way
+from eidrive_behaviors.actions.routing import check_way
 from eidrive_scenario.api.actions import (
     TIME_ATTRIBUTES,
     ActionBehaviour,
     ActionContext,
     Domain,
     EntityAbsentError,
-    Goal,
     ResolvedPosition,
     TrajectoryCurve,
     TrajectoryProgress,
@@ -26,10 +24,8 @@ from eidrive_scenario.api.actions import (
     resolve_position,
     sample_trajectory,
 )
-from eidrive_scenario.api.common import EPSILON, Array, Pose, wrap_angle
+from eidrive_scenario.api.common import EPSILON, Pose, wrap_angle
 
-ARRIVED = 2.0
-"""Maximum distance to the end along the trajectory at which a driven vehicle has arrived [m]."""
 TELEPORT_DISTANCE = 1.0
 """Minimum distance to the start on the trajectory at which an actor is teleported there [m]."""
 
@@ -92,7 +88,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         if not present and spline is not None and spline.clothoid_spline_segment[0].position_start is None:
             raise EntityAbsentError(self.actor.name)
         self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolve_pose, motion.pose)
-        self._s = self._driver_s = self._offset()
+        self._s = self._offset()
         self._progress = TrajectoryProgress(self._layout, self._s)
         self._followed = self._progress
         self.actor.set_progress(self._progress)
@@ -105,8 +101,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._heading = motion.pose.h if present else None
         """Heading before the action [rad]; None for an actor that the trajectory adds to the world."""
         self._put: Pose | None = None
-        self._driver_path: Array | None = None
-        """Points (M, 3) that a driven vehicle follows; `_driver_s` is its last place on the trajectory [m]."""
+        self._driven: DrivenTrajectory | None = None
         self._pursuit = self._run = None
         self._begun = self._direction_known = self._teleports = False
         if self._timing is not None and not (self._follows_limits and present):
@@ -280,26 +275,24 @@ class FollowTrajectoryAction(ActionBehaviour):
         return back._replace(h=wrap_angle(back.h))
 
     def _set_driver_goal(self) -> Status:
-        layout = self._layout
-        if self._driver_path is None or self._driver_s != self._s:
-            check_way(self, layout.length)
-            self._driver_path = self._points(self._s)
-            self._driver_lap = self._points(0.0) if layout.closed else None
+        driven, motion = self._driven, self.actor.motion
+        if driven is None or driven.place != self._s:
+            check_way(self, self._layout.length)
+            driven = self._driven = DrivenTrajectory(self._layout, self._s)
+        starts = motion.teleported or not self.actor.present
         if self.actor.present:
-            here = self.actor.motion.pose
-            place = layout.track(here.x, here.y, self._s)
+            place = driven.move(motion.pose)
             self._progress.move(self.context.view.tick, place, place)
-            self._s = place if layout.closed else min(max(place, 0.0), layout.length)
         else:
             self._enter(self._pose(self._s))
-        self._driver_s = self._s
-        self.actor.set_goal(replace(self.actor.goal or Goal(), path=self._driver_path, lap=self._driver_lap))
-        return Status.RUNNING if layout.closed or layout.length - self._s > ARRIVED else Status.SUCCESS
-
-    def _points(self, start: float) -> Array:
-        """Return points of the trajectory (M, 3) from an arc length [m] to its end, for a driven vehicle."""
-        count = max(2, math.ceil(self._layout.length / POINTS_APART) + 1)
-        return np.array([self._layout.at(s)[:3] for s in np.linspace(start, self._layout.length, count).tolist()])
+        speed = None
+        if self._timing is not None:
+            speed = self._layout.speed_at(self._clock(0.0), self._speeds) / self._timing.scale
+            if starts:
+                motion.set_speed(speed)
+        self._s = driven.place
+        self.actor.set_goal(driven.goal(self.actor.goal, speed))
+        return Status.SUCCESS if driven.has_arrived else Status.RUNNING
 
     def _resolve_pose(self, position: model.Position) -> Pose:
         return resolve_position(position, self.context, self.actor.name).pose
