@@ -1,4 +1,4 @@
-"""Options of several commands: driving stacks, planner, criteria, and the runs whose recording is kept."""
+"""Options of several commands: driving stacks, controllers, planner, criteria, and the runs whose recording is kept."""
 
 from __future__ import annotations
 
@@ -7,6 +7,21 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.short_help import rare
+
+UserValues = Annotated[list[str] | None, rare(metavar="K=V", help="Value for UserDefinedValueConditions; repeatable.")]
+Controllers = Annotated[
+    list[str] | None,
+    rare(metavar="K=V", help="Model V, such as alks, of controller K of another tool; repeatable."),
+]
+AllowTorchscript = Annotated[
+    bool,
+    rare(
+        "--allow-torchscript",
+        envvar="EIDRIVE_ALLOW_TORCHSCRIPT",
+        help="Load TorchScript weights, which can execute any code with your permissions.",
+    ),
+]
 Drive = Annotated[
     list[str] | None,
     typer.Option(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import Criteria, Drive, Keep, Planner
+from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Criteria, Drive, Keep, Planner, UserValues
 from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.cli.live import Live, LivePort, LiveSpeed, live_view, wait_until_closed
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_senders
@@ -51,17 +51,8 @@ def run(
     param: Annotated[
         list[str] | None, typer.Option(metavar="K=V", help="Parameter of the scenario; repeatable.")
     ] = None,
-    user_value: Annotated[
-        list[str] | None,
-        rare(metavar="K=V", help="Value for UserDefinedValueConditions; repeatable."),
-    ] = None,
-    controller: Annotated[
-        list[str] | None,
-        rare(
-            metavar="K=V",
-            help="Model V, such as alks, of controller K of another tool; repeatable.",
-        ),
-    ] = None,
+    user_value: UserValues = None,
+    controller: Controllers = None,
     drive: Drive = None,
     criterion: Criteria = None,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
@@ -119,14 +110,7 @@ def run(
     live: Live = False,
     live_speed: LiveSpeed = None,
     live_port: LivePort = None,
-    allow_torchscript: Annotated[
-        bool,
-        rare(
-            "--allow-torchscript",
-            envvar="EIDRIVE_ALLOW_TORCHSCRIPT",
-            help="Load TorchScript weights, which can execute any code with your permissions.",
-        ),
-    ] = False,
+    allow_torchscript: AllowTorchscript = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run only.")] = False,
     help_all: HelpAll = False,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.added_options import Keep
+from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Keep, UserValues
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
 from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
@@ -47,6 +47,11 @@ def sweep(
     runs: Annotated[int | None, rare(min=1, help="Total number of runs.", show_default="all")] = None,
     channel: Annotated[str | None, typer.Option(help="Channel profile of all runs.", show_default=False)] = None,
     param: Annotated[list[str] | None, typer.Option(metavar="K=V", help="Parameter of all runs; repeatable.")] = None,
+    drive: Annotated[
+        list[str] | None, rare(metavar="NAME[=STACK]", help="Give entity NAME a driving stack, as in `eidrive run`.")
+    ] = None,
+    user_value: UserValues = None,
+    controller: Controllers = None,
     criterion: Annotated[list[str] | None, rare(metavar="YAML|FILE", help="Add criteria; repeatable.")] = None,
     time_limit: Annotated[float, rare(help="Maximum simulated time in seconds.")] = 120.0,
     out: Annotated[
@@ -83,6 +88,7 @@ def sweep(
         str | None,
         rare(metavar="METRIC", help="Metric that --falsify minimizes instead of margins."),
     ] = None,
+    allow_torchscript: AllowTorchscript = False,
     retry: Annotated[bool, rare("--retry", help="Repeat aborted and crashed runs of the store.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would run.")] = False,
     help_all: HelpAll = False,
@@ -110,6 +116,7 @@ def sweep(
     from eidrive_scenario.experiments.sweeps.workers import LocalWorkers, Workers
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.simulation import RunSettings
+    from eidrive_scenario.simulation.added_settings import parse_drive
 
     for option, value in (("--time-limit", time_limit), ("--wall-limit", wall_limit)):
         check_seconds(option, value)
@@ -120,8 +127,12 @@ def sweep(
     settings = RunSettings(
         channel=channel,
         parameters=parse_assignments("--param", param or []),
+        user_values=parse_assignments("--user-value", user_value or []),
+        controllers=parse_assignments("--controller", controller or []),
+        drive=parse_drive("--drive", drive or []),
         criteria=criterion,
         time_limit=time_limit,
+        allow_torchscript=allow_torchscript,
     )
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
     axes = parse_axes(vary or [])

@@ -28,6 +28,17 @@ MOST_RUNS = 10_000_000
 """Maximum number of runs of a sweep."""
 RUN = "run"
 """Name of the axis of the runs of a distribution file."""
+_INPUTS = (
+    "files",
+    "versions",
+    "extensions",
+    "channel_profile",
+    "later_channels",
+    "stations",
+    "weather_profile",
+    "criteria",
+)
+"""Resolved settings that determine results beside the settings of a run, which may only name their files."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +70,9 @@ class SweepPlan:
     seeds     seeds of each combination
     runs      maximum number of runs; with fewer than all, every combination gets the first seeds
     settings  settings of all runs
-    inputs    digest of all input files and versions
+    inputs    digest of all input files, of what they contain, and of versions
     profile   channel profile whose settings the axes `channel.KEY` replace
+    contents  the same digest with one setting, by its axis and value, as these values may name files
     """
 
     scenario: Path
@@ -70,6 +82,7 @@ class SweepPlan:
     settings: RunSettings
     inputs: str
     profile: Mapping[str, Any] | None
+    contents: Mapping[tuple[str, Scalar], str]
 
     def __len__(self) -> int:
         return self.runs
@@ -88,7 +101,9 @@ class SweepPlan:
         """Return a run at a point, which need not be one of the plan."""
         settings = settings_at(_without_run(point), self.settings, self.profile)
         run = int(point[RUN]) if RUN in point else None
-        content = {"inputs": self.inputs, "run": run, "seed": seed, "settings": _plain(settings)}
+        contents = {name: found for name in point if (found := self.contents.get((name, point[name]))) is not None}
+        inputs = {"inputs": self.inputs, "contents": contents}
+        content = {**inputs, "run": run, "seed": seed, "settings": _plain(settings)}
         return SweepJob(sha256_of(canonical_json(content).encode()), number, self.scenario, run, seed, point, settings)
 
 
@@ -133,10 +148,10 @@ def plan_of(
         raise SettingError(Diagnostic(f"the sweep has {total} runs", f"expected 1 to {MOST_RUNS}"))
     first = _first_resolved(scenario, points, settings)
     profile = first.channel_profile
-    digest = sha256_of(canonical_json({"files": first.files, "versions": dict(first.versions)}).encode())
-    plan = SweepPlan(scenario, tuple(points), chosen, min(total, runs or total), settings, digest, profile)
     _check_names(points, first.parameters)
-    _check_settings(scenario, points, settings)
+    contents = _contents(scenario, points, settings)
+    runs = min(total, runs or total)
+    plan = SweepPlan(scenario, tuple(points), chosen, runs, settings, _digest(scenario, first), profile, contents)
     for point in points:  # a point that cannot be run is an error before the runs, not among them
         at = settings_at(_without_run(point), settings, profile)
         if isinstance(at.channel, Mapping):
@@ -153,18 +168,30 @@ def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:
             raise SettingError(Diagnostic(text, suggestion(parameter, [*declared, *sorted(SETTINGS)])))
 
 
-def _check_settings(scenario: Path, points: Sequence[Point], settings: RunSettings) -> None:
-    """Build a run with each value of a setting, of numbers with the least and the greatest one, to find invalid ones.
+def _contents(scenario: Path, points: Sequence[Point], settings: RunSettings) -> dict[tuple[str, Scalar], str]:
+    """Return the digest of the inputs of a run with each text of a setting, by name and value.
 
-    Raise InputError for an invalid value.
+    Build these runs, and those with the least and the greatest of the numbers of a setting, to find invalid values.
+    Raise InputError for an invalid one.
     """
+    found: dict[tuple[str, Scalar], str] = {}
     for name in SETTINGS:
         values = dict.fromkeys(point[name] for point in points if name in point)
         numbers = [value for value in values if not isinstance(value, str)]
         texts: list[Scalar] = [value for value in values if isinstance(value, str)]
         for value in texts + ([min(numbers), max(numbers)] if numbers else []):
             with suppress(ConstraintError):
-                _resolved(scenario, points[0].get(RUN), settings_at({name: value}, settings, None))
+                resolved = _resolved(scenario, points[0].get(RUN), settings_at({name: value}, settings, None))
+                if isinstance(value, str):
+                    found[name, value] = _digest(scenario, resolved)
+    return found
+
+
+def _digest(scenario: Path, resolved: ResolvedSettings) -> str:
+    """Return the digest of the file of a scenario or distribution, and of the inputs among resolved settings."""
+    inputs = resolved.as_json()
+    file = sha256_of(scenario.read_bytes())
+    return sha256_of(canonical_json({"file": file, **{name: inputs[name] for name in _INPUTS}}).encode())
 
 
 def versions() -> Mapping[str, str]:

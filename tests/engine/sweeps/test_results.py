@@ -169,6 +169,21 @@ def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_
     assert "2 already in the store (1 failed, 1 passed)" in eidrive(*arguments).stdout
 
 
+def test_sweep_command_drives_entities_of_other_tools(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    """The key of a run depends on the content of the file of the stack."""
+    stack = tmp_path / "stack.yaml"
+    common = ("sweep", scenario, "--store", tmp_path / "s.db", "--workers", "1", "--user-value", "Mood=calm")
+    assert eidrive(*common).exit_code == 0
+    for speed in (5, 6):
+        stack.write_text(f"target_speed: {speed}")
+        assert eidrive(*common, "--drive", f"Ego={stack}").exit_code == 0
+    with ResultStore.read(tmp_path / "s.db") as store:
+        runs = list(store.runs())
+    assert len(runs) == 3
+    assert sorted(f"--drive Ego={stack}" in run.command for run in runs) == [False, True, True]
+    assert all("--user-value Mood=calm" in run.command for run in runs)
+
+
 def test_sweep_command_prints_why_runs_have_no_verdict(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
     store = tmp_path / "s.db"
     arguments = ("sweep", scenario, "--vary", "Speed=10,fast", "--store", store, "--workers", "1")

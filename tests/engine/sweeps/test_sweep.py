@@ -73,6 +73,34 @@ def test_keys_depend_on_inputs_only(scenario: Path, tmp_path: Path) -> None:
     assert not {job.key for job in plan_of(scenario, SPEEDS, RunSettings(), seeds=[1, 2])} & set(one.values())
 
 
+@pytest.mark.parametrize("setting", ["channel", "weather", "criteria", "drive", "axis"])
+def test_keys_depend_on_the_content_of_setting_files(scenario: Path, setting: str) -> None:
+    texts = {
+        "channel": ("delay: {kind: constant, seconds: 0.1}", "delay: {kind: constant, seconds: 0.2}"),
+        "weather": ("friction: 0.7", "friction: 0.6"),
+        "criteria": ("max_speed: {of: Ego, at_most: 6}", "max_speed: {of: Ego, at_most: 7}"),
+        "drive": ("target_speed: 5", "target_speed: 6"),
+    }
+    file = scenario.with_name("setting.yaml")
+    points = [{"channel": str(file)}, {"channel": "none"}] if setting == "axis" else SPEEDS
+    given = {} if setting == "axis" else {setting: {"Ego": str(file)} if setting == "drive" else str(file)}
+    keys = []
+    for text in texts["channel" if setting == "axis" else setting]:
+        file.write_text(text)
+        first, second = ([job.key for job in plan_of(scenario, points, RunSettings(**given))] for _ in range(2))
+        assert first == second
+        keys.append(set(first))
+    assert len(keys[0] & keys[1]) == (1 if setting == "axis" else 0)
+
+
+def test_keys_depend_on_the_values_of_a_distribution(distribution: Path) -> None:
+    plans = []
+    for value in ("10", "11"):
+        distribution.write_text(distribution.read_text().replace('value="10"', f'value="{value}"'))
+        plans.append(plan_of(distribution, points_of((), "grid", None, 1), RunSettings(), is_distribution=True))
+    assert not {job.key for job in plans[0]} & {job.key for job in plans[1]}
+
+
 def test_shards_are_disjoint_and_complete(scenario: Path) -> None:
     plan = plan_of(scenario, SPEEDS, RunSettings(), runs=10)
     shards = [Shard(plan, number, 4) for number in (1, 2, 3, 4)]
