@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Keep, UserValues
+from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
 from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
@@ -200,7 +201,7 @@ def results(
     """
     import json as json_text
 
-    from eidrive_scenario.experiments.sweeps.results import stored_runs, summaries, write_csv, write_parquet
+    from eidrive_scenario.experiments.sweeps.results import indistinct, stored_runs, summaries, write_csv, write_parquet
     from eidrive_scenario.experiments.sweeps.store import PASSED as PASSED_RUN
 
     if not 0.0 < confidence < 1.0:
@@ -208,6 +209,7 @@ def results(
     found = list(stored_runs(stores))
     names = None if by is None else [name.strip() for name in by.split(",")]
     rows = summaries(found, by=names, interval=interval, confidence=confidence)
+    print_warnings([f"{warning}; a new store keeps them apart"] if (warning := indistinct(found)) else [])
     if csv is not None:
         write_csv(found, csv)
     if parquet is not None:

@@ -9,11 +9,8 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.paired import PairedDifference, PairedVerdicts, paired_difference
-from eidrive_scenario.experiments.sweeps.results import stored_runs
+from eidrive_scenario.experiments.sweeps.results import Identity, identity, indistinct, stored_runs
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
-
-Identity = tuple[str, int | None, int, tuple[tuple[str, Any], ...]]
-"""Scenario, run of a distribution, seed and values of the axes."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,10 @@ def compare(
 
 
 def _by_identity(paths: Sequence[Path]) -> dict[Identity, StoredRun]:
-    return {(run.scenario, run.run, run.seed, tuple(sorted(run.point.items()))): run for run in stored_runs(paths)}
+    runs = list(stored_runs(paths))
+    if warning := indistinct(runs):
+        raise SettingError(Diagnostic(f"{', '.join(map(str, paths))}: {warning}", "sweep again into a new store"))
+    return {identity(run): run for run in runs}
 
 
 def _difference(name: str, pairs: Sequence[tuple[StoredRun, StoredRun]], confidence: float) -> PairedDifference:

@@ -6,7 +6,7 @@ import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval, clopper_pearson, wilson
@@ -22,6 +22,8 @@ INTERVALS: Mapping[str, Callable[..., Proportion]] = {
 }
 """Intervals of success rates by name. That of a confidence sequence is valid while runs are added; the others are for a
 number of runs that was fixed before."""
+Identity: TypeAlias = tuple[str, int | None, int, tuple[tuple[str, Any], ...]]
+"""Scenario, run of a distribution, seed, and values of the axes of a run."""
 FIXED = ("key", "number", "status", "error", "command", "seconds")
 """Columns of every run before those of its axes and of its result."""
 
@@ -47,6 +49,20 @@ def stored_runs(paths: Sequence[Path]) -> Iterator[StoredRun]:
         with ResultStore.read(path) as store:
             found.update((run.key, run) for run in store.runs())
     return iter(sorted(found.values(), key=lambda run: (run.number, run.key)))
+
+
+def identity(run: StoredRun) -> Identity:
+    """Return what distinguishes a run from the others of its sweep."""
+    return run.scenario, run.run, run.seed, tuple(sorted(run.point.items()))
+
+
+def indistinct(runs: Sequence[StoredRun]) -> str:
+    """Return a warning of runs that differ only in files or in settings that are no axes; empty without such runs."""
+    count = len(runs) - len({identity(run) for run in runs})
+    if not count:
+        return ""
+    what = "1 run repeats another one" if count == 1 else f"{count} runs repeat other ones"
+    return f"{what} with other options, or after a change of a file"
 
 
 def summaries(

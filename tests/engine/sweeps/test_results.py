@@ -169,6 +169,17 @@ def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_
     assert "2 already in the store (1 failed, 1 passed)" in eidrive(*arguments).stdout
 
 
+def test_results_of_changed_inputs_are_a_warning(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    sweep = ("sweep", scenario, "--vary", "Speed=10,12", "--store", tmp_path / "s.db", "--workers", "1")
+    assert eidrive(*sweep).exit_code == 0
+    assert not eidrive("results", tmp_path / "s.db").stderr
+    assert eidrive(*sweep, "--time-limit", "0.3").exit_code == 0
+    assert "2 runs repeat other ones with other options" in eidrive("results", tmp_path / "s.db").stderr
+    compared = eidrive("compare", tmp_path / "s.db", tmp_path / "s.db")
+    assert compared.exit_code == 2
+    assert "2 runs repeat other ones" in compared.stderr
+
+
 def test_sweep_command_drives_entities_of_other_tools(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
     """The key of a run depends on the content of the file of the stack."""
     stack = tmp_path / "stack.yaml"

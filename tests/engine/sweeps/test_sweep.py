@@ -83,7 +83,9 @@ def test_keys_depend_on_the_content_of_setting_files(scenario: Path, setting: st
     }
     file = scenario.with_name("setting.yaml")
     points = [{"channel": str(file)}, {"channel": "none"}] if setting == "axis" else SPEEDS
-    given = {} if setting == "axis" else {setting: {"Ego": str(file)} if setting == "drive" else str(file)}
+    given: dict[str, Any] = (
+        {} if setting == "axis" else {setting: {"Ego": str(file)} if setting == "drive" else str(file)}
+    )
     keys = []
     for text in texts["channel" if setting == "axis" else setting]:
         file.write_text(text)
