@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import msgspec
+
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, STATUSES, ResultStore, StoredRun
@@ -70,17 +72,18 @@ def summaries(
 ) -> list[PointSummary]:
     """Return the runs by combination of values: numbers in ascending order, texts in the order of the runs.
 
-    by  names of the axes that distinguish combinations; None: all
+    by  names that distinguish combinations: axes, and parameters that a distribution varies; None: all
 
-    Raise SettingError for an axis that no run has, or an unknown interval.
+    Raise SettingError for a name that no run has, or an unknown interval.
     """
     if interval not in INTERVALS:
         raise SettingError(Diagnostic(f"--interval: unknown interval {interval!r}", f"expected {', '.join(INTERVALS)}"))
     groups: dict[tuple[tuple[str, Any], ...], dict[str, int]] = {}
     names: dict[str, None] = {}
     for run in runs:
-        names.update(dict.fromkeys(run.point))
-        chosen = [(name, run.point[name]) for name in (names if by is None else by) if name in run.point]
+        values = {**run.point, **_varied_parameters(run)}
+        names.update(dict.fromkeys(values))
+        chosen = [(name, values[name]) for name in (names if by is None else by) if name in values]
         counts = groups.setdefault(tuple(chosen), dict.fromkeys(STATUSES, 0))
         counts[run.status] += 1
     unknown = [name for name in by or () if name not in names]
@@ -94,6 +97,18 @@ def summaries(
         rate = INTERVALS[interval](counts[PASSED], trials, confidence) if trials else None
         found.append(PointSummary(dict(point), {name: count for name, count in counts.items() if count}, rate))
     return found
+
+
+def _varied_parameters(run: StoredRun) -> dict[str, Any]:
+    """Return the values of the parameters that the distribution of a run varies; empty for other runs."""
+    if run.run is None or not run.settings:
+        return {}
+    names = msgspec.json.decode(run.settings, type=_Distribution).varied
+    return {name: run.result[column] for name in names if (column := f"parameter.{name}") in run.result}
+
+
+class _Distribution(msgspec.Struct):
+    varied: tuple[str, ...] = ()
 
 
 def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:

@@ -169,6 +169,18 @@ def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_
     assert "2 already in the store (1 failed, 1 passed)" in eidrive(*arguments).stdout
 
 
+def test_results_of_a_distribution_by_its_parameters(eidrive: Eidrive, distribution: Path, tmp_path: Path) -> None:
+    """Speeds 10, 30 and 50: below the limit of 20, above it, and excluded."""
+    store = tmp_path / "s.db"
+    assert eidrive("sweep", distribution, "--seeds", "1-2", "--store", store, "--workers", "1").exit_code == 0
+    rows = [json.loads(line) for line in eidrive("results", store, "--by", "Speed", "--json").stdout.splitlines()]
+    points = [{"Speed": 10}, {"Speed": 30}, {}]
+    assert [(row["point"], row["runs"]) for row in rows] == [
+        (point, {status: 2}) for point, status in zip(points, ("passed", "failed", "excluded"), strict=True)
+    ]
+    assert eidrive("results", store).stdout.splitlines()[1].split()[:3] == ["0", "10", "2"]
+
+
 def test_results_of_changed_inputs_are_a_warning(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
     sweep = ("sweep", scenario, "--vary", "Speed=10,12", "--store", tmp_path / "s.db", "--workers", "1")
     assert eidrive(*sweep).exit_code == 0
