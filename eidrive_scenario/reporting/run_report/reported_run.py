@@ -18,7 +18,7 @@ from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 if TYPE_CHECKING:
     from eidrive_scenario.simulation import RunResult
 
-_OF_REPORT = ("folder", "replay", "axes")
+_OF_REPORT = ("folder", "replay", "axes", "sweep")
 """Fields that are no part of a result."""
 
 
@@ -56,6 +56,8 @@ class ReportedRun(BaseModel):
     command: str = ""
     axes: dict[str, int | float | str] = {}
     """Values of the axes of a sweep; empty for other runs."""
+    sweep: str = ""
+    """Store of the sweep; empty for other runs."""
     folder: Path | None = None
     """Folder of the run; None if the result was not read from a file."""
     replay: str = ""

@@ -40,8 +40,9 @@ class RunGroup:
     def varied(self) -> tuple[str, ...]:
         """Axes of a sweep with numbers, or parameters of a distribution, whose values differ."""
         names = dict.fromkeys(self.axes)
-        if any(run.run is not None for run in self.runs):
-            names.update(dict.fromkeys(name for run in self.runs for name in run.parameters))
+        for run in self.runs:
+            if run.run is not None:
+                names.update(dict.fromkeys(_names(run.settings.get("varied")) or run.parameters))
         return tuple(name for name in names if len({run.value_of(name) for run in self.runs}) > 1)
 
     @property
@@ -76,6 +77,9 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
     settings = [_comparable(run, axes) for run in runs]
     names = dict.fromkeys(name for one in settings for name in one)
     differing = [name for name in names if len({one.get(name, "") for one in settings}) > 1]
+    differing = [
+        name for name in differing if not _depends_on_axes([one.get(name, "") for one in settings], runs, axes)
+    ]
     found: dict[tuple[str, ...], list[ReportedRun]] = {}
     for run, one in zip(runs, settings, strict=True):
         found.setdefault((run.channel, *(one.get(name, "") for name in differing)), []).append(run)
@@ -101,6 +105,23 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
         )
         for ((channel, *values), members), options in zip(found.items(), chosen, strict=True)
     ]
+
+
+def _depends_on_axes(values: Sequence[str], runs: Sequence[ReportedRun], axes: Sequence[str]) -> bool:
+    """Whether the values of a setting follow from the axes with numbers, or from the number of the run.
+
+    Such as those of a parameter that is an expression of another one, or of a property with the value `$name`. They
+    change along the axes within a sweep; the other sweeps have the same value at the same point.
+    """
+    at_point: dict[object, str] = {}
+    in_sweep: dict[object, set[str]] = {}
+    for run, value in zip(runs, values, strict=True):
+        texts = tuple(sorted((name, held) for name, held in run.axes.items() if name not in axes))
+        point = texts, run.run, tuple(run.axes.get(name) for name in axes)
+        if at_point.setdefault(point, value) != value:
+            return False
+        in_sweep.setdefault((run.sweep, texts), set()).add(value)
+    return any(len(found) > 1 for found in in_sweep.values())
 
 
 def _differing_options(first: Sequence[tuple[str, ReportedRun]]) -> list[dict[str, str]]:

@@ -64,7 +64,8 @@ def _reported(run: StoredRun, store: Path) -> ReportedRun:
         reported = parse_run(_as_result(run), store)
     else:
         reported = parse_run(kept[1], kept[0]).model_copy(update={"folder": kept[0].parent})
-    return reported.model_copy(update={"axes": {name: value for name, value in run.point.items() if name != "run"}})
+    axes = {name: value for name, value in run.point.items() if name != "run"}
+    return reported.model_copy(update={"axes": axes, "sweep": str(store)})
 
 
 def _kept_result(run: StoredRun, store: Path) -> tuple[Path, Mapping[str, Any]] | None:

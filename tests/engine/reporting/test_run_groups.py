@@ -70,6 +70,58 @@ def test_group_runs_separates_changed_scenario_files() -> None:
     }
 
 
+def swept(speed: float, detector: str = "oracle", *, store: str = "a.db", **settings: Any) -> ReportedRun:
+    """Run of a sweep over a speed; `settings` replace those that follow from it."""
+    parameters = {"Speed": str(speed), "Limit": str(2.0 * speed)}
+    content: dict[str, Any] = {
+        "parameters": parameters,
+        "stations": {"Ego": {"target_speed": speed, "detector": detector, "range": 50.0}},
+        **settings,
+    }
+    return ReportedRun(
+        scenario="s",
+        seed=1,
+        passed=True,
+        end_reason="stop trigger",
+        parameters=parameters,
+        settings=content,
+        axes={"Speed": speed, "detector": detector},
+        sweep=store,
+    )
+
+
+def test_settings_that_follow_from_an_axis_do_not_separate_groups() -> None:
+    """A parameter that is an expression of the axis, and a property of a station."""
+    runs = [swept(speed, detector) for speed in (8.0, 10.0, 12.0) for detector in ("oracle", "lidar")]
+    groups = group_runs(runs)
+    assert [(dict(group.differing), len(group.runs), group.varied) for group in groups] == [
+        ({"detector": "oracle"}, 3, ("Speed",)),
+        ({"detector": "lidar"}, 3, ("Speed",)),
+    ]
+
+
+def test_settings_of_other_sweeps_separate_groups() -> None:
+    """The second sweep continues the axis of the first one with another range of the detector."""
+    far: dict[str, Any] = {"stations": {"Ego": {"target_speed": 8.0, "detector": "oracle", "range": 80.0}}}
+    runs = [*(swept(speed) for speed in (8.0, 10.0)), *(swept(speed, store="b.db", **far) for speed in (12.0, 14.0))]
+    assert {group.differing["stations.Ego.range"] for group in group_runs(runs)} == {"50", "80"}
+
+
+def test_settings_that_differ_at_one_point_separate_groups() -> None:
+    other: dict[str, Any] = {"stations": {"Ego": {"target_speed": 7.0, "detector": "oracle", "range": 50.0}}}
+    groups = group_runs([swept(8.0), swept(10.0), swept(8.0, **other)])
+    assert {group.differing["stations.Ego.target_speed"] for group in groups} == {"7", "8", "10"}
+
+
+def test_runs_of_a_distribution_are_one_group_with_its_varied_parameters() -> None:
+    runs = [
+        swept(speed, run=None, varied=["Speed"]).model_copy(update={"run": number, "axes": {}, "sweep": ""})
+        for number, speed in enumerate((8.0, 10.0))
+    ]
+    (group,) = group_runs(runs)
+    assert (dict(group.differing), group.varied) == ({}, ("Speed",))
+
+
 def test_report_counts_copied_result_once(tmp_path: Path) -> None:
     one = run()
     page = write_report([one, dict(one), run(seed=2)], tmp_path).read_text(encoding="utf-8")
