@@ -18,8 +18,8 @@ WIDTH, HEIGHT = 11.0, 3.0
 """Size of the chart [in]; a page scales it to its own width."""
 LEFT, RIGHT, TOP, BOTTOM = 0.047, 0.873, 0.95, 0.14
 """Edges of the axes as fractions of the size. The names of the series are to the right of them."""
-WIDE = 0.99
-"""Right edge of the axes without names."""
+WIDE = 0.975
+"""Right edge of the axes without names; half of the number at the end of the axis is beyond it."""
 NAME_SPACING = 11.5
 """Minimum vertical distance between names [pt]."""
 

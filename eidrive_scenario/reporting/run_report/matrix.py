@@ -55,7 +55,7 @@ def parameter_matrix(runs: Sequence[ReportedRun], varied: Sequence[str]) -> Matr
     for run in runs:
         found.setdefault(along(run), {}).setdefault(across(run), []).append(run)
     columns = {name for cells in found.values() for name in cells}
-    if not all(run.axes for run in runs) and len(runs) <= max(len(columns), len(found)):
+    if not all(run.is_swept for run in runs) and len(runs) <= max(len(columns), len(found)):
         return None
     return _matrix(f"{down} \\ {varied[0]}" if down else varied[0], found, least_rows=1)
 

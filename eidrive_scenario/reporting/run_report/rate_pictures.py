@@ -89,7 +89,7 @@ def rate_curves(groups: Sequence[RunGroup]) -> Iterator[RateCurves]:
 def _line(runs: Sequence[ReportedRun], axis: str, name: str, color: str) -> ChartSeries | None:
     """Return the rates of a group at each level; None if no value occurs twice and the runs are no sweep."""
     levels = levels_of(runs, axis)
-    if levels is None or (not runs[0].axes and len(levels.centers) == len(runs)):
+    if levels is None or (not runs[0].is_swept and len(levels.centers) == len(runs)):
         return None
     found: dict[int, list[bool]] = defaultdict(list)
     for run in runs:

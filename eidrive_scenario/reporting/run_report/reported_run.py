@@ -71,6 +71,11 @@ class ReportedRun(BaseModel):
         return found if found is None or isinstance(found, int | float) else str(found)
 
     @property
+    def is_swept(self) -> bool:
+        """Whether the run is one of a sweep, whose values stand for themselves even if each occurs once."""
+        return bool(self.axes or self.sweep)
+
+    @property
     def finished(self) -> bool:
         """False if the run ended at its time limit."""
         return self.end_reason != TIME_LIMIT

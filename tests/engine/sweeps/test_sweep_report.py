@@ -97,6 +97,16 @@ def test_sweep_with_out_keeps_recordings_of_failed_runs(eidrive: Eidrive, scenar
     assert "Ego drove up to 30.00 m/s" in page.text_content(), "the reason of the kept result"
 
 
+def test_sweep_of_a_distribution_has_a_curve_over_its_parameter(
+    eidrive: Eidrive, distribution: Path, tmp_path: Path
+) -> None:
+    """Speeds 10, 30 and 50: below the limit of 20, above it, and excluded."""
+    assert eidrive("sweep", distribution, "--store", tmp_path / "s.db", "--workers", "1").exit_code == 0
+    page = root_of(report_files([tmp_path / "s.db"], tmp_path / "report"))
+    assert page.xpath("//h3[contains(., 'over Speed')]")
+    assert tables(page)[0] == [["Speed", "10", "30"], ["none", "100 % 1/1 0.21 … 1.00", "0 % 0/1 0.00 … 0.79"]]
+
+
 def test_record_without_out_is_invalid_input(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
     done = eidrive("sweep", scenario, "--store", tmp_path / "s.db", "--record", "never")
     assert done.exit_code == 2
