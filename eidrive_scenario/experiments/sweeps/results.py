@@ -72,20 +72,28 @@ def summaries(
 ) -> list[PointSummary]:
     """Return the runs by combination of values: numbers in ascending order, texts in the order of the runs.
 
-    by  names that distinguish combinations: axes, and parameters that a distribution varies; None: all
+    by  names that distinguish combinations: axes, and parameters of a distribution; None: all axes, and the parameters
+        that have several values
 
     Raise SettingError for a name that no run has, or an unknown interval.
     """
     if interval not in INTERVALS:
         raise SettingError(Diagnostic(f"--interval: unknown interval {interval!r}", f"expected {', '.join(INTERVALS)}"))
-    groups: dict[tuple[tuple[str, Any], ...], dict[str, int]] = {}
-    names: dict[str, None] = {}
+    axes: dict[str, None] = {}
+    parameters: dict[str, set[Any]] = {}
+    outcomes: list[tuple[dict[str, Any], str]] = []
     for run in runs:
-        values = {**run.point, **_varied_parameters(run)}
-        names.update(dict.fromkeys(values))
-        chosen = [(name, values[name]) for name in (names if by is None else by) if name in values]
-        counts = groups.setdefault(tuple(chosen), dict.fromkeys(STATUSES, 0))
-        counts[run.status] += 1
+        axes.update(dict.fromkeys(run.point))
+        varied = _varied_parameters(run)
+        for name, value in varied.items():
+            parameters.setdefault(name, set()).add(value)
+        outcomes.append(({**run.point, **varied}, run.status))
+    names = dict.fromkeys([*axes, *parameters])
+    columns = [name for name in names if name in axes or len(parameters[name]) > 1] if by is None else by
+    groups: dict[tuple[tuple[str, Any], ...], dict[str, int]] = {}
+    for values, status in outcomes:
+        chosen = tuple((name, values[name]) for name in columns if name in values)
+        groups.setdefault(chosen, dict.fromkeys(STATUSES, 0))[status] += 1
     unknown = [name for name in by or () if name not in names]
     if unknown:
         hint = f"expected {', '.join(names)}" if names else "the runs vary by their seeds only"

@@ -104,16 +104,17 @@ class ResultStore:
             except OSError as error:
                 raise _error(f"cannot write: {error.strerror}", "choose another file", path) from error
             stack.enter_context(exclusive(path))
-            is_new = not path.exists()
-            connection = _checked(path, lambda: _connect(path))
-            stack.callback(connection.close)
-            store = cls(path, connection)
-            _checked(path, store._create)
-            store._check_versions(versions)
+            is_new, store = not path.exists(), None
             try:
+                connection = _checked(path, lambda: _connect(path))
+                stack.callback(connection.close)
+                opened = cls(path, connection)
+                _checked(path, opened._create)
+                opened._check_versions(versions)
+                store = opened
                 yield store
             except InputError:
-                if is_new and not store.statuses():
+                if is_new and (store is None or not store.statuses()):
                     path.unlink(missing_ok=True)
                 raise
 
