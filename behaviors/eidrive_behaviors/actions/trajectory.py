@@ -287,7 +287,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             self._enter(self._pose(self._s))
         speed = None
         if self._timing is not None:
-            speed = self._layout.speed_at(self._clock(0.0), self._speeds) / self._timing.scale
+            speed = self._layout.speed_at(self._clock(0.0)) / self._timing.scale
             if starts:
                 motion.set_speed(speed)
         self._s = driven.place

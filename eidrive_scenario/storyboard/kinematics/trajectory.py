@@ -111,14 +111,13 @@ class TrajectoryCurve:
         span = self.times[index + 1] - self.times[index]
         return s[index] + share * (speeds[index] * span * (1.0 - share) + share * way)
 
-    def speed_at(self, time: float, speeds: Sequence[float] | None = None) -> float:
-        """Return the speed of `at_time` at a time [m/s]: 0 before the first point, that of the end after the last."""
+    def speed_at(self, time: float) -> float:
+        """Return the mean speed between the points around a time [m/s]: 0 before the first one, the last at the end."""
         if self.times is None or time < self.times[0]:
             return 0.0
-        index, share = self._interval(self.times, time)
+        index, _ = self._interval(self.times, time)
         span = self.times[index + 1] - self.times[index]
-        mean = (self.timed[index + 1] - self.timed[index]) / span if span > 0.0 else 0.0
-        return mean if speeds is None else (1.0 - 2.0 * share) * speeds[index] + 2.0 * share * mean
+        return (self.timed[index + 1] - self.timed[index]) / span if span > 0.0 else 0.0
 
     def time_at(self, s: float) -> float:
         """Return the time at an arc length [s]; 0 without times."""

@@ -195,11 +195,7 @@ def test_track_follows_a_teleported_actor_and_extends_open_trajectories() -> Non
     assert around.track(0.5, 2.0, 1.0) == pytest.approx(398.0)
 
 
-def test_speed_at_a_time_is_the_derivative_of_the_place() -> None:
+def test_speed_at_a_time_is_the_mean_between_points() -> None:
     way = polyline((0, 0, 1.0, None), (30, 0, 4.0, None), (30, 0, 6.0, None), (70, 0, 8.0, None))
     assert [way.speed_at(time) for time in (0.5, 1.0, 3.9, 5.0, 7.0, 9.0)] == [0.0, 10.0, 10.0, 0.0, 20.0, 20.0]
-    speeds = way.speeds_from(4.0)
-    for time in (1.5, 3.0, 7.5):
-        slope = (way.at_time(time + 1e-6, speeds) - way.at_time(time - 1e-6, speeds)) / 2e-6
-        assert way.speed_at(time, speeds) == pytest.approx(slope, abs=1e-5)
     assert polyline((0, 0, None, None), (3, 0, None, None)).speed_at(1.0) == 0.0
