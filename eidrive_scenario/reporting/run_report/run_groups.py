@@ -110,8 +110,8 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
 def _depends_on_axes(values: Sequence[str], runs: Sequence[ReportedRun], axes: Sequence[str]) -> bool:
     """Whether the values of a setting follow from the axes with numbers, or from the number of the run.
 
-    Such as those of a parameter that is an expression of another one, or of a property with the value `$name`. They
-    change along the axes within a sweep; the other sweeps have the same value at the same point.
+    Examples are a parameter that is an expression of another one, and a property with the value `$name`. The values
+    change along the axes within a sweep, and other sweeps have the same value at the same point.
     """
     at_point: dict[object, str] = {}
     in_sweep: dict[object, set[str]] = {}
