@@ -155,16 +155,18 @@ class _LimitedBlock:
             raise WallLimitError(watchdog.limit.seconds, where=running_line(error.__traceback__)) from error
 
 
-def _is_entered_or_left(frame: FrameType | None) -> bool:
-    """Whether a frame belongs to the beginning or the end of a limited block."""
+def _is_protected(frame: FrameType | None) -> bool:
+    """Whether a frame belongs to the beginning or the end of a limited block, or saves notes."""
     while frame is not None:
-        if frame.f_code in _BOUNDARIES:
+        if frame.f_code in _PROTECTED:
             return True
         frame = frame.f_back
     return False
 
 
-_BOUNDARIES = frozenset({_LimitedBlock.__enter__.__code__, _LimitedBlock.__exit__.__code__})
+_PROTECTED = frozenset(
+    {_LimitedBlock.__enter__.__code__, _LimitedBlock.__exit__.__code__, Limit.publish.__code__}  # which has a file open
+)
 
 
 class _Watchdog:
@@ -176,7 +178,7 @@ class _Watchdog:
         self._by_signal = _SIGNAL is not None and threading.current_thread() is threading.main_thread()
         self._before: Callable[[int, FrameType | None], object] | int | None = None
         self._is_postponed = False
-        """Whether the last interruption fell into the beginning or the end of the block."""
+        """Whether the last interruption fell into the beginning or the end of the block, or into saving notes."""
         self._ended = threading.Event()
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._watch, name="eidrive wall limit", daemon=True)
@@ -226,7 +228,7 @@ class _Watchdog:
                 return
             if self._by_signal and _SIGNAL is not None:
                 signal.pthread_kill(self._target, _SIGNAL)
-            elif _is_entered_or_left(sys._current_frames().get(self._target)):
+            elif _is_protected(sys._current_frames().get(self._target)):
                 self._is_postponed = True
             else:
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._target), ctypes.py_object(LimitReached))
@@ -234,7 +236,7 @@ class _Watchdog:
     def _interrupted(self, number: int, frame: FrameType | None) -> None:
         if not self.limit.armed:
             return
-        if _is_entered_or_left(frame):
+        if _is_protected(frame):
             self._is_postponed = True
         else:
             raise LimitReached

@@ -36,10 +36,12 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
     profile, stations = resolved.channel_profile, dict(resolved.stations)
     later = () if settings.channel is not None else tuple(_later_channels(scenario))
     files = [*_scenario_files(scenario), *_setting_files((profile, *later, *stations.values()), scenario)]
+    declared = [one for several in setup.declared_criteria.values() for one in several]
     models = distributions(
         [
+            *setup.storyboard.extensions,
             *(("controllers", name) for name in settings.controllers.values()),
-            *(("criteria", one.kind) for one in added),
+            *(("criteria", one.kind) for one in [*declared, *added]),
         ]
     )
     return ResolvedSettings(

@@ -52,6 +52,8 @@ class Storyboard:
         self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed, empty_view=_empty_view())
         builder = Builder(scenario, self.context, actions or registry("actions"), conditions or registry("conditions"))
         self.init, self.root = builder.build()
+        self.extensions = frozenset(builder.extensions)
+        """Group and name of each action and condition."""
         for name, actor in self.context.actors.items():
             actor.set_trailer(declared_trailer(scenario.entities[name]))
         check_acyclic(self.context.actors)

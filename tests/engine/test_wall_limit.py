@@ -21,7 +21,7 @@ from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.simulation.hung_runs import describe_dump
-from eidrive_scenario.wall_limit import current_limit, limit_wall_time
+from eidrive_scenario.wall_limit import LastResort, Limit, current_limit, limit_wall_time, set_last_resort
 
 pytestmark = pytest.mark.timeout(600)
 LONG = 3600.0
@@ -139,6 +139,31 @@ def test_interruption_while_a_block_ends_leaves_no_limit() -> None:
         if seen <= event:
             break
     assert 8 < event < 99
+
+
+def test_interruption_waits_until_notes_are_saved() -> None:
+    """Otherwise a file remains open, which is a warning at a later time."""
+    saved: list[str] = []
+
+    def save(limit: Limit) -> None:
+        if limit.notes:
+            time.sleep(0.5)
+            saved.extend(limit.notes)
+
+    def add_note_and_hang() -> None:
+        with limit_wall_time(0.1) as limit:
+            assert limit is not None
+            limit.add_note("a note")
+            while True:
+                pass
+
+    before = set_last_resort(LastResort(end=lambda limit, frame: None, publish=save))
+    try:
+        with pytest.raises(WallLimitError):
+            add_note_and_hang()
+    finally:
+        set_last_resort(before)
+    assert saved == ["a note"]
 
 
 def test_limits_that_end_with_their_blocks_leave_none() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -19,6 +20,7 @@ from eidrive_scenario.experiments.sweeps.axes import (
     is_setting,
     settings_at,
 )
+from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.openscenario import ConcreteRun, load_distribution
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json, package_versions, sha256_of
 from eidrive_scenario.simulation import RunSettings, Simulation
@@ -190,8 +192,16 @@ def _contents(scenario: Path, points: Sequence[Point], settings: RunSettings) ->
 def _digest(scenario: Path, resolved: ResolvedSettings) -> str:
     """Return the digest of the file of a scenario or distribution, and of the inputs among resolved settings."""
     inputs = resolved.as_json()
-    file = sha256_of(scenario.read_bytes())
-    return sha256_of(canonical_json({"file": file, **{name: inputs[name] for name in _INPUTS}}).encode())
+    content = {name: inputs[name] for name in _INPUTS}
+    content |= {"file": sha256_of(scenario.read_bytes()), "code": [_code(one) for one in resolved.extensions.values()]}
+    return sha256_of(canonical_json(content).encode())
+
+
+def _code(extension: str) -> str:
+    """Return the digest of the module of an extension, named by its package and entry point; empty if unknown."""
+    module = sys.modules.get(extension.rpartition("(")[2].partition(":")[0])
+    file = getattr(module, "__file__", None)
+    return sha256_of(Path(file).read_bytes()) if file is not None and is_regular_file(Path(file)) else ""
 
 
 def versions() -> Mapping[str, str]:

@@ -66,6 +66,8 @@ class Builder:
         self._conditions = conditions
         self._diagnostics: list[Diagnostic] = []
         self._built: list[Condition] = []
+        self.extensions: set[tuple[str, str]] = set()
+        """Group and name of each action and condition of the storyboard."""
         self._selections = Selections(scenario)
 
     def build(self) -> tuple[InitBlock, StoryboardElement]:
@@ -164,6 +166,7 @@ class Builder:
             name = _registered_name(leaf, self._actions)
             if not self._known(name, self._actions, leaf, f"{name} is not supported"):
                 continue
+            self.extensions.add((self._actions.kind, name))
             try:
                 one = self._selections.single(leaf)
                 for parent_element in [one] if parent is leaf else self._selections.alternatives(parent):
@@ -207,6 +210,7 @@ class Builder:
         name = _registered_name(leaf, self._conditions)
         if not self._known(name, self._conditions, leaf, f"{name} is not supported"):
             return None
+        self.extensions.add((self._conditions.kind, name))
         make = self._conditions.load(name, Condition)
         base = Condition if by_entity is None else EntityCondition
         type_error = RegistryError(f"{self._conditions.describe(name)} is not a subclass of {base.__name__}")

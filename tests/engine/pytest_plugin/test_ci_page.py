@@ -80,7 +80,7 @@ def test_commands_of_example_pass_in_new_project(tmp_path: Path) -> None:
     run(f"eidrive init {project}", tmp_path)
     environment["PYTHONPATH"] = os.pathsep.join([str(project), str(installed(project, tmp_path / "installed"))])
     listed = commands("GitHub Actions")
-    assert [line for line in listed if line.startswith(INSTALL)] == ["pip install -e . pytest pytest-xdist"]
+    assert [line for line in listed if line.startswith(INSTALL)] == ["pip install -e . pytest-xdist"]
     executed = [line for line in listed if not line.startswith(INSTALL)]
     assert [line.split()[0] for line in executed] == ["eidrive", "pytest", "eidrive"]
     for command in executed:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import Future
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of, 
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import SweepProgress, run_sweep
 from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
-from eidrive_scenario.simulation import RunSettings
+from eidrive_scenario.registry import registry
+from eidrive_scenario.simulation import RunSettings, Simulation
 
 SPEEDS: list[Point] = points_of(parse_axes(["Speed=10,30,50"]), "grid", None, 1)
 
@@ -93,6 +95,24 @@ def test_keys_depend_on_the_content_of_setting_files(scenario: Path, setting: st
         assert first == second
         keys.append(set(first))
     assert len(keys[0] & keys[1]) == (1 if setting == "axis" else 0)
+
+
+def test_keys_depend_on_the_modules_of_extensions(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A criterion that the scenario declares; its module is part of the key, its resolved settings name it."""
+    module = tmp_path / "gap_of_sweep.py"
+    code = "from eidrive_criteria.max_speed import MaxSpeed\n\nclass Gap(MaxSpeed):\n    pass\n"
+    module.write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    point = EntryPoint("gap_of_sweep", "gap_of_sweep:Gap", "eidrive_scenario.criteria")
+    monkeypatch.setitem(registry("criteria")._points, point.name, point)
+    scenario.write_text(scenario.read_text().replace("{max_speed:", "{gap_of_sweep:"))
+    first = {job.key for job in plan_of(scenario, SPEEDS, RunSettings())}
+    module.write_text(f"{code}# changed\n")
+    assert not first & {job.key for job in plan_of(scenario, SPEEDS, RunSettings())}
+    with Simulation(scenario) as simulation:
+        assert "gap_of_sweep:Gap" in simulation.resolved.extensions["criteria.gap_of_sweep"]
 
 
 def test_keys_depend_on_the_values_of_a_distribution(distribution: Path) -> None:
