@@ -164,9 +164,7 @@ def _is_protected(frame: FrameType | None) -> bool:
     return False
 
 
-_PROTECTED = frozenset(
-    {_LimitedBlock.__enter__.__code__, _LimitedBlock.__exit__.__code__, Limit.publish.__code__}  # which has a file open
-)
+_PROTECTED = frozenset({_LimitedBlock.__enter__.__code__, _LimitedBlock.__exit__.__code__, Limit.publish.__code__})
 
 
 class _Watchdog:

@@ -110,7 +110,7 @@ def judge_impact(
     if other not in view.rows or _speed(view, before, other) <= STOPPED:
         return Impact(side, True, "the other one had stopped")
     state, there = view.states[row], view.plain_boxes[view.rows[other]]
-    reverses = _longitudinal_speed(view, before, of) < 0.0
+    reverses = _longitudinal_speed(view, before, of) < -STOPPED
     bearing = math.atan2(there[1] - state.y, there[0] - state.x) - state.yaw - (math.pi if reverses else 0.0)
     if abs(math.remainder(bearing, math.tau)) > BEHIND:
         return Impact(side, False, "it was driving away from it in reverse" if reverses else "it was hit from behind")

@@ -111,11 +111,13 @@ def _varied_parameters(run: StoredRun) -> dict[str, Any]:
     """Return the values of the parameters that the distribution of a run varies; empty for other runs."""
     if run.run is None or not run.settings:
         return {}
-    names = msgspec.json.decode(run.settings, type=_Distribution).varied
+    names = msgspec.json.decode(run.settings, type=_VariedNames).varied
     return {name: run.result[column] for name in names if (column := f"parameter.{name}") in run.result}
 
 
-class _Distribution(msgspec.Struct):
+class _VariedNames(msgspec.Struct):
+    """Part of the settings of a run that is read."""
+
     varied: tuple[str, ...] = ()
 
 

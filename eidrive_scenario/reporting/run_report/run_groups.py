@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from eidrive_scenario.experiments.sweeps.axes import PARAMETER, is_setting
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
@@ -77,9 +77,8 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
     settings = [_comparable(run, axes) for run in runs]
     names = dict.fromkeys(name for one in settings for name in one)
     differing = [name for name in names if len({one.get(name, "") for one in settings}) > 1]
-    differing = [
-        name for name in differing if not _depends_on_axes([one.get(name, "") for one in settings], runs, axes)
-    ]
+    points = [_point(run, axes) for run in runs]
+    differing = [name for name in differing if not _depends_on_axes([one.get(name, "") for one in settings], points)]
     found: dict[tuple[str, ...], list[ReportedRun]] = {}
     for run, one in zip(runs, settings, strict=True):
         found.setdefault((run.channel, *(one.get(name, "") for name in differing)), []).append(run)
@@ -107,7 +106,20 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
     ]
 
 
-def _depends_on_axes(values: Sequence[str], runs: Sequence[ReportedRun], axes: Sequence[str]) -> bool:
+class _Point(NamedTuple):
+    """Place of a run in its sweep: values of the axes with texts, number of the run and values of the other axes."""
+
+    sweep: str
+    texts: tuple[tuple[str, object], ...]
+    numbers: tuple[object, ...]
+
+
+def _point(run: ReportedRun, axes: Sequence[str]) -> _Point:
+    texts = tuple(sorted((name, value) for name, value in run.axes.items() if name not in axes))
+    return _Point(run.sweep, texts, (run.run, *(run.axes.get(name) for name in axes)))
+
+
+def _depends_on_axes(values: Sequence[str], points: Sequence[_Point]) -> bool:
     """Whether the values of a setting follow from the axes with numbers, or from the number of the run.
 
     Examples are a parameter that is an expression of another one, and a property with the value `$name`. The values
@@ -115,12 +127,10 @@ def _depends_on_axes(values: Sequence[str], runs: Sequence[ReportedRun], axes: S
     """
     at_point: dict[object, str] = {}
     in_sweep: dict[object, set[str]] = {}
-    for run, value in zip(runs, values, strict=True):
-        texts = tuple(sorted((name, held) for name, held in run.axes.items() if name not in axes))
-        point = texts, run.run, tuple(run.axes.get(name) for name in axes)
-        if at_point.setdefault(point, value) != value:
+    for (sweep, texts, numbers), value in zip(points, values, strict=True):
+        if at_point.setdefault((texts, numbers), value) != value:
             return False
-        in_sweep.setdefault((run.sweep, texts), set()).add(value)
+        in_sweep.setdefault((sweep, texts), set()).add(value)
     return any(len(found) > 1 for found in in_sweep.values())
 
 
