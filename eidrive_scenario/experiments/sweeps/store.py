@@ -12,7 +12,7 @@ from typing import Any, Self, TypeVar
 
 import msgspec
 
-from eidrive_scenario.errors import Diagnostic, InputError, SettingError, SimulationError
+from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError, SimulationError
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.files.bounded import is_regular_file
 
@@ -89,7 +89,7 @@ class ResultStore:
     def open(cls, path: Path, versions: Mapping[str, str]) -> Iterator[Self]:
         """Open a store for writing, and create it if there is none; other processes may read it.
 
-        An InputError of the caller deletes a new store again if it has no runs.
+        An EidriveError of the caller deletes a new store again if it has no runs.
 
         versions  versions of the packages that affect results: a store contains results of one set of them
 
@@ -113,7 +113,7 @@ class ResultStore:
                 opened._check_versions(versions)
                 store = opened
                 yield store
-            except InputError:
+            except EidriveError:
                 if is_new and (store is None or not store.statuses()):
                     path.unlink(missing_ok=True)
                 raise

@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 from sweep_runs import RUN, VERSIONS, opened
 
-from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
+from eidrive_scenario.errors import Diagnostic, EidriveError, SettingError, SimulationError
 from eidrive_scenario.experiments.sweeps.store import ResultStore
 
 
@@ -54,18 +54,23 @@ def add_and_raise(path: Path) -> None:
         raise SettingError(Diagnostic("no axes"))
 
 
-def test_input_error_deletes_new_store_without_runs(tmp_path: Path) -> None:
+@pytest.mark.parametrize("error", [SettingError(Diagnostic("no axes")), SimulationError("no worker")])
+def test_error_deletes_new_store_without_runs(tmp_path: Path, error: EidriveError) -> None:
     path = tmp_path / "s.db"
-    with pytest.raises(SettingError, match="no axes"), opened(path):
-        raise SettingError(Diagnostic("no axes"))
+    with pytest.raises(type(error)), opened(path):
+        raise error
     assert not path.exists()
+
+
+def test_error_keeps_new_store_with_runs(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
     with pytest.raises(SettingError, match="no axes"):
         add_and_raise(path)
     with ResultStore.read(path) as store:
         assert list(store.runs()) == [RUN]
 
 
-def test_input_error_keeps_existing_store_without_runs(tmp_path: Path) -> None:
+def test_error_keeps_existing_store_without_runs(tmp_path: Path) -> None:
     path = tmp_path / "s.db"
     with opened(path):
         pass
