@@ -21,6 +21,7 @@ from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
 from eidrive_scenario.world.physics.bullet import connect, disconnect
 from eidrive_scenario.world.physics.contacts import ContactTracker
 from eidrive_scenario.world.physics.couplings import Couplings
+from eidrive_scenario.world.physics.crossings import Crossings, find_crossings
 from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
 from eidrive_scenario.world.physics.free_space import FreeSpace
@@ -218,8 +219,7 @@ class World:
     def raycast(
         self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = (), *, sensor: str = ""
     ) -> RayHits:
-        """Return the first hits of rays (M, 3) to (M, 3). Actors in `ignore` and actors hidden from the sensor are
-        skipped.
+        """Return the first hits of rays (M, 3) to (M, 3) except on actors in `ignore` and actors hidden from a sensor.
 
         `sensor` is its name. Without a sensor, the visibility for sensors in general is used.
         """
@@ -247,9 +247,10 @@ class World:
         """Return True if certainly nothing is between a point of an actor and the box of another, by their rows."""
         return self._free_space.is_free(self.view(), own, origin, target)
 
-    def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
-        """Return whether the line of sight from the origin (3,) to each target (M, 3) is free, except for `ignore`."""
-        return np.asarray(self.raycast(origin, targets, ignore).fraction >= 1.0)
+    def crossings(self, begins: Array, ends: Array, most: int) -> Crossings:
+        """Return the first `most` actors, and the scenery, that lines from points (M, 3) to points (M, 3) cross."""
+        self._refresh()
+        return find_crossings(self._client, self._scenery, self.view(), begins, ends, most)
 
     def camera(
         self,
@@ -314,7 +315,6 @@ class World:
 
     def _refresh(self) -> None:
         """Create the bodies for rays, and move those of actors to their current poses."""
-        raised = self._scenery.raise_ground()
-        if self._scenery.raise_obstacles() or raised:
+        if self._scenery.raise_ground() | self._scenery.raise_obstacles():
             self._changed()
         self._physics.refresh(self._actors.bodies)

@@ -15,12 +15,10 @@ from eidrive_scenario.world.view import WorldView
 
 Place = tuple[float, float, float]
 
-_BEYOND = 0.02
-"""Distance behind a hit at which the ray continues [m]; pybullet rarely reports the same body again from there."""
-_FEW = 8
+_FEW = 16
 """Maximum number of rays that are first tested for any hit, which is faster."""
 _MOST_BODIES = 16
-"""Maximum number of bodies per ray; further bodies do not change the path loss."""
+"""Maximum number of blocking actors per line; further actors do not change the path loss."""
 
 
 def antenna_position(view: WorldView, spec: ActorSpec, height: float | None) -> Place:
@@ -39,7 +37,7 @@ def antenna_position(view: WorldView, spec: ActorSpec, height: float | None) -> 
 def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
     """Return the line-of-sight state of these pairs of antennas; the bodies of the pair do not block.
 
-    An actor in between gives NLOSv, a building or the ground NLOS.
+    An actor in between gives NLOSv, a building or the ground NLOS. Actors behind that are not counted.
     """
     count = len(pairs)
     view = world.view()
@@ -47,37 +45,26 @@ def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence
         met = world.first_hit(*_ends(places, pairs))
         if all(row in (NOTHING, view.rows.get(second)) for row, (_, second) in zip(met, pairs, strict=True)):
             return LineOfSightStates(np.full(count, LOS), np.full(count, -np.inf), {})
-    origins, targets = (np.array(points, dtype=float).reshape(-1, 3) for points in _ends(places, pairs))
-    states, heights = np.full(count, LOS), np.full(count, -np.inf)
-    found: dict[int, list[str]] = {}
+    row_of, points = {name: row for row, name in enumerate(places)}, np.array([*places.values()])
+    first, second = (np.fromiter([row_of[pair[end]] for pair in pairs], np.int64, count) for end in (0, 1))
+    hidden = view.hidden_rows()
+    crossed = world.crossings(points[first], points[second], _MOST_BODIES + 2 + len(hidden))
+    lines, rows = crossed.lines, crossed.rows
+    own = np.array([view.rows.get(name, NOTHING) for name in places])
+    behind = crossed.shares >= crossed.scenery[lines]
+    blocks = ~behind & ~np.isin(rows, hidden) & (rows != own[first][lines]) & (rows != own[second][lines])
+    heights = np.full(count, -np.inf)
     tops = view.centers[:, 2] + view.size[:, 2] / 2.0
-    length = np.maximum(np.linalg.norm(targets - origins, axis=1), _BEYOND)
-    begun = np.zeros(count)
-    open_rays = np.arange(count)
-    for _ in range(_MOST_BODIES):
-        if not len(open_rays):
-            break
-        way = targets[open_rays] - origins[open_rays]
-        hits = world.raycast(origins[open_rays] + begun[open_rays, None] * way, targets[open_rays])
-        going_on = []
-        for ray, row, fraction in zip(open_rays.tolist(), hits.rows.tolist(), hits.fraction.tolist(), strict=True):
-            if fraction >= 1.0:
-                continue
-            if row < 0:
-                states[ray] = NLOS
-                continue
-            name = view.names[row]
-            if name == pairs[ray][1]:
-                continue  # The body of the other station: nothing is between it and its antenna
-            if name != pairs[ray][0] and name not in found.get(ray, ()):
-                found.setdefault(ray, []).append(name)
-                states[ray] = NLOSV
-                heights[ray] = max(heights[ray], tops[row])
-            begun[ray] += fraction * (1.0 - begun[ray]) + _BEYOND / length[ray]
-            if begun[ray] < 1.0:
-                going_on.append(ray)
-        open_rays = np.array(going_on, dtype=np.int64)
-    return LineOfSightStates(states, heights, {ray: tuple(names) for ray, names in found.items()})
+    found: dict[int, list[str]] = {}
+    for line, row in zip(lines[blocks].tolist(), rows[blocks].tolist(), strict=True):
+        names = found.setdefault(line, [])
+        if len(names) < _MOST_BODIES:
+            names.append(view.names[row])
+            heights[line] = max(heights[line], tops[row])
+    states = np.full(count, LOS)
+    states[[*found]] = NLOSV
+    states[crossed.scenery < 1.0] = NLOS
+    return LineOfSightStates(states, heights, {line: tuple(names) for line, names in found.items()})
 
 
 def _ends(places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> tuple[list[Place], list[Place]]:

@@ -52,7 +52,7 @@ def cast_rays(
     """
     ends = (np.reshape(np.asarray(points, dtype=float), (-1, 3)) for points in (origins, targets))
     origins, targets = (np.ascontiguousarray(points) for points in np.broadcast_arrays(*ends))
-    handles, fraction, normal = _cast(client, origins, targets)
+    handles, fraction, normal = cast(client, origins, targets)
     rows = row_of_handle[handles]
     if len(passed):
         length = np.linalg.norm(targets - origins, axis=1)
@@ -63,7 +63,7 @@ def cast_rays(
                 break
             start = np.minimum(fraction[again] + step[again] / np.maximum(length[again], step[again]), 1.0)
             begin = origins[again] + start[:, None] * (targets[again] - origins[again])
-            handles, further, normal[again] = _cast(client, begin, targets[again])
+            handles, further, normal[again] = cast(client, begin, targets[again])
             before, rows[again] = rows[again], row_of_handle[handles]
             step[again] = np.where(rows[again] == before, 2.0 * step[again], _STEP_IN)
             fraction[again] = np.where(handles < 0, 1.0, start + further * (1.0 - start))
@@ -116,12 +116,18 @@ def first_hits(
     return [row_of_handle[hit[0]] for hit in hits]
 
 
-def _cast(client: int, origins: Array, targets: Array) -> tuple[Integers, Array, Array]:
+def cast(client: int, origins: Array, targets: Array, groups: int = -1) -> tuple[Integers, Array, Array]:
+    """Return handle, share of the distance (M,) and normal (M, 3) of the first hits of rays on bodies of some groups.
+
+    groups  sum of groups of the collision filter
+    """
     count = len(origins)
     handles, fraction, normal = np.empty(count, dtype=np.int64), np.empty(count), np.empty((count, 3))
     for start in range(0, count, _BATCH):
         part = slice(start, start + _BATCH)
-        hits = bullet.rayTestBatch(origins[part], targets[part], numThreads=1, physicsClientId=client)
+        hits = bullet.rayTestBatch(
+            origins[part], targets[part], numThreads=1, collisionFilterMask=groups, physicsClientId=client
+        )
         handles[part] = np.fromiter(map(_HANDLE, hits), np.int64, len(hits))
         fraction[part] = np.fromiter(map(_FRACTION, hits), float, len(hits))
         normals = np.fromiter(chain.from_iterable(map(_NORMAL, hits)), float, 3 * len(hits))

@@ -168,7 +168,8 @@ def test_foliage_and_trunks_block_sight_but_not_below_crowns() -> None:
     with World(network(*objects)) as world:
         x = [50.0, 50.0, 100.0, 101.0, 101.0]
         z = [1.0, 1.7, 1.0, 1.0, 4.0]
-        clear = [bool(world.line_of_sight((at, -2.0, up), [(at, -14.0, up)])[0]) for at, up in zip(x, z, strict=True)]
+        begins, ends = ([(at, across, up) for at, up in zip(x, z, strict=True)] for across in (-2.0, -14.0))
+        clear = (world.raycast(begins, ends).fraction >= 1.0).tolist()
     assert clear == [False, True, False, True, False]
 
 

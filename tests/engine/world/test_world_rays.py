@@ -51,7 +51,7 @@ def test_rays_pass_ignored_actors_in_all_directions(world: World, car: CarFactor
 
 def test_line_of_sight_behind_a_truck_is_blocked(world: World, car: CarFactory) -> None:
     world.add(car("Truck"), Placement(10.0, 0.0))
-    clear = world.line_of_sight((0, 0, 1.0), [[20, 0, 1.0], [20, 0, 4.0], [8.0, 0, 1.0], [20, 3, 1.0]])
+    clear = world.raycast((0, 0, 1.0), [[20, 0, 1.0], [20, 0, 4.0], [8.0, 0, 1.0], [20, 3, 1.0]]).fraction >= 1.0
     assert clear.tolist() == [False, True, True, True]
 
 
@@ -78,7 +78,7 @@ def test_ray_hits_moving_driven_car_at_its_position(world: World, car: CarFactor
 def test_buildings_block_rays_as_ground(world: World) -> None:
     world.add_building("House", (20.0, 0.0, 4.0), (10.0, 10.0, 8.0), yaw=0.3)
     assert world.raycast([[0, 0, 2.0]], [[40, 0, 2.0]]).rows.tolist() == [-1]
-    assert not world.line_of_sight((0, 0, 2.0), [[40, 0, 2.0]])[0]
+    assert world.raycast((0, 0, 2.0), [[40, 0, 2.0]]).fraction[0] < 1.0
 
 
 def test_many_rays_equal_geometry(world: World, car: CarFactory) -> None:
