@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 
@@ -115,6 +116,18 @@ def test_signal_sensor_requires_front_range_and_line_of_sight() -> None:
     assert visible_signals(roads, states, 125.0) == {"stop"}
     assert "east red" not in visible_signals(roads, states, 90.0, truck=True)
     assert visible_signals(roads, {}, 60.0) == {"east", "stop"}
+
+
+@pytest.mark.parametrize("height", [1.5, 2.5, 3.8, 4.5])
+@pytest.mark.parametrize("gap", [1.0, 2.0, 5.0, 30.0])
+def test_roof_of_the_station_does_not_hide_a_lower_signal(height: float, gap: float) -> None:
+    """The sensor is 4.7 m behind the front, 0.41 m above the roof; the centers of the faces are at 2.95 and 2.45 m."""
+    spec = dataclasses.replace(TRUCK, size=(8.5, 2.5, height), offset=(0.0, 0.0, height / 2.0))
+    roads = street(light("east", 120.0), stop_sign("stop", 120.0))
+    with World(roads, dt=0.05) as world:
+        world.add(spec, Placement(120.0 - gap - 4.25, -1.75))
+        readings = SignalSensor(spec, roads).read(world, world.view(), 0, {"east": "green"})
+    assert {reading.id for reading in readings} == {"east", "stop"}
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.37, 0.77])
