@@ -204,7 +204,8 @@ def _overlaps(
         # Before a head-on collision the vehicle has to stand for some time, instead of a stop in the last moment.
         has_just_stopped = stands & (_recent_maximum(rolled.speed, shift) >= AT_REST) & ~stops[:, None]
         late = touching & head_on & has_just_stopped[:, None, :]
-        touching &= ~(at_rest & (scene.speed != 0.0))
+        # A vehicle that stands still is not hit by its own fault, except on the way of traffic with the right of way.
+        touching &= ~(at_rest & (scene.speed != 0.0) & ~(crosses & scene.yields)[:, None])
     lack = np.where(counts, np.minimum(lack, 1.0), 0.0)
     return touching, lack if late is None else np.where(late, 1.0, lack)
 
