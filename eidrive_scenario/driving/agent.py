@@ -87,6 +87,11 @@ class Agent:
         self._own_body = OwnBody(spec, duration=settings.lifetime(complete=False), dt=dt)
 
     @property
+    def next_message_number(self) -> int:
+        """Sequence number of the next message of the station."""
+        return self._message_generator.number
+
+    @property
     def error_subject(self) -> str:
         """Station that errors of its extensions name."""
         return f"station {self.name!r}"

@@ -100,8 +100,11 @@ def build_agent(
     dt: float,
     detector: Detector | None = None,
     encoder: Asn1Encoder | None = None,
+    number: int = 0,
 ) -> Agent:
     """Build the agent of a station. `detector` is an instance that is built already.
+
+    number  sequence number of its first message
 
     A vehicle without a planner in its settings has the default one. A station that does not drive receives messages
     only if its settings select senders. Raise SettingError if an actor without wheels has a planner.
@@ -139,7 +142,9 @@ def build_agent(
         if planner == NO_PLANNER
         else _planner(planner, settings, installation, view or None, dt=dt, seed=seed),
         controller=_vehicle_controller(settings, spec, dt) if spec.has_wheels else None,
-        message_generator=MessageGenerator(spec, settings, sensors=len(sensors), view=view, encoder=encoder, seed=seed),
+        message_generator=MessageGenerator(
+            spec, settings, sensors=len(sensors), view=view, encoder=encoder, seed=seed, dt=dt, number=number
+        ),
         dt=dt,
         receives_messages=listens,
         points=points,

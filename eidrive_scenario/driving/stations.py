@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
-from eidrive_scenario.driving.communication.radio_line_of_sight import antenna_position, line_of_sight_states
+from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
 from eidrive_scenario.driving.control.overrides import ControlOverrides
 from eidrive_scenario.driving.planning.area_checks import areas_off_road
 from eidrive_scenario.driving.resolved_stations import resolved_stations
@@ -42,7 +42,6 @@ from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.channel_checks import check_delivered, check_events, check_interval, check_statistics
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
-from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics, message_counts
 from eidrive_scenario.world import World
@@ -72,6 +71,8 @@ class Stations(DrivingStack):
         self._perceived: Mapping[str, StationPerception] = {}
         self._min_existence: dict[str, float] = {}
         self._agents: dict[str, Agent] = {}
+        self._next_numbers: dict[str, int] = {}
+        """Sequence number of the next message of each removed station."""
         self._rigs: dict[str, Rig] = {}
         self._signal_sensors: dict[str, SignalSensor] = {}
         self._overrides: dict[str, ControlOverrides] = {}
@@ -163,6 +164,7 @@ class Stations(DrivingStack):
             dt=context.dt,
             detector=detector,
             encoder=self._encoders.get(spec.name),
+            number=self._next_numbers.pop(spec.name, 0),
         )
         if agent.planner is not None:
             self._min_existence[spec.name] = settings.planner_settings.min_existence
@@ -173,6 +175,8 @@ class Stations(DrivingStack):
             self._overrides[spec.name] = ControlOverrides(spec, context.dt)
 
     def remove(self, name: str) -> None:
+        if name in self._agents:
+            self._next_numbers[name] = self._agents[name].next_message_number
         for held in (self._agents, self._min_existence, self._rigs, self._signal_sensors, self._overrides):
             held.pop(name, None)
 
@@ -197,7 +201,8 @@ class Stations(DrivingStack):
             return {}
         if self._channel is not None:
             self._statistics = None
-            self._channel.update_environment(self._radio_environment(world, view))
+            antennas = [(agent.spec, agent.settings.antenna_height) for agent in self._agents.values()]
+            self._channel.update_environment(radio_environment(world, view, antennas, self._context.roads))
         self._readings = readings = read_stations(self._rigs, self._signal_sensors, world, view, inputs.signals)
         now, own_perception = view.time, self._own_perception
         intervals = {name: self._min_message_interval(name) for name in self._agents}
@@ -270,13 +275,6 @@ class Stations(DrivingStack):
             if not is_built_in(type(channel)):
                 check_statistics(channel, self._statistics[1])
         return self._statistics[1]
-
-    def _radio_environment(self, world: World, view: WorldView) -> RadioEnvironment:
-        antennas = {
-            name: antenna_position(view, agent.spec, agent.settings.antenna_height)
-            for name, agent in self._agents.items()
-        }
-        return RadioEnvironment(antennas, partial(line_of_sight_states, world, antennas))
 
     def _min_message_interval(self, sender: str) -> float:
         """Return the minimum time between two messages of a station under congestion control [s]."""

@@ -99,6 +99,11 @@ class RoadNetwork(RoadAttributes):
             raise self._geo_reference_error(error) from error
 
     @cached_property
+    def is_level(self) -> bool:
+        """Whether all roads are in the plane z = 0."""
+        return all(road.elevation.is_zero and road.superelevation.is_zero for road in self.roads.values())
+
+    @cached_property
     def _locator(self) -> Locator:
         return Locator(self.tables)
 

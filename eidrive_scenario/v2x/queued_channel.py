@@ -26,6 +26,9 @@ class QueuedChannel(Channel):
         self._remaining: list[LinkEvent] = []
 
     def update_environment(self, surroundings: RadioEnvironment) -> None:
+        if surroundings.names != self.surroundings.names:
+            for name in set(self.surroundings.names).difference(surroundings.names):
+                self._links.remove(name)
         self.surroundings = surroundings
 
     def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
@@ -48,6 +51,7 @@ class QueuedChannel(Channel):
             raise SettingError(Diagnostic(message, "derive both channels from LinkChannel"))
         previous.finalize()
         self._links = previous._links
+        self.surroundings = previous.surroundings
         self._remaining = list(previous.drain_events())
 
     def finalize(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class LineOfSightStates(NamedTuple):
     """Result of M rays between antennas.
 
     states    (M,) LOS, NLOSV or NLOS
-    heights   (M,) top of the highest blocking vehicle in the world frame [m]; minus infinity without one
+    heights   (M,) top of the highest blocking vehicle above the ground [m]; minus infinity without one
     blockers  names of the blocking bodies in order from the first antenna, by index of the ray; without open rays
     """
 
@@ -39,10 +39,14 @@ LineOfSightQuery = Callable[[Sequence[tuple[str, str]]], LineOfSightStates]
 
 @dataclass(frozen=True)
 class RadioEnvironment:
-    """Antenna positions by station in the world frame [m]; `sight` is None without a query for lines of sight."""
+    """Antenna positions by station in the world frame [m]; `sight` is None without a query for lines of sight.
+
+    grounds  height of the ground below antennas in the world frame [m]; 0 for other stations
+    """
 
     places: Mapping[str, tuple[float, float, float]]
     sight: LineOfSightQuery | None = None
+    grounds: Mapping[str, float] = field(default_factory=dict)
 
     def distance(self, first: str, second: str) -> float | None:
         """Return the distance between two antennas [m]; None if one is absent."""
@@ -58,6 +62,17 @@ class RadioEnvironment:
     def positions(self) -> Array:
         """Antenna positions (N, 3) in the order of `names` [m]."""
         return np.array([self.places[name] for name in self.names], dtype=float).reshape(-1, 3)
+
+    def height(self, name: str) -> float:
+        """Return the height of an antenna above the ground [m]."""
+        return self.places[name][2] - self.grounds.get(name, 0.0)
+
+    @cached_property
+    def heights(self) -> Array:
+        """Heights of the antennas above the ground (N,) in the order of `names` [m]."""
+        if not self.grounds:
+            return self.positions[:, 2]
+        return np.array([self.height(name) for name in self.names], dtype=float)
 
 
 EMPTY_RADIO_ENVIRONMENT = RadioEnvironment({})

@@ -227,3 +227,20 @@ def test_run_with_invalid_channel_raises_before_the_start(tmp_path: Path, channe
     profile.write_text(channel)
     with pytest.raises(InputError, match=r"mine\.yaml:1: "):
         Simulation(load_for_seed(ONE, 1, {}), settings=RunSettings(channel=profile))
+
+
+def test_message_numbers_continue_after_the_sender_enters_again() -> None:
+    """Loss and delay are keyed by the number of a message: numbers from 0 would repeat those of the first presence."""
+    numbers: list[int] = []
+    with Simulation(load_for_seed(ONE, 1, {}), seed=1, settings=RunSettings(channel="ideal")) as simulation:
+        assert isinstance(simulation.stack, Stations)
+        rsu = simulation.world.spec("RSU")
+        for tick in range(30):
+            if tick == 10:
+                simulation.stack.remove("RSU")
+            if tick == 20:
+                simulation.stack.add(rsu)
+            frame, _ = simulation.tick()
+            numbers += [link.number for link in frame.links if link.sender == "RSU"]
+    assert numbers == list(range(len(numbers)))
+    assert len(numbers) in (19, 20, 21)

@@ -29,6 +29,9 @@ class MessageGenerator:
     view     sectors that they cover, for the sensor information of its CPMs
     encoder  encodes messages to measure their size; None uses the size model
     seed     of the phase of the messages. Stations are not synchronized, so that their phases are random and uniform
+    dt       time step [s]: messages are generated in the time step after their phase, and passed to the radio with an
+             offset, the remainder of the phase, so that the messages of stations spread over the time step
+    number   sequence number of the first message
     """
 
     def __init__(
@@ -40,6 +43,8 @@ class MessageGenerator:
         view: tuple[ViewSector, ...] = (),
         encoder: Asn1Encoder | None = None,
         seed: int = 0,
+        dt: float = math.inf,
+        number: int = 0,
     ) -> None:
         self._spec = spec
         self._settings = settings
@@ -47,7 +52,8 @@ class MessageGenerator:
         self._view = view
         self._encoder = encoder
         self._clock = settings.clock
-        self._number = 0
+        self.number = number
+        """Sequence number of the next message."""
         self._periods = -1
         start, elapsed = generator(seed, "message phase", spec.name).uniform(size=2).tolist()
         self._phase, fixed = 0.0, settings.message_phase
@@ -55,6 +61,8 @@ class MessageGenerator:
             self._phase = start / settings.message_rate if fixed is None else fixed
         elif settings.generation == "etsi":
             self._phase = start * CHECK if fixed is None else fixed
+        self._offset = 0.0 if math.isinf(dt) else max(0.0, self._phase - math.floor(self._phase / dt + EQUAL) * dt)
+        """Time from the time step of a message until it is passed to the radio [s]."""
         self._first = math.inf
         """Time of the first evaluation [s]."""
         self._cam_rules = CamGenerationRules(elapsed if fixed is None else None)
@@ -101,6 +109,8 @@ class MessageGenerator:
             if messages:
                 self._last_generated[kind] = now
             generated += messages
+        if self._offset > 0.0:
+            generated = [replace(message, offset=self._offset) for message in generated]
         return tuple([self._clock.with_station_timestamps(message, now) for message in generated])
 
     def _due(
@@ -179,8 +189,8 @@ class MessageGenerator:
         return replace(message, size=len(encoded) + self._settings.security_bytes)
 
     def _take_number(self) -> int:
-        self._number += 1
-        return self._number - 1
+        self.number += 1
+        return self.number - 1
 
 
 def own_body(spec: ActorSpec, state: StationState) -> Detections:

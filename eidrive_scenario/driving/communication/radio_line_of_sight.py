@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
-from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.physics.ground import is_level
 from eidrive_scenario.world.physics.rays import NOTHING
 from eidrive_scenario.world.view import WorldView
 
@@ -34,10 +39,37 @@ def antenna_position(view: WorldView, spec: ActorSpec, height: float | None) -> 
     return (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + over)
 
 
-def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
+def radio_environment(
+    world: World, view: WorldView, stations: Sequence[tuple[ActorSpec, float | None]], roads: RoadNetwork | None
+) -> RadioEnvironment:
+    """Return the antennas of stations, each with the height of its antenna or None, and their lines of sight."""
+    antennas = {spec.name: antenna_position(view, spec, height) for spec, height in stations}
+    grounds = {} if is_level(roads) else {spec.name: ground_height(view, spec, roads) for spec, _ in stations}
+    return RadioEnvironment(antennas, partial(line_of_sight_states, world, antennas, grounds=grounds), grounds)
+
+
+def ground_height(view: WorldView, spec: ActorSpec, roads: RoadNetwork | None) -> float:
+    """Return the height of the ground below a station in the world frame [m].
+
+    A vehicle stands on the ground. Other stations may be mounted above it: the ground is the road, if one is near.
+    """
+    x, y, z, *_ = view.states[view.rows[spec.name]]
+    if roads is None or spec.has_wheels:
+        return z
+    found = roads.locate_at(x, y, z=z)
+    return z if found is None else roads.road_pose_at(found.road, found.s, found.t).z
+
+
+def line_of_sight_states(
+    world: World,
+    places: dict[str, Place],
+    pairs: Sequence[tuple[str, str]],
+    grounds: Mapping[str, float] = MappingProxyType({}),
+) -> LineOfSightStates:
     """Return the line-of-sight state of these pairs of antennas; the bodies of the pair do not block.
 
-    An actor in between gives NLOSv, a building or the ground NLOS. Actors behind that are not counted.
+    An actor in between gives NLOSv, a building or the ground NLOS. Actors behind that are not counted. Heights of
+    blocking actors are above the line between the grounds below the two antennas.
     """
     count = len(pairs)
     view = world.view()
@@ -54,17 +86,31 @@ def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence
     behind = crossed.shares >= crossed.scenery[lines]
     blocks = ~behind & ~np.isin(rows, hidden) & (rows != own[first][lines]) & (rows != own[second][lines])
     heights = np.full(count, -np.inf)
-    tops = view.centers[:, 2] + view.size[:, 2] / 2.0
+    lines, rows = lines[blocks], rows[blocks]
+    tops = view.centers[rows, 2] + view.size[rows, 2] / 2.0
+    if grounds:
+        below = np.array([grounds.get(name, 0.0) for name in places])
+        begin, end = points[first[lines]], points[second[lines]]
+        share = _share_of_line(begin[:, :2], end[:, :2], view.centers[rows, :2])
+        tops -= below[first[lines]] * (1.0 - share) + below[second[lines]] * share
     found: dict[int, list[str]] = {}
-    for line, row in zip(lines[blocks].tolist(), rows[blocks].tolist(), strict=True):
+    for line, row, top in zip(lines.tolist(), rows.tolist(), tops.tolist(), strict=True):
         names = found.setdefault(line, [])
         if len(names) < _MOST_BODIES:
             names.append(view.names[row])
-            heights[line] = max(heights[line], tops[row])
+            heights[line] = max(heights[line], top)
     states = np.full(count, LOS)
     states[[*found]] = NLOSV
     states[crossed.scenery < 1.0] = NLOS
     return LineOfSightStates(states, heights, {line: tuple(names) for line, names in found.items()})
+
+
+def _share_of_line(begin: Array, end: Array, points: Array) -> Array:
+    """Return the share of the lines (M, 2) to (M, 2) at the places nearest to points (M, 2)."""
+    along = end - begin
+    length = np.maximum(np.einsum("ni,ni->n", along, along), 1e-9)
+    share: Array = np.clip(np.einsum("ni,ni->n", points - begin, along) / length, 0.0, 1.0)
+    return share
 
 
 def _ends(places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> tuple[list[Place], list[Place]]:

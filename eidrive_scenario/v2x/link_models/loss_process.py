@@ -63,7 +63,8 @@ class LossProcess:
         to_bad, to_good = loss.steps
         begin = message.number - message.number % RENEWAL
         number, bad = self._chains.get(link, (-1, False))
-        number = max(number, begin - 1)
+        if not begin <= number <= message.number:
+            number = begin - 1
         while number < message.number:
             number += 1
             likely = loss.share_bad if number == begin else 1.0 - to_good if bad else to_bad

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -36,4 +37,7 @@ def _shift_timestamps(message: Message, error: float) -> Message:
         message,
         detections=replace(message.detections, time=message.detections.time + error),
         state=replace(message.state, time=message.state.time + error),
+        points=None
+        if message.points is None
+        else dataclasses.replace(message.points, time=message.points.time + error),
     )

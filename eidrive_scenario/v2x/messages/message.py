@@ -55,6 +55,8 @@ class Message(msgspec.Struct, frozen=True):
     """Shared lidar point cloud of the sender, included in `size`; None if it is not shared."""
     sensors: tuple[ViewSector, ...] | None = None
     """Sensor information of a CPM: sectors that the sender perceives, in its own frame; None: not in this message."""
+    offset: float = 0.0
+    """Time from the time step of the message until the sender passes it to the radio [s]; radio models include it."""
 
 
 class ReceivedMessage(msgspec.Struct, frozen=True):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message
@@ -51,6 +51,8 @@ class Transmission:
     """Whether the control information reserves the resource for another transmission."""
     gain: Array | None = None
     """Fading gain at each station (N,) [dB]; None without fading."""
+    busy: Bools | None = None
+    """Stations that are locked to an earlier message at the start (N,); None without preamble detection."""
     control: NDArray[np.int8] | None = None
     """Outcome of the control information at each station (N,), as cause of loss or 0; None without it."""
 
@@ -124,6 +126,12 @@ class MediumAccess(ABC):
         """Return the channel busy ratio of a station over the `span` [s] since its entry."""
         return float(self._busy_time[row] + self._period_busy[row]) / span
 
+    def continue_from(self, previous: MediumAccess) -> None:
+        """Take the congestion control of the same stations from a replaced medium, unless its settings differ."""
+        if self.gate.control == previous.gate.control and self.gate.background == previous.gate.background:
+            self.gate = previous.gate
+            self._last_start, self._last_use = previous._last_start, previous._last_use
+
     def rearrange(self, names: tuple[str, ...]) -> list[Transmission]:
         """Replace the stations; return the pending transmissions of removed stations."""
         rows = [self._rows.get(name) for name in names]
@@ -145,6 +153,8 @@ class MediumAccess(ABC):
         for entry in self.active:
             if entry.gain is not None:
                 entry.gain = reorder_rows(entry.gain, rows, 0.0)
+            if entry.busy is not None:
+                entry.busy = reorder_rows(entry.busy, rows, False) > 0.0
         self.gate = self.gate.reorder(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)

@@ -12,6 +12,8 @@ EXTRA_BITS = 22
 """Bits of service field and tail."""
 BITS_PER_SYMBOL = {3.0: 24, 4.5: 36, 6.0: 48, 9.0: 72, 12.0: 96, 18.0: 144, 24.0: 192, 27.0: 216}
 """Data bits per OFDM symbol, by data rate in 10 MHz [Mbit/s]."""
+SENSITIVITIES = {3.0: -85.0, 4.5: -84.0, 6.0: -82.0, 9.0: -80.0, 12.0: -77.0, 18.0: -73.0, 24.0: -69.0, 27.0: -68.0}
+"""Minimum sensitivity of receivers in 10 MHz, by data rate [dBm] (IEEE 802.11-2012, table 18-14)."""
 
 SUBFRAME = 1e-3
 """Duration of an LTE subframe [s]."""

@@ -81,6 +81,11 @@ class LinkBudget:
         self._normals, self._updates, self._places = np.zeros((2, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         self._set_stations(())
 
+    def continue_from(self, previous: LinkBudget) -> None:
+        """Take the stations and the shadowing of another link budget."""
+        self._set_stations(previous._names)
+        self._normals, self._updates, self._places = previous._normals, previous._updates, previous._places
+
     def at(self, surroundings: RadioEnvironment) -> Budget:
         """Return the link budget at the current antenna positions."""
         names = surroundings.names
@@ -132,9 +137,10 @@ class LinkBudget:
     ) -> tuple[list[Link], dict[tuple[int, int], tuple[str, ...]]]:
         """Return the geometry of each link, and the blocking bodies by rows, evaluated pair by pair."""
         links, blockers = [], {}
+        heights = surroundings.heights.tolist()
         ends = list(zip(self._first.tolist(), self._second.tolist(), strict=True))
         for pair, (a, b) in enumerate(ends):
-            lower, upper = sorted((places[a][2], places[b][2]))
+            lower, upper = sorted((heights[a], heights[b]))
             link = Link(math.dist(places[a], places[b]), LOS, lower, upper, -math.inf, 0)
             if self._line_of_sight == "random":
                 draw = uniform(int(self._sight_keys[pair]), 0)
@@ -213,7 +219,7 @@ class LinkBudget:
         self, surroundings: RadioEnvironment, positions: Array, distance: Array
     ) -> tuple[LinkGeometry, dict[tuple[int, int], tuple[str, ...]]]:
         count = len(distance)
-        heights = positions[:, 2]
+        heights = surroundings.heights
         lower = np.minimum(heights[self._first], heights[self._second])
         upper = np.maximum(heights[self._first], heights[self._second])
         states, tops = np.full(count, LOS), np.full(count, -np.inf)

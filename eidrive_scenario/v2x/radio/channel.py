@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.v2x.channel import OutgoingMessage
+from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
 from eidrive_scenario.v2x.link_models.composed import delay_of
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
@@ -29,16 +29,15 @@ from eidrive_scenario.v2x.radio.csma import Csma
 from eidrive_scenario.v2x.radio.events import DroppedBlock, ReceptionBlock
 from eidrive_scenario.v2x.radio.jamming import Jamming
 from eidrive_scenario.v2x.radio.link_counter_table import LinkCounterTable
+from eidrive_scenario.v2x.radio.preambles import PreambleDetection
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+from eidrive_scenario.v2x.statistics.links import ABSENT
 from eidrive_scenario.v2x.statistics.reception_log import Entry
-
-ABSENT = "absent"
-"""Reason for the loss of a message whose sender or receiver has left the world."""
 
 
 class RadioChannel(QueuedChannel):
@@ -68,7 +67,6 @@ class RadioChannel(QueuedChannel):
             tuple(profile.noise_in(width) for width in range(1, profile.max_subchannels + 1)),
             profile.sensing,
             profile.curves,
-            locks=profile.technology == "80211p",
             background=profile.background_by_loss(),
         )
         background = self._receiver.background
@@ -79,6 +77,7 @@ class RadioChannel(QueuedChannel):
         self._rows: dict[str, int] = {}
         self._receivers: dict[str, tuple[list[str], Integers]] = {}
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
+        self._preambles = PreambleDetection(profile.sensing) if profile.technology == "80211p" else None
         self._access = self._new_access(())
         self._access.fading = self._fading
         self._counters = LinkCounterTable(())
@@ -116,7 +115,7 @@ class RadioChannel(QueuedChannel):
         offered: list[Transmission] = []
         for message, receivers in outbox:
             row = self._row(message.sender)
-            ready = now + self.profile.jitter * uniform(self._jitter_keys[row], message.number)
+            ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], message.number)
             entry = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
             rows = self._rows_of(message.sender, receivers)
             if len(rows) < len(receivers):
@@ -152,6 +151,16 @@ class RadioChannel(QueuedChannel):
         row = self._rows.get(station)
         return 0.0 if row is None else self._access.interval(row)
 
+    def continue_from(self, previous: Channel) -> None:
+        """Take the links of the previous channel, and from a RadioChannel shadowing and congestion control."""
+        super().continue_from(previous)
+        if isinstance(previous, RadioChannel) and previous._until is not None:
+            self._until = previous._until
+            self._set_stations(previous._access.names, self._until)
+            self._link_budget.continue_from(previous._link_budget)
+            self._access.continue_from(previous._access)
+            self._last_arrival = previous._last_arrival
+
     def finalize(self) -> None:
         self._advance(math.inf)
         self._counters.flush_into(self._links)
@@ -179,6 +188,8 @@ class RadioChannel(QueuedChannel):
         """Replace the stations. Pending messages of removed stations are lost."""
         self._entry_times = {name: self._entry_times.get(name, now) for name in names}
         self._counters.flush_into(self._links)
+        if self._preambles is not None:
+            self._preambles.rearrange([self._rows.get(name) for name in names])
         lost = self._access.rearrange(names)
         gone = [entry for entry in self._open if entry.message.sender not in names]
         self._open = [entry for entry in self._open if entry not in gone]
@@ -216,6 +227,8 @@ class RadioChannel(QueuedChannel):
         started, dropped = self._access.advance(now, power)
         for entry in dropped:
             self._drop(entry)
+        if self._preambles is not None:
+            self._preambles.start(started, self._rows, power)
         under_way = [*self._open, *started]
         ended = [entry for entry in under_way if entry.end <= now]
         self._open = [entry for entry in under_way if entry.end > now]

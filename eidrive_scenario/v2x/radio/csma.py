@@ -122,10 +122,10 @@ class Csma(MediumAccess):
         """
         others = sensed & np.isfinite(starts)
         others[row] = False
-        unaware = others & (starts < start + SLOT)
+        unaware = others & (starts < start + SLOT - TIME_TOLERANCE)
         self._fixed[unaware] = starts[unaware]
         waiting = others & ~unaware & ~np.isnan(self._slots)
-        counted = np.floor((start - np.maximum(self.ready, self.free_from) - AIFS) / SLOT + 1e-9)
+        counted = np.floor((start - np.maximum(self.ready, self.free_from) - AIFS + TIME_TOLERANCE) / SLOT)
         self._slots[waiting] -= np.clip(counted[waiting], 0.0, self._slots[waiting])
 
     def reorder(self, rows: Sequence[int | None]) -> None:

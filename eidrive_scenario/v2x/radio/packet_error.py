@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,10 @@ class ErrorCurve:
     size: int | None
     source: str
     floor: float = 0.0
+
+    def shifted(self, by: float) -> ErrorCurve:
+        """Return the curve with the same error rates at ratios that are higher [dB]."""
+        return replace(self, ratios=tuple(ratio + by for ratio in self.ratios))
 
     def at(self, ratio_db: Array, size: float | Array) -> Array:
         """Return the packet error rate of packets of `size` [bytes], broadcast.
@@ -58,6 +62,9 @@ def interpolate(x: float, places: Sequence[float], values: Sequence[float]) -> f
     low, high = places[after - 1], places[after]
     return (values[after] - values[after - 1]) / (high - low) * (x - low) + values[after - 1]
 
+
+CURVE_RATE_MBPS = 6.0
+"""Data rate of all curves of 802.11p [Mbit/s]."""
 
 _WILAB = "WiLabV2Xsim, IEEE 802.11p at 6 Mbit/s (MCS 2), 350 bytes, channel model "
 _GOUBET_RATIOS, _GOUBET_ERRORS = ieee80211p.FRAME_ERRORS

@@ -16,10 +16,10 @@ from eidrive_scenario.v2x.link_models.composed import ComposedProfile
 from eidrive_scenario.v2x.propagation.fading import Fading, NoFading
 from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.access import QueueSettings
-from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80211p_airtime
+from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SENSITIVITIES, SUBFRAME, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.jamming import Jammer
-from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
+from eidrive_scenario.v2x.radio.packet_error import CURVE_RATE_MBPS, CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import LOS
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
@@ -150,10 +150,16 @@ class RadioProfile(ComposedProfile):
 
     @property
     def curves(self) -> tuple[ErrorCurve, ErrorCurve, ErrorCurve]:
-        """Packet error curves with LOS, NLOSv and NLOS."""
+        """Packet error curves with LOS, NLOSv and NLOS.
+
+        Those of 802.11p are known for 6 Mbit/s. At another data rate they are shifted by the difference of the minimum
+        sensitivities in the standard.
+        """
         chosen = self.packet_errors
-        names = _CURVES[self.technology] if chosen is None else (chosen.los, chosen.nlosv, chosen.nlos)
-        return CURVES[names[0]], CURVES[names[1]], CURVES[names[2]]
+        los, nlosv, nlos = _CURVES[self.technology] if chosen is None else (chosen.los, chosen.nlosv, chosen.nlos)
+        by = SENSITIVITIES[self.data_rate_mbps] - SENSITIVITIES[CURVE_RATE_MBPS]
+        curves = {name: CURVES[name].shifted(by) if by else CURVES[name] for name in (los, nlosv, nlos)}
+        return curves[los], curves[nlosv], curves[nlos]
 
     def airtime(self, size: int) -> float:
         """Return the duration of the transmission of a message of `size` bytes [s]."""

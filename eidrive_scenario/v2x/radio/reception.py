@@ -44,14 +44,12 @@ class Receiver:
     noises_dbm   noise in the band of a message in 1, 2, … subchannels [dBm]
     sensing_dbm  minimum sensed power [dBm]
     curves       packet error curves by code of the line-of-sight state
-    locks        whether a receiver locks to the earlier of overlapping messages (IEEE 802.11p)
     background   background traffic, and the mean path loss (D,) at the distances of its table [dB]
     """
 
     noises_dbm: Sequence[float]
     sensing_dbm: float
     curves: Sequence[ErrorCurve]
-    locks: bool
     background: tuple[ErrorTable, Array] | None = None
 
     def receive(
@@ -113,7 +111,7 @@ class Receiver:
         if int(last.max() - first.min()) > 1:
             common = np.minimum(last[None, :], last[own, None]) - np.maximum(first[None, :], first[own, None])
             shares = common / (last - first)
-        interference, busy, half_duplex = self._interference(overlapping, same_band, shares, start, own, rows, received)
+        interference, half_duplex = self._interference(overlapping, same_band, shares, rows, received)
         if jamming is not None:
             interference = interference + jamming
         if same_band.any():
@@ -128,7 +126,9 @@ class Receiver:
             jammed = signal - 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + jamming)
             causes[draws < self._errors(jammed, states, sizes)] = JAMMING
         causes[draws < lost_alone] = PROPAGATION
-        causes[busy] = BUSY
+        for index, entry in enumerate(ended):
+            if entry.busy is not None:
+                causes[index, entry.busy] = BUSY
         causes[signal < self.sensing_dbm] = SENSING
         causes[half_duplex] = HALF_DUPLEX
         if self.background is not None:
@@ -164,7 +164,7 @@ class Receiver:
                 key=lambda other: budget.rows[other.message.sender],
             )
             shares = [(faded[id(other)], _common_share(other, entry)) for other in disturbing]
-            earlier = [faded[id(other)] for other in disturbing if self.locks and other.start < entry.start]
+            busy = None if entry.busy is None else entry.busy.tolist()
             noise_dbm = self.noises_dbm[entry.bands - 1]
             controls = None if entry.control is None else entry.control.tolist()
             number, size = entry.message.number, entry.message.size
@@ -176,7 +176,7 @@ class Receiver:
                     cause = HALF_DUPLEX
                 elif signal < self.sensing_dbm:
                     cause = SENSING
-                elif any(received[station] >= self.sensing_dbm for received in earlier):
+                elif busy is not None and busy[station]:
                     cause = BUSY
                 elif draw < curve.of(signal - noise_dbm, size):
                     cause = PROPAGATION
@@ -215,25 +215,18 @@ class Receiver:
         return loss_at.tolist(), table.distance.tolist(), given
 
     def _interference(
-        self,
-        overlapping: Bools,
-        same_band: Bools,
-        shares: Array | None,
-        start: Array,
-        own: Integers,
-        rows: Integers,
-        received: Array,
-    ) -> tuple[Array, Bools, Bools]:
-        """Return interference [mW], whether the receiver is locked to an earlier message, and whether it transmits.
+        self, overlapping: Bools, same_band: Bools, shares: Array | None, rows: Integers, received: Array
+    ) -> tuple[Array, Bools]:
+        """Return the interference (T, N) [mW], and whether the receiver transmits (T, N).
 
-        Results are (T, N). Sums follow the order of the stations, which makes them independent of the BLAS library.
+        Sums follow the order of the stations, which makes them independent of the BLAS library.
 
         shares    (T, A) share of the power of each interferer in the band of a message; None: 1
         received  (A, N) received power of each transmission at each station [dBm]
         """
-        shape = (len(own), received.shape[1])
-        interference, busy, half_duplex = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-        milliwatts, sensed = 10.0 ** (received / 10.0), received >= self.sensing_dbm
+        shape = (len(overlapping), received.shape[1])
+        interference, half_duplex = np.zeros(shape), np.zeros(shape, dtype=bool)
+        milliwatts = 10.0 ** (received / 10.0)
         for place in np.flatnonzero(overlapping.any(axis=1)).tolist():
             half_duplex[place, rows[overlapping[place]]] = True
             others = np.flatnonzero(same_band[place])
@@ -243,10 +236,7 @@ class Receiver:
                 if shares is not None:
                     disturbing = disturbing * shares[place, others][:, None]
                 interference[place] = disturbing.sum(axis=0)
-                if self.locks:
-                    earlier = others[start[others] < start[own[place]]]
-                    busy[place] = sensed[earlier].any(axis=0)
-        return interference, busy, half_duplex
+        return interference, half_duplex
 
     def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:
         lowest, highest = int(states.min()), int(states.max())

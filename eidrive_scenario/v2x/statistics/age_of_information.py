@@ -40,7 +40,7 @@ class AgeOfInformation:
 
     def __init__(self) -> None:
         self._floor = np.zeros(0)
-        """Age at the last update of each link [s]; NaN before the first."""
+        """Age at the last update of each link [s]; NaN before the first, and after the receiver has left."""
         self._time, self._area, self._peaks = np.zeros(0), np.zeros(0), np.zeros(0)
         self._updates = np.zeros(0, dtype=np.int64)
         self._breakpoints: list[tuple[Integers, Array, Integers]] = []
@@ -70,10 +70,21 @@ class AgeOfInformation:
         of, low, peaks = links[later], low[later], peaks[later]
         high = np.maximum(peaks, low)
         count = len(self._floor)
-        self._time += np.bincount(of, high - low, count)
-        self._area += np.bincount(of, 0.5 * (high**2 - low**2), count)
         self._peaks += np.bincount(of, peaks, count)
         self._updates += np.bincount(of, minlength=count)
+        self._add(of, low, high)
+
+    def end(self, links: Integers, ages: Array) -> None:
+        """End the age of links at these ages (K,) [s]; the next update of a link counts as its first."""
+        low = self._floor[links]
+        self._add(links, low, np.maximum(ages, low))
+        self._floor[links] = np.nan
+
+    def _add(self, of: Integers, low: Array, high: Array) -> None:
+        """Add rises of the age (K,) from `low` to `high` [s]."""
+        count = len(self._floor)
+        self._time += np.bincount(of, high - low, count)
+        self._area += np.bincount(of, 0.5 * (high**2 - low**2), count)
         self._breakpoints.append(_breakpoints(of, low, high))
         self._number += 2 * len(of)
         if self._number > self._limit:
@@ -81,8 +92,9 @@ class AgeOfInformation:
 
     def statistics(self, now: float, newest: Array, order: Integers) -> AgeStatistics:
         """Return the statistics at `now` of the links in `order`; `newest` (L,) are the newest generation times [s]."""
-        low = self._floor
-        high = np.maximum(now - newest, low)
+        running = ~np.isnan(self._floor)
+        low = np.where(running, self._floor, 0.0)
+        high = np.where(running, np.maximum(now - newest, low), 0.0)
         time, area = self._time + (high - low), self._area + 0.5 * (high**2 - low**2)
         defined = time > 0.0
         mean = np.divide(area, time, out=np.full(len(low), np.nan), where=defined)

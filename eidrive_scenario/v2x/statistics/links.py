@@ -10,6 +10,9 @@ from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMe
 from eidrive_scenario.v2x.statistics.link_statistics import LinkCounters, LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog
 
+ABSENT = "absent"
+"""Reason for the loss of a message whose sender or receiver has left the world."""
+
 
 class Links:
     """Queues of messages in flight. This class alone enforces causality.
@@ -22,6 +25,8 @@ class Links:
         self._counters: dict[str, dict[str, LinkCounters]] = {}
         """By receiver and sender."""
         self._reception_log = ReceptionLog()
+        self._now = -math.inf
+        """Time of the last delivery [s]."""
 
     def counters(self, sender: str, receiver: str) -> LinkCounters:
         """Return the counters of a link; create them if the link is new."""
@@ -82,6 +87,7 @@ class Links:
 
     def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         """Return messages that have arrived by `now`, each once, by time of arrival, sender and number."""
+        self._now = now
         queue = self._queues.get(receiver)
         if not queue:
             return ()
@@ -96,6 +102,12 @@ class Links:
         due.sort()
         self._reception_log.record(receiver, due)
         return tuple([entry[4] for entry in due])
+
+    def remove(self, receiver: str) -> None:
+        """End the links to a station that has left: messages in flight to it are lost, and their age is not counted."""
+        for _, sender, *_ in self._queues.pop(receiver, ()):
+            self.counters(sender, receiver).count_loss(ABSENT)
+        self._reception_log.end_links(receiver, self._now)
 
     def in_flight(self) -> int:
         """Return the number of messages in flight on all links."""

@@ -45,6 +45,8 @@ class ReceptionLog:
         self._number = 0
         self._received: Integers = np.zeros(0, dtype=np.int64)
         self._delay_sum, self._delay_max, self._newest = np.zeros(0), np.zeros(0), np.zeros(0)
+        self._newest_present = np.zeros(0)
+        """Generation time of the newest message since the entry of the receiver [s]."""
         self._ages = AgeOfInformation()
 
     def record(self, receiver: str, entries: Sequence[Entry]) -> None:
@@ -54,6 +56,14 @@ class ReceptionLog:
         if self._number > MAX_PENDING:
             self._process_pending()
 
+    def end_links(self, receiver: str, now: float) -> None:
+        """End the age of information of a receiver that has left at `now` [s], until its next reception."""
+        self._process_pending()
+        codes = np.array([*self._codes.get(receiver, {}).values()], dtype=np.int64)
+        codes = codes[np.isfinite(self._newest_present[codes])]
+        self._ages.end(codes, now - self._newest_present[codes])
+        self._newest_present[codes] = -np.inf
+
     def statistics_by_link(self, now: float) -> dict[tuple[str, str], ReceptionStatistics]:
         """Return the receptions on each link up to `now` [s], by (sender, receiver) in alphabetical order."""
         self._process_pending()
@@ -61,7 +71,7 @@ class ReceptionLog:
         links = sorted(code_of)
         codes = np.array([code_of[link] for link in links], dtype=np.int64)
         columns = (self._received, self._delay_sum, self._delay_max, self._newest)
-        ages = [_none_for_nan(age) for age in self._ages.statistics(now, self._newest, codes)]
+        ages = [_none_for_nan(age) for age in self._ages.statistics(now, self._newest_present, codes)]
         rows = zip(*(column[codes].tolist() for column in columns), *ages, strict=True)
         return {link: ReceptionStatistics(*row) for link, row in zip(links, rows, strict=True)}
 
@@ -93,17 +103,20 @@ class ReceptionLog:
         self._delay_sum, self._delay_max = (
             np.concatenate([a, np.zeros(more)]) for a in (self._delay_sum, self._delay_max)
         )
-        self._newest = np.concatenate([self._newest, np.full(more, -np.inf)])
+        self._newest, self._newest_present = (
+            np.concatenate([a, np.full(more, -np.inf)]) for a in (self._newest, self._newest_present)
+        )
         self._ages.resize(self._count)
 
     def _record_ages(self, codes: Integers, generated: Array, arrived: Array) -> None:
         """Update the age of information with messages that are newer than all earlier ones of their link."""
         order = np.argsort(codes, kind="stable")
         codes, generated, arrived = codes[order], generated[order], arrived[order]
-        before = np.maximum(_largest_before(codes, generated), self._newest[codes])
+        before = np.maximum(_largest_before(codes, generated), self._newest_present[codes])
         fresh = generated > before
         self._ages.record_updates(codes[fresh], (arrived - generated)[fresh], (arrived - before)[fresh])
         np.maximum.at(self._newest, codes, generated)
+        np.maximum.at(self._newest_present, codes, generated)
 
 
 def _none_for_nan(ages: Array) -> list[float | None]:

@@ -31,4 +31,4 @@ class GroundUnder:
 
 def is_level(roads: RoadNetwork | None) -> bool:
     """Return whether all roads are in the plane z = 0."""
-    return roads is None or all(road.elevation.is_zero and road.superelevation.is_zero for road in roads.roads.values())
+    return roads is None or roads.is_level

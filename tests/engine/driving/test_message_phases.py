@@ -79,3 +79,40 @@ def test_messages_in_each_tick_have_no_phase() -> None:
     assert len(sent("Car", 0.1)) == 10
     with pytest.raises(ValidationError, match="message_phase needs a message_rate or generation 'etsi'"):
         AgentSettings.model_validate({"message_phase": 0.1})
+
+
+def ready_times(dt: float, seconds: float = 2.0) -> dict[str, list[float]]:
+    """Return the times at which forty stations with 10 Hz pass their messages to the radio."""
+    times: dict[str, list[float]] = {}
+    for number in range(40):
+        spec = ActorSpec(f"Car{number}", "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
+        settings = AgentSettings.model_validate({"message_rate": 10})
+        generator = MessageGenerator(spec, settings, sensors=1, seed=3, dt=dt)
+        for tick in range(round(seconds / dt)):
+            now = tick * dt
+            for message in generator.generate(StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0), Detections(now), now):
+                times.setdefault(spec.name, []).append(message.generated + message.offset)
+    return times
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.02, 0.05, 0.1])
+def test_messages_of_stations_spread_equally_at_all_time_steps(dt: float) -> None:
+    times, finest = ready_times(dt), ready_times(0.001)
+    assert is_uniform([instants[0] % 0.1 for instants in times.values()], 0.1)
+    for name, instants in times.items():
+        late = (np.array(instants[:15]) - finest[name][:15]) / dt
+        assert np.diff(instants) == pytest.approx(0.1)
+        assert late[0] >= -1e-6
+        assert late[0] <= 1.0 + 0.001 / dt
+
+
+def test_message_at_a_multiple_of_the_time_step_has_no_offset() -> None:
+    for phase, expected in ((0.0, 0.0), (0.1, 0.0), (0.15, 0.0), (0.13, 0.03)):
+        spec = ActorSpec("Car", "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
+        settings = AgentSettings.model_validate({"message_rate": 1, "message_phase": phase})
+        generator = MessageGenerator(spec, settings, sensors=1, dt=0.05)
+        found = []
+        for tick in range(10):
+            now = tick * 0.05
+            found += generator.generate(StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0), Detections(now), now)
+        assert [message.offset for message in found] == pytest.approx([expected])

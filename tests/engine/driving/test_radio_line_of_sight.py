@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import pytest
 from opendrive_xml import elevation_xml, map_xml, road_xml
 from sample_car import CAR
 
-from eidrive_scenario.driving.communication.radio_line_of_sight import Place, antenna_position, line_of_sight_states
+from eidrive_scenario.driving.communication.radio_line_of_sight import (
+    Place,
+    antenna_position,
+    line_of_sight_states,
+    radio_environment,
+)
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV
 from eidrive_scenario.world import World
@@ -113,3 +118,24 @@ def test_hill_between_antennas_blocks() -> None:
         world.add(of_height("Car", 1.5), Placement(100.0, -2.0, 10.0))
         states = line_of_sight_states(world, places, [("A", "B"), ("B", "A"), ("B", "Tower")] * 20)
     assert states.states.tolist() == [NLOS, NLOS, LOS] * 20
+
+
+def on_slope(grade: float) -> tuple[float, Sequence[float]]:
+    """Return the heights of a van and of the antennas of two cars around it, on a road of this grade [m]."""
+    roads = RoadNetwork.parse(map_xml(road_xml(length=300.0, profiles=elevation_xml(slope=grade))))
+    with World(roads) as world:
+        for name, x, height in (("A", 100.0, 1.5), ("Van", 130.0, 2.5), ("B", 160.0, 1.5)):
+            pose = roads.lane_pose_at("1", -1, x)
+            world.add(of_height(name, height), Placement(pose.x, pose.y, pose.z, pose.h, pose.p, pose.r))
+        stations = [(world.spec(name), None) for name in "AB"]
+        environment = radio_environment(world, world.view(), stations, roads)
+        assert environment.sight is not None
+        return environment.sight([("A", "B")]).heights[0], environment.heights.tolist()
+
+
+@pytest.mark.parametrize("grade", [-0.12, -0.05, 0.05, 0.12])
+def test_heights_on_a_slope_are_above_the_road(grade: float) -> None:
+    top, antennas = on_slope(grade)
+    level_top, level_antennas = on_slope(0.0)
+    assert top == pytest.approx(level_top, abs=0.05)
+    assert antennas == pytest.approx(level_antennas, abs=0.05)

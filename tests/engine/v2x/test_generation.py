@@ -14,6 +14,7 @@ from eidrive_scenario.v2x.messages.generation.cam import CamGenerationRules
 from eidrive_scenario.v2x.messages.generation.cpm import CpmContents, CpmGenerationRules, quality
 from eidrive_scenario.v2x.messages.generation.object_ids import ObjectIdAssigner
 from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.v2x.messages.point_cloud import compress
 from eidrive_scenario.v2x.messages.size import cam_size, cpm_size, objects_that_fit
 
 DT = 0.05
@@ -200,11 +201,14 @@ def test_objects_that_fit_are_the_maximum_below_the_mtu() -> None:
 
 def test_station_clock_shifts_timestamps_only() -> None:
     sender, receiver = StationClock(offset=0.02, drift=1e-4), StationClock(offset=-0.01)
-    message = Message("A", 0, 100.0, state(100.0), Detections(99.9), 121)
+    points = compress(np.zeros((1, 3)), 99.8, 0.2)
+    message = Message("A", 0, 100.0, state(100.0), Detections(99.9), 121, points=points)
     stamped = sender.with_station_timestamps(message, 100.0)
     assert stamped.generated == 100.0
     assert stamped.state.time == pytest.approx(100.03)
     assert stamped.detections.time == pytest.approx(99.93)
+    assert stamped.points is not None
+    assert stamped.points.time == pytest.approx(99.83)
     local = receiver.with_local_timestamps(stamped, 100.2)
     assert local.detections.time == pytest.approx(99.94), "30 ms by the sender, 10 ms by the receiver"
     assert StationClock().with_station_timestamps(message, 100.0) is message

@@ -58,7 +58,7 @@ def fingerprint(links: Sequence[LinkEvent]) -> str:
 
 
 PROFILES: list[dict[str, Any]] = [
-    {"queue": {"length": 1}, "jitter": 0.2},
+    {"queue": {"length": 1}, "jitter": 0.02},
     {"technology": "cv2x_mode4", "tx_power_dbm": 5, "delay": {"kind": "uniform", "minimum": 0, "maximum": 0.2}},
     {"loss": {"kind": "bernoulli", "probability": 0.3}, "line_of_sight": "random"},
 ]

@@ -10,6 +10,7 @@ from radio_traffic import composed, message
 
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.links import Links
 
 DT = 0.05
@@ -173,3 +174,35 @@ def test_links_count_bytes_sent_per_link() -> None:
     carrier.send(message("RSU", 0, 0.0, size=156), ["Ego", "Spectator"], 0.0)
     assert carrier.statistics(0.0)["RSU", "Ego"].bytes_sent == 156
     assert np.sum([link.bytes_sent for link in carrier.statistics(0.0).values()]) == 312
+
+
+def test_messages_to_a_station_that_left_are_lost_and_not_delivered_later() -> None:
+    """Sent at 0 s with a delay of 0.3 s; the receiver is absent from 0.1 s to 5 s."""
+    carrier = composed(delay={"kind": "constant", "seconds": 0.3})
+    both = RadioEnvironment({"RSU": (0.0, 0.0, 5.0), "Ego": (9.0, 0.0, 1.5)})
+    carrier.update_environment(both)
+    carrier.send(message("RSU", 0, 0.0), ["Ego"], 0.0)
+    carrier.update_environment(RadioEnvironment({"RSU": (0.0, 0.0, 5.0)}))
+    assert carrier.in_flight() == 0
+    carrier.update_environment(both)
+    assert carrier.deliver("Ego", 5.0) == ()
+    link = carrier.statistics(5.0)["RSU", "Ego"]
+    assert (link.sent, link.lost, link.lost_by, link.in_flight) == (1, 1, {"absent": 1}, 0)
+
+
+def test_age_of_information_is_not_counted_while_the_receiver_is_absent() -> None:
+    """Delays of 0.5 s; present up to 3 s and from 60 s on: two equal cycles of ages 0.5 to 1.5 and 0.5 to 2."""
+    links = Links()
+    for begin in (0.0, 60.0):
+        for number, second in enumerate((0.0, 1.0)):
+            links.enqueue_delivery(message("RSU", number, begin + second), "Ego", begin + second, 0.5)
+        for now in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0):
+            links.deliver("Ego", begin + now)
+        if begin == 0.0:
+            links.remove("Ego")
+    link = links.statistics(63.0)["RSU", "Ego"]
+    assert link.received == 4
+    assert link.age == 2.0
+    assert link.peak_age == pytest.approx(1.5)
+    assert link.mean_age == pytest.approx((1.0 + 1.25 * 1.5) / 2.5)
+    assert link.p95_age == pytest.approx(2.0 - 0.05 * 2.5)

@@ -67,6 +67,8 @@ def test_burst_loss_of_a_late_receiver_equals_that_of_an_early_one() -> None:
     late = composed(6, loss=burst(0.3, 4))
     for number in (4095, 4096, 4200, 9990, 9999):
         assert (late.send(message(number), ["Ego"], number * DT)[0].outcome == "delivered") == early[number]
+    for number in (70, 3, 4100, 9):
+        assert (late.send(message(number), ["Ego"], number * DT)[0].outcome == "delivered") == early[number]
     far = composed(6, loss=burst(0.3, 4))
     with work_within(2):
         far.send(message(10**9), ["Ego"], 1e8)

@@ -97,18 +97,22 @@ def test_congestion_control_includes_background_traffic(congestion: dict[str, st
 
 
 def test_limeric_saturated_channel_converges_to_the_fixed_point() -> None:
-    """With 25 saturated stations the channel busy ratio converges to 0.4435 (see test_congestion)."""
+    """With 25 saturated stations the channel busy ratio converges to 0.4435 (see test_congestion).
+
+    The fixed point is that of messages that do not overlap: the stations start one after the other.
+    """
     places = {f"S{n:02}": (4.0 * n, 0.0, 1.5) for n in range(25)}
-    profile = {**QUIET, "congestion": {"kind": "limeric"}, "queue": {"discipline": "lcfs"}, "jitter": 0.01}
-    carrier = radio(3, **profile)
+    congestion = {"kind": "limeric", "interval_min": 0.01}
+    carrier = radio(3, congestion=congestion, queue={"discipline": "lcfs"}, jitter=0.0, **QUIET)
     times = {}
-    for tick in range(1200):
+    for tick in range(2400):
         now = tick * 0.01
         carrier.update_environment(RadioEnvironment(places))
-        carrier.transmit([(message(name, tick, now), []) for name in places], now)
-        if tick in (799, 1199):
+        outbox = [replace(message(name, tick, now), offset=0.001 * row) for row, name in enumerate(places)]
+        carrier.transmit([(one, []) for one in outbox], now)
+        if tick in (1999, 2399):
             times[tick] = np.mean([now * (carrier.channel_busy_ratio(name) or 0.0) for name in places])
-    assert (times[1199] - times[799]) / 4.0 == pytest.approx(0.4435, rel=0.05)
+    assert (times[2399] - times[1999]) / 4.0 == pytest.approx(0.4435, rel=0.01)
 
 
 def test_background_traffic_reduces_deliveries_and_raises_busy_ratio() -> None:

@@ -20,6 +20,7 @@ from eidrive_scenario.v2x.propagation.gains import (
 from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, LogDistance, Tr37885, WinnerB1
 from eidrive_scenario.v2x.radio.airtime import fragments, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.packet_error import CURVES
+from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV
 
 D = np.array([10.0, 100.0, 1000.0])
@@ -181,3 +182,15 @@ def test_nist_packet_errors_of_qpsk_equal_ns_3() -> None:
     curve = CURVES["80211p_nist"]
     ratios = np.array([23.0 - 47.86 - 25.0 * math.log10(meters) + 96.975 for meters in (400, 440, 450)])
     assert 1.0 - curve.at(ratios, 336) == pytest.approx([0.9825, 0.53245, 0.23095], abs=0.01)
+
+
+@pytest.mark.parametrize(("rate", "decibels"), [(3.0, -3.0), (12.0, 5.0), (27.0, 14.0)])
+def test_range_shrinks_with_the_sensitivity_at_the_data_rate(rate: float, decibels: float) -> None:
+    """In free space, 20 dB per decade of distance: the range of IEEE 802.11-2012, table 18-14, relative to 6 Mbit/s."""
+    distance = np.geomspace(10.0, 1e5, 4000)
+    reaches = []
+    for data_rate in (6.0, rate):
+        profile = RadioProfile(data_rate_mbps=data_rate)
+        ratio = profile.radiated - free_space(distance, profile.frequency_ghz) - profile.noise
+        reaches.append(distance[np.flatnonzero(profile.curves[0].at(ratio, 350) < 0.5)[-1]])
+    assert reaches[0] / reaches[1] == pytest.approx(10.0 ** (decibels / 20.0), rel=0.01)

@@ -13,6 +13,7 @@ from radio_traffic import DT, exchange, message, radio
 
 from eidrive_scenario.v2x.propagation.path_loss import Tr37885
 from eidrive_scenario.v2x.radio.budget import LinkBudget
+from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 
 ROW = {name: (60.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCDE")}
@@ -103,3 +104,20 @@ def test_shadowing_of_a_pair_is_kept_while_other_stations_change() -> None:
     three = {"A": (10.0, 5.0, 1.5), **two}
     assert budget.at(RadioEnvironment(three)).loss[1, 2] == loss
     assert budget.at(RadioEnvironment(two)).loss[0, 1] == loss
+
+
+def test_shadowing_is_kept_when_the_profile_is_replaced() -> None:
+    places = {"A": (0.0, 0.0, 1.5), "B": (40.0, 0.0, 1.5), "C": (70.0, 9.0, 1.5)}
+    kept, other = radio(1), radio(1, tx_power_dbm=10)
+    kept.update_environment(RadioEnvironment(places))
+
+    def losses(carrier: RadioChannel, number: int) -> list[float | None]:
+        now = 0.1 * number
+        carrier.update_environment(RadioEnvironment(places))
+        events = carrier.transmit([(message("A", number, now), ["B", "C"])], now)
+        return [event.path_loss_db for event in [*events, *carrier.transmit([], now + 0.05)]]
+
+    before = losses(kept, 0)
+    other.continue_from(kept)
+    assert losses(other, 1) == before
+    assert losses(radio(2), 1) != before
