@@ -19,6 +19,8 @@ UNASSIGNED_GATE = -2.0 * math.log(1e-6)
 
 One true pair in a hundred is outside a gate of 99 %, which would split objects many times per second.
 """
+LEVEL_TOLERANCE = 2.0
+"""Maximum vertical gap between two boxes of one object [m], since heights of detections have large errors."""
 _FEW_PAIRS = 1024
 """Maximum number of pairs that are all listed, which is faster."""
 CERTAIN = -1e3
@@ -56,16 +58,16 @@ class Pairs(NamedTuple):
 def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_station: bool) -> Pairs:
     """Return association candidates: tracks of the same station, or of two stations with the lower one first.
 
-    Candidates are within the gate, have the same object id of the station, or have centers within half a width of each
-    other, because two bodies cannot overlap even if the covariances are small. The cost is the negative log-likelihood
-    of the offset without constants.
+    Candidates are on one level, not on and below a bridge. They are within the gate, have the same object id of the
+    station, or have centers within half a width of each other, because two bodies cannot overlap even if the
+    covariances are small. The cost is the negative log-likelihood of the offset without constants.
     """
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
     rows, columns = _pairs_of_stations(first["station"], second["station"], own, other, same_station)
     x, y = own.x[rows] - other.x[columns], own.y[rows] - other.y[columns]
     limit = own.reach[rows] + other.reach[columns]
-    near = x * x + y * y <= limit * limit
+    near = (x * x + y * y <= limit * limit) & _on_one_level(first["body"][rows], second["body"][columns])
     certain = None
     if same_station and second["number"].max(initial=-1) >= 0:
         number = second["number"][columns]
@@ -90,6 +92,12 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
         cost[certain] = CERTAIN
     fits = inside | (~vague & (mahalanobis <= UNASSIGNED_GATE))
     return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
+
+
+def _on_one_level(first: Array, second: Array) -> NDArray[np.bool_]:
+    """Return whether bodies (N, 4) of z, length, width and height may be at the same height."""
+    apart = np.abs(first[:, 0] - second[:, 0]) > 0.5 * (first[:, 3] + second[:, 3]) + LEVEL_TOLERANCE
+    return np.asarray(~apart)
 
 
 def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.v2x.messages.message import StationState
+from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.world.actor import ActorSpec
 
 DT = 0.01
@@ -111,7 +111,7 @@ def test_message_at_a_multiple_of_the_time_step_has_no_offset() -> None:
         spec = ActorSpec("Car", "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
         settings = AgentSettings.model_validate({"message_rate": 1, "message_phase": phase})
         generator = MessageGenerator(spec, settings, sensors=1, dt=0.05)
-        found = []
+        found: list[Message] = []
         for tick in range(10):
             now = tick * 0.05
             found += generator.generate(StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0), Detections(now), now)

@@ -52,6 +52,15 @@ def test_fuse_single_current_report_is_unchanged(report: Make, fuse: Fuse) -> No
     assert np.isnan(fuse([report("A", 1.0, [(10.0, 3.0)])], 1.0).velocity).all()
 
 
+@pytest.mark.parametrize(("height", "objects"), [(0.0, 1), (2.5, 1), (6.5, 2)])
+def test_fuse_keeps_cars_on_and_below_a_bridge_separate(report: Make, fuse: Fuse, height: float, objects: int) -> None:
+    """Errors of the height of a box by 2.5 m do not split a car."""
+    below, above = report("A", 0.0, [(10.0, 0.0)]), report("B", 0.0, [(10.2, 0.1)])
+    above.detections.boxes[:, 2] += height
+    assert len(fuse([below, above], 0.0)) == objects
+    assert len(fuse([above, below], 0.0)) == objects
+
+
 def test_fuse_keeps_distant_cars_separate(report: Make, fuse: Fuse) -> None:
     places = [(10.0, 0.0), (10.0, 3.0), (30.0, 0.0)]
     fused = fuse([report("A", 0.0, places), report("B", 0.0, places[:2])], 0.0)

@@ -35,6 +35,7 @@ class Course:
 
     half_width  of the lane at its start [m]
     stops       distances at which stop signs hold the traffic [m];  passages  of junctions
+    heights     of the road (M,) [m]
     """
 
     def __init__(
@@ -44,8 +45,10 @@ class Course:
         half_width: float,
         stops: tuple[float, ...] = (),
         passages: tuple[Passage, ...] = (),
+        heights: Array | None = None,
     ) -> None:
         self.points, self.along, self.half_width = points, along, half_width
+        self.heights: Array = np.zeros(len(along)) if heights is None else heights
         self.stops, self.passages = stops, passages
         self._x, self._y = (np.ascontiguousarray(column) for column in points.T)
         step = np.diff(points, axis=0)
@@ -157,7 +160,8 @@ class LaneCourses:
         poses = tables.lane_poses(np.concatenate(rows), np.concatenate(places), np.zeros(sum(map(len, places))))
         points = np.column_stack([poses.x, poses.y])
         step = np.hypot(*np.diff(points, axis=0).T)
-        points = points[np.concatenate([[True], step > 0.05])]
+        apart = np.concatenate([[True], step > 0.05])
+        points, heights = points[apart], np.asarray(poses.z)[apart]
         if len(points) < 2:
             return None
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -165,7 +169,8 @@ class LaneCourses:
         section = self._roads.road(first.road).sections[first.section]
         width = section.lanes[first.lane].width
         half_width = max(width.value(0.0), width.value(section.length)) / 2.0
-        return Course(points, along, half_width, self._rules.stops_along(points), self._rules.passages(points))
+        stops, passages = self._rules.stops_along(points), self._rules.passages(points, heights)
+        return Course(points, along, half_width, stops, passages, heights)
 
 
 def _likely(branches: list[Branch]) -> list[Branch]:

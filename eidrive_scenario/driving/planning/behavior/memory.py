@@ -27,6 +27,9 @@ LARGEST_ERROR = 3.0
 """Maximum standard deviation that is considered [m]; above it the position says nothing."""
 SMOOTHING = 0.4
 """Weight of the newest difference quotient in the velocity of an object whose detector estimates none."""
+OTHER_LEVEL = 3.5
+"""Difference of height from which on a road user is on another level than a road, such as a bridge [m]: less than the
+clearance of bridges, 4.5 m, by an error of 1 m."""
 VELOCITY_ERROR = 1.5
 """Assumed standard deviation of a velocity per standard deviation of the position [1/s]."""
 LASTING = 1.0
@@ -83,6 +86,10 @@ class KnownObject(msgspec.Struct):
     """Estimated rate of change of the speed [m/s²]."""
     mean_speed: float = 0.0
     """Speed over about the last second [m/s]."""
+    z: float = 0.0
+    """Height of the lower side of its box [m]."""
+    height: float = 0.0
+    """Height of its box [m]."""
 
     @property
     def speed(self) -> float:
@@ -160,7 +167,8 @@ class ObjectMemory:
         ahead: Array = np.array([(known.x, known.y) for known in self._objects])
         places: Array = np.array([(known.x, known.y) for known in found])
         gap = np.hypot(places[:, None, 0] - ahead[None, :, 0], places[:, None, 1] - ahead[None, :, 1])
-        fresh, earlier = (gap < GATE).nonzero()
+        bottom, former = (np.array([known.z for known in some]) for some in (found, self._objects))
+        fresh, earlier = ((gap < GATE) & (np.abs(bottom[:, None] - former) < OTHER_LEVEL)).nonzero()
         order = gap[fresh, earlier].argsort(kind="stable")
         pairs: list[tuple[int, KnownObject]] = []
         new: set[int] = set()
@@ -207,7 +215,7 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
     for row, (box, (vx, vy), (variance, ellipse)) in enumerate(zip(*columns, strict=True)):
         if existence[row] < least:
             continue
-        x, y, _, length, width, _, yaw = box
+        x, y, z, length, width, height, yaw = box
         moving = not (math.isnan(vx) or math.isnan(vy))
         vx, vy = (vx, vy) if moving else (0.0, 0.0)
         error = math.sqrt(variance) if variance >= 0.0 else USUAL_ERROR
@@ -216,6 +224,7 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         known = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
         known.mean_speed, known.ellipse = known.speed, ellipse if variance > 0.0 else (1.0, 0.0, 0.0)
         known.first_seen, known.mean_place = now, (x, y)
+        known.z, known.height = z - height / 2.0, height
         found.append(known)
     return found
 
@@ -242,7 +251,9 @@ def _still_stands(known: KnownObject, uncertainty: float) -> bool:
 
 def _is_among(lost: KnownObject, found: list[KnownObject]) -> bool:
     """Return whether a lost object is at the place of one in view, of which it was another track."""
-    return any(math.hypot(other.x - lost.x, other.y - lost.y) < GATE for other in found)
+    return any(
+        math.hypot(other.x - lost.x, other.y - lost.y) < GATE and abs(other.z - lost.z) < OTHER_LEVEL for other in found
+    )
 
 
 def _keep_course(known: KnownObject) -> None:
@@ -294,6 +305,7 @@ def _take_over(known: KnownObject, fresh: KnownObject, step: float, shares: _Sha
     known.row, known.kind, known.seen = fresh.row, fresh.kind, fresh.seen
     known.x, known.y, known.yaw = fresh.x, fresh.y, fresh.yaw
     known.length, known.width = fresh.length, fresh.width
+    known.z, known.height = fresh.z, fresh.height
     known.error, known.ellipse, known.existence = fresh.error, fresh.ellipse, fresh.existence
     x, y = known.mean_place
     known.mean_place = x + shares.place * (fresh.x - x), y + shares.place * (fresh.y - y)

@@ -94,7 +94,7 @@ class BehaviorPlanner(RoutePlanner):
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
         path = self._advanced_path(x, y, ego.yaw, goal)
-        line = self._line_of(path, x, y)
+        line = self._line_of(path, ego)
         place = self._place_on(line, x, y)
         wanted = self._target_speed(ego, goal)
         if self._decision is None or now - self._decided >= self.planner_settings.period - TIME_TOLERANCE:
@@ -111,13 +111,14 @@ class BehaviorPlanner(RoutePlanner):
                 return replace(plan, speeds=np.minimum(limits, wanted), acceleration=goal.acceleration)
         return plan
 
-    def _line_of(self, path: PlannedPath, x: float, y: float) -> ReferenceLine:
+    def _line_of(self, path: PlannedPath, ego: EgoState) -> ReferenceLine:
         """Return the reference line of the path; the current maneuver continues on an extended path."""
         before = self._line
         if before is not None and before.path is path:
             return before
-        line = self._line = ReferenceLine(path, self.roads)
-        self._passages = self._rules.passages(line.points) if self._rules is not None else ()
+        x, y, z = ego.position.tolist()
+        line = self._line = ReferenceLine(path, self.roads, z)
+        self._passages = self._rules.passages(line.points, line.heights) if self._rules is not None else ()
         self._limits = speed_limits(line.curvature, path.limits, line.spacing, self.planner_settings)
         if self.observes_regions and self.roads is not None:
             self._ways = self._find_ways(self.roads, line)

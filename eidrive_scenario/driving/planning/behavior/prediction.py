@@ -45,6 +45,7 @@ class Prediction(msgspec.Struct, frozen=True):
     objects  (N,) index of the object;  x, y, yaw, speed  (N, K) [m, rad, m/s]
     room     (N,) distance of the center from the nearer edge of the lane that it follows, inf for other objects [m]
     passages  of junctions ahead, for each hypothesis
+    z         (N, K) height of the lower side of the object [m]; None if all roads are level
     """
 
     objects: tuple[int, ...]
@@ -54,6 +55,7 @@ class Prediction(msgspec.Struct, frozen=True):
     speed: Array
     room: Array
     passages: tuple[tuple[Passage, ...], ...] = ()
+    z: Array | None = None
 
 
 class Hypothesis(NamedTuple):
@@ -63,6 +65,8 @@ class Hypothesis(NamedTuple):
     speed: Array
     room: float = math.inf
     passages: tuple[Passage, ...] = ()
+    z: Array | None = None
+    """Height of the road that it follows (K,) [m]; None: it follows none, or all roads are level."""
 
 
 class Predictor:
@@ -72,6 +76,7 @@ class Predictor:
         self._roads = roads
         self._courses = LaneCourses(roads, rules or JunctionRules(roads)) if roads is not None else None
         self._times = times
+        self._level = roads is None or roads.is_level
 
     def follow_lanes(self, objects: list[KnownObject], lanes: list[list[Course]]) -> None:
         """Let lost vehicles move along their lanes."""
@@ -108,7 +113,24 @@ class Predictor:
             speed,
             np.array([entry.room for entry in found]),
             tuple([entry.passages for entry in found]),
+            None if self._level else self._heights(objects, owners, found),
         )
+
+    def _heights(self, objects: list[KnownObject], owners: list[int], found: list[Hypothesis]) -> Array:
+        """Return the heights (N, K) of hypotheses [m]: those of the roads below them, else of the object."""
+        now = np.array([objects[owner].z for owner in owners])
+        z = np.repeat(now[:, None], len(self._times), axis=1)
+        for row, one in enumerate(found):
+            if one.z is not None:
+                z[row] = one.z
+        free = [row for row, one in enumerate(found) if one.z is None and one.speed[0] > 0.0]
+        if free and self._roads is not None:
+            x, y = (np.concatenate([found[row].poses[axis] for row in free]) for axis in (0, 1))
+            heights = z[free].ravel()
+            lanes, s, points = self._roads.overlapped_lanes(x, y, heights)
+            heights[points] = self._roads.tables.lane_poses(lanes, s, np.zeros(len(s))).z
+            z[free] = heights.reshape(len(free), -1)
+        return z
 
     def _hypotheses(self, known: KnownObject, courses: list[Course]) -> list[Hypothesis]:
         times, now = self._times, known.speed
@@ -138,7 +160,8 @@ class Predictor:
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             fits = now <= noise or course.can_follow(along, now - noise)
-            (found if fits else too_fast).append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead))
+            z = None if self._level else np.interp(along + way, course.along, course.heights)
+            (found if fits else too_fast).append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if len(found) == MOST_HYPOTHESES:
                 break
         found = found or too_fast
@@ -150,8 +173,8 @@ class Predictor:
         moving = [index for index, known in enumerate(objects) if known.speed >= STANDING and known.kind not in ON_FOOT]
         if not moving or self._roads is None or self._courses is None:
             return found
-        x, y = np.array([(objects[index].x, objects[index].y) for index in moving]).T.copy()
-        rows, _, owners = self._roads.overlapped_lanes(x, y)
+        x, y, z = np.array([(objects[index].x, objects[index].y, objects[index].z) for index in moving]).T.copy()
+        rows, _, owners = self._roads.overlapped_lanes(x, y, None if self._level else z)
         drivable = self._roads.tables.lane_drivable
         for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):
             if drivable[row]:

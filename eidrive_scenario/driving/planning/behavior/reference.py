@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -67,9 +68,13 @@ class LanesBeside(NamedTuple):
 
 
 class ReferenceLine:
-    """Path of the route with distances along it (s) and to its left (d)."""
+    """Path of the route with distances along it (s) and to its left (d).
 
-    def __init__(self, path: PlannedPath, roads: RoadNetwork | None) -> None:
+    z  height of its start [m]
+    """
+
+    def __init__(self, path: PlannedPath, roads: RoadNetwork | None, z: float = 0.0) -> None:
+        self._z = z
         self.path = path
         self.points: Array = path.points
         step = np.diff(self.points, axis=0)
@@ -91,6 +96,22 @@ class ReferenceLine:
     def length(self) -> float:
         """Length of the line [m]."""
         return float(self.along[-1])
+
+    @cached_property
+    def heights(self) -> Array | None:
+        """Heights of the road at the points (M,) [m]; None if all roads are level.
+
+        Each point is on the road of the one before or on one that continues it, where roads cross above each other.
+        """
+        roads = self._roads
+        if roads is None or roads.is_level:
+            return None
+        place, z, found = None, self._z, []
+        for x, y in self.points.tolist():
+            place = roads.locate_at(x, y, place, z, reach=5.0)
+            z = z if place is None else roads.road_pose_at(place.road, place.s, place.t).z
+            found.append(z)
+        return np.array(found)
 
     def index_at(self, s: float) -> int:
         """Return the index of the last point up to a distance along the line."""

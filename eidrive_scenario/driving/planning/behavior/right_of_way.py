@@ -56,13 +56,16 @@ class JunctionRules:
         lines = self._lines_near(points)
         return tuple(sorted(place for place, line in places_along(lines, points) if line.kind == "stop sign"))
 
-    def passages(self, points: Array) -> tuple[Passage, ...]:
-        """Return the passages of junctions by a way (M, 2), in their order; a way may pass a junction several times."""
+    def passages(self, points: Array, heights: Array | None = None) -> tuple[Passage, ...]:
+        """Return the passages of junctions by a way (M, 2), in their order; a way may pass a junction several times.
+
+        heights  of the way (M,) [m], for roads above each other; None: the roads are level
+        """
         step = np.diff(points, axis=0)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
         heading = np.arctan2(step[:, 1], step[:, 0])
         inside: list[set[str]] = [set() for _ in points]
-        rows, _, owners = self._roads.overlapped_lanes(points[:, 0].copy(), points[:, 1].copy())
+        rows, _, owners = self._roads.overlapped_lanes(points[:, 0].copy(), points[:, 1].copy(), heights)
         for row, owner in zip(rows.tolist(), owners.tolist(), strict=True):
             junction = self._junction[row]
             if junction is not None:

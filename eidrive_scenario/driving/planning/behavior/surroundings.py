@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.detections import VULNERABLE
-from eidrive_scenario.driving.planning.behavior.memory import KnownObject
+from eidrive_scenario.driving.planning.behavior.memory import OTHER_LEVEL, KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
@@ -139,6 +139,9 @@ def surroundings(
     margin = np.array(
         [settings.pedestrian_margin if known.kind in VULNERABLE else settings.lateral_margin for known in owners]
     )
+    if prediction.z is not None and line.heights is not None:
+        below = np.interp(s, line.along, line.heights, left=np.nan, right=np.nan)
+        d = np.where(np.abs(prediction.z - below) > OTHER_LEVEL, 1e3, d)
     moving = prediction.speed[:, :1] > 0.0
     center, offset, length, width = ego
     behind = (s[:, 0] + half_length[:, 0] < center - length) & (np.abs(d[:, 0] - offset) < half_width[:, 0] + width)
