@@ -3,38 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
-from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
+from eidrive_scenario.evaluation.lane_chains import SPACING, LaneChains
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.world.view import WorldView
 
 RANGE = 200.0
 """Maximum distance of the actors that are considered [m]."""
-SPACING = 5.0
-"""Distance of the sample points of a lane [m]."""
+STEP = 5
+"""Number of sample points of a lane per point to which actors are compared."""
 BESIDE = 15.0
 """Distance from the sample points of the lane within which actors are placed on their lanes [m]."""
 CLOSE = 10.0
 """Distance between bodies up to which straight coordinates apply to actors beside the lane [m]."""
 STANDING = 0.1
 """Maximum speed of a standing actor [m/s]. Its heading is irrelevant for the role of a leader."""
-
-
-class _Chain(NamedTuple):
-    """Lane ahead up to a fork.
-
-    roads   distance of its start [m], direction in s and lane at the start, by road
-    length  from the start of the first road [m]
-    points  (N, 2) of the lane center, SPACING apart [m]
-    """
-
-    roads: Mapping[str, tuple[float, int, int]]
-    length: float
-    points: Array
 
 
 class Relation(NamedTuple):
@@ -97,7 +84,7 @@ class Surroundings:
 
     def __init__(self, roads: RoadNetwork | None) -> None:
         self._roads = roads
-        self._chains: dict[tuple[LaneKey, int], _Chain] = {}
+        self._chains = None if roads is None else LaneChains(roads, RANGE)
         self._hints: dict[str, LaneLocation | None] = {}
 
     def relations(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Iterator[Relation]:
@@ -134,13 +121,12 @@ class Surroundings:
 
     def _in_reach(self, view: WorldView, row: int, near: list[int], place: LaneLocation, direction: int) -> list[int]:
         """Return the actors beside the lane and those in the straight path; the others are ignored."""
-        assert self._roads is not None
-        chain = self._chain(place, direction)
-        begun = place.s if direction > 0 else self._roads.roads[place.road].length - place.s
-        first = max(int((begun - 2.0 * BESIDE) / SPACING), 0)
-        points = chain.points[first : int((begun + RANGE) / SPACING) + 2]
+        assert self._chains is not None
+        chain = self._chains.chain(place, direction)
+        begun = chain.roads[place.road].along(place.s)
+        first, last = np.searchsorted(chain.along, (begun - 2.0 * BESIDE, begun + RANGE + SPACING)).tolist()
         boxes = view.boxes[near]
-        offset = boxes[:, None, :2] - points
+        offset = boxes[:, None, :2] - chain.points[first:last:STEP]
         beside = (np.square(offset).sum(axis=-1) <= BESIDE * BESIDE).any(axis=1)
         own = view.plain_boxes[row]
         left = (boxes[:, 1] - own[1]) * math.cos(own[6]) - (boxes[:, 0] - own[0]) * math.sin(own[6])
@@ -193,24 +179,21 @@ class Surroundings:
         self, view: WorldView, row: int, other: int, place: LaneLocation, direction: int
     ) -> tuple[_Body, _Body] | None:
         """Return both bodies in the coordinates of the lane."""
-        assert self._roads is not None
+        assert self._chains is not None
         own, body = view.plain_boxes[row], view.plain_boxes[other]
         there = self._locate(view, other)
-        roads, length, _ = self._chain(place, direction)
-        begun = place.s if direction > 0 else self._roads.roads[place.road].length - place.s
-        if there is None or there.road not in roads:
+        chain = self._chains.chain(place, direction)
+        begun = chain.roads[place.road].along(place.s)
+        road = None if there is None else chain.roads.get(there.road)
+        if there is None or road is None:
             distance = math.hypot(body[0] - own[0], body[1] - own[1]) - (own[3] + body[3]) / 2.0
-            bends_away = there is not None and CLOSE < distance < length - begun
+            bends_away = there is not None and CLOSE < distance < chain.length - begun
             return None if bends_away else self._straight(view, row, other)
-        start, way, lane = roads[there.road]
-        along = start + (there.s if way > 0 else self._roads.roads[there.road].length - there.s) - begun
-        if there.road == place.road:
-            left = (there.t - place.t) * direction
-        else:
-            left = (there.t - self._lane_t(there.road, lane, there.s)) * way - place.offset * direction
+        along = chain.distance(road.along(there.s)) - chain.distance(begun)
+        left = (there.t - self._chains.center(road, there.road, there.s)) * road.direction - place.offset * direction
         return (
             _body(view, row, 0.0, 0.0, self._heading(place, direction)),
-            _body(view, other, along, left, self._heading(there, way)),
+            _body(view, other, along, left, self._heading(there, road.direction)),
         )
 
     def _locate(self, view: WorldView, row: int) -> LaneLocation | None:
@@ -225,52 +208,6 @@ class Surroundings:
         assert self._roads is not None
         heading = self._roads.road_pose_at(place.road, place.s).h
         return heading if direction > 0 else heading + math.pi
-
-    def _lane_t(self, road: str, lane: int, s: float) -> float:
-        """Return t of the center of a lane at s; that of the nearest lane of its side if it does not exist there."""
-        assert self._roads is not None
-        numbers = self._roads.lane_ids(road, s)
-        same = [number for number in numbers if (number > 0) == (lane > 0)] or list(numbers)
-        nearest = min(same, key=lambda number: abs(number - lane))
-        return self._roads.location(road, nearest, s).t
-
-    def _chain(self, place: LaneLocation, direction: int) -> _Chain:
-        """Return the lane ahead up to a fork."""
-        assert self._roads is not None
-        road = self._roads.roads[place.road]
-        key = LaneKey(place.road, road.section_at(place.s).index, place.lane)
-        known = self._chains.get((key, direction))
-        if known is not None:
-            return known
-        found = {place.road: (0.0, direction, place.lane)}
-        length, way, last = road.length, direction, key
-        while length - road.length <= RANGE:
-            ways = list(self._roads.links.beyond(last, way))
-            if len(ways) != 1:
-                break
-            (following, way), before = ways[0], last
-            if following.road != before.road:
-                if following.road in found:
-                    break
-                found[following.road] = (length, way, following.lane)
-                length += self._roads.roads[following.road].length
-            last = following
-        chain = self._chains[key, direction] = _Chain(found, length, self._sample(found))
-        return chain
-
-    def _sample(self, roads: Mapping[str, tuple[float, int, int]]) -> Array:
-        """Return points (N, 2) of the lane center, SPACING apart; the first one is at the start of the first road."""
-        assert self._roads is not None
-        points = []
-        along = 0.0
-        for number, (start, way, lane) in roads.items():
-            length = self._roads.roads[number].length
-            while along <= start + length:
-                s = along - start if way > 0 else length - (along - start)
-                pose = self._roads.road_pose_at(number, s, self._lane_t(number, lane, s))
-                points.append((pose.x, pose.y))
-                along += SPACING
-        return np.array(points).reshape(-1, 2)
 
 
 def _body(view: WorldView, row: int, along: float, left: float, heading: float) -> _Body:

@@ -27,6 +27,7 @@ from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.routing.costs import Cost, assumed_speed
 from eidrive_scenario.roads.routing.distance import Chain, RoadDistances
 from eidrive_scenario.roads.routing.graph import LaneWays, build_ways, find_lanes
+from eidrive_scenario.roads.routing.lane_count import lanes_between
 from eidrive_scenario.roads.routing.links import LaneLinks
 from eidrive_scenario.roads.routing.movement import BranchSelector, Movement, driving_direction
 from eidrive_scenario.roads.routing.nearby import locate_near
@@ -292,6 +293,14 @@ class RoadNetwork(RoadAttributes):
         """
         found = self._distances.placed(a, b)
         return None if found is None else found[2]
+
+    def lanes_between(self, a: LaneLocation, b: LaneLocation) -> int | None:
+        """Return the number of lanes from the lane of a to that of b, positive in the direction of t at a, or None.
+
+        Lanes are followed along their links, as their numbers may change.
+        """
+        runs = self.orientation(a, b)
+        return None if runs is None else lanes_between(self.roads, self.links, a, b, runs)
 
     def _usual_speed(self, road: str) -> float:
         return assumed_speed(self.speed_limit(road, 0.5 * self.road(road).length))

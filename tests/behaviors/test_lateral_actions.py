@@ -6,11 +6,12 @@ Ego drives at 20 m/s from x = 100 in lane -1 (y = -2).
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 from recorded_scene import RunScene
 from storyboard_xml import speed_xml
-from street_scene import after
+from street_scene import NOTHING, after
 from trajectories import RELATIVE, follow_points
 from whole_run import Run
 
@@ -283,3 +284,23 @@ def test_preempted_init_trajectory_is_no_longer_followed(run: Run) -> None:
     run(1, ("Ego", aside, after(0.45)), driven=False, init=init, during=look)
     assert followed[0.4]
     assert not followed[0.6]
+
+
+@pytest.mark.parametrize("change", [False, True])
+def test_lateral_transition_continues_from_the_place_of_a_teleport(scene: RunScene, change: bool) -> None:
+    """After 1 s Ego is moved to 1 m on the right of the center of its lane, y = -2 m, and continues to the left."""
+    offset = """<PrivateAction><LateralAction><LaneOffsetAction continuous="false">
+      <LaneOffsetActionDynamics dynamicsShape="cubic" maxLateralAcc="0.5"/><LaneOffsetTarget>
+      <AbsoluteTargetLaneOffset value="1.5"/></LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
+    lane = """<PrivateAction><LateralAction><LaneChangeAction>
+      <LaneChangeActionDynamics dynamicsShape="cubic" dynamicsDimension="time" value="6"/>
+      <LaneChangeTarget><AbsoluteTargetLane value="1"/></LaneChangeTarget></LaneChangeAction></LateralAction>
+      </PrivateAction>"""
+    teleport = """<PrivateAction><TeleportAction><Position><LanePosition roadId="1" laneId="{}" s="500" offset="{}"/>
+      </Position></TeleportAction></PrivateAction>""".format(*((1, -5.0) if change else (-1, -1.0)))
+    played = scene(10, ("Ego", lane if change else offset), ("Other", NOTHING), ("Ego", teleport, after(1.0)))
+    rows = [row["Ego"] for row in played.rows]
+    moved = next(index for index, (one, two) in enumerate(pairwise(rows)) if two.x - one.x > 100.0) + 1
+    assert rows[moved].y == pytest.approx(-3.0)
+    assert all(-1e-9 <= two.y - one.y < 0.2 for one, two in pairwise(rows[moved:]))
+    assert rows[-1].y == pytest.approx(2.0 if change else -0.5, abs=1e-6)

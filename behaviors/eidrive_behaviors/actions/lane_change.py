@@ -90,7 +90,6 @@ class LaneChangeAction(ActionBehaviour):
         self._transition = self._build_transition(start, target)
         self._path = None
         self._offset = start
-        self._followed_lane = moved.road, self._lane
         if is_follow_mode(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
             sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
             self._limited_offset = RateLimitedValue(start, sideways, up=math.inf, down=math.inf)
@@ -126,11 +125,10 @@ class LaneChangeAction(ActionBehaviour):
         return Status.SUCCESS if arrived else Status.RUNNING
 
     def _switch_reference_lane(self) -> None:
-        """Continue from the new offset after the target lane has ended and its neighbor has become the target."""
+        """Continue from the new offset after a teleport, or after the neighbor of an ended lane became the target."""
         here, transition = self.actor.motion.location, self._transition
-        if here is None or (here.road, here.lane) == self._followed_lane:
+        if here is None:
             return
-        self._followed_lane = here.road, here.lane
         offset = here.offset * self._roads.driving_direction(here.road, here.lane)
         if abs(offset - self._offset) <= SHIFTED:
             return

@@ -40,7 +40,6 @@ class LaneOffsetAction(ActionBehaviour):
             motion.snap_to_lane()
         if motion.location is None:
             raise off_road_error(self)
-        self._lane = motion.location.road, motion.location.lane
         self._start_transition(motion.location)
 
     def _start_transition(self, here: LaneLocation) -> None:
@@ -61,10 +60,8 @@ class LaneOffsetAction(ActionBehaviour):
             warn_without_effect(self)
         if self.actor.driven or here is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
-        if (here.road, here.lane) != self._lane:
-            self._lane = here.road, here.lane
-            if abs(here.offset * self._way(here) - self._offset) > SHIFTED:
-                self._start_transition(here)
+        if abs(here.offset * self._way(here) - self._offset) > SHIFTED:
+            self._start_transition(here)  # in another lane, or after a teleport
         transition, speed, dt = self._transition, self.actor.motion.speed, self.context.dt
         if transition.extent > 0.0 and abs(speed) < STANDING:
             return Status.RUNNING

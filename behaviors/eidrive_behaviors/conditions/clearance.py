@@ -75,17 +75,13 @@ class RelativeClearanceCondition(EntityCondition):
 
     def _in_range(self, context: ConditionContext, entity: str, here: LaneLocation, other: LaneLocation) -> bool:
         assert context.roads is not None
-        runs = context.roads.orientation(here, other)
-        if runs is None:
+        runs, steps = context.roads.orientation(here, other), context.roads.lanes_between(here, other)
+        if runs is None or steps is None:
             return False
         way = context.roads.driving_direction(here.road, here.lane) * facing(context, entity, here)
-        lane = other.lane * runs
-        same = lane == here.lane or context.roads.driving_direction(other.road, other.lane) * runs == way
+        same = steps == 0 or context.roads.driving_direction(other.road, other.lane) * runs == way
         if not same and not self.element.opposite_lanes:
             return False
-        steps = lane - here.lane
-        if (lane > 0) != (here.lane > 0):
-            steps -= 1 if steps > 0 else -1
         left = steps * way
         ranges = self.element.relative_lane_range
         return not ranges or any(

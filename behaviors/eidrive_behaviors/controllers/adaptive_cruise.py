@@ -89,7 +89,11 @@ class AdaptiveCruise(ControllerModel):
             slower = self.actor.limits()[2]
             reach = max(LOOKOUT, 2.0 * CLOSEST + self._last**2 / slower) if slower > 0.0 else math.inf
             if apart is not None and 0.0 < apart[0] < reach and abs(apart[1]) < self.lateral_range:
-                same = here.lane == there.lane if here.road == there.road else self._is_beside_lane(apart[1]) is False
+                same = (
+                    roads.lanes_between(here, there) == 0
+                    if here.road == there.road
+                    else self._is_beside_lane(apart[1]) is False
+                )
                 gap = apart[0] - self._overhang(name)
                 if same and gap > 0.0:
                     return gap

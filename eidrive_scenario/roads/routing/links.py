@@ -6,11 +6,15 @@ Links are stored in both directions, as a file may specify them at either end.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.road_map import Connection, Contact, Junction, LaneSection, Road, RoadLink, RoadMap
+
+FAR = 200
+"""Maximum number of lanes in the search for the continuation of a lane."""
 
 
 class LaneEnd(NamedTuple):
@@ -47,6 +51,22 @@ class LaneLinks:
         """Yield the lanes after leaving a lane in `direction` (+1 along s), with the direction of entry."""
         for other in self._lanes.get(LaneEnd(lane, direction), ()):
             yield other.lane, -other.side
+
+    def continued(self, lane: LaneKey, road: str, section: int) -> int | None:
+        """Return the lane of a road section that continues a lane or that it continues; None without one within FAR
+        lanes."""
+        if (lane.road, lane.section) == (road, section):
+            return lane.lane
+        open_ = deque((lane, direction) for direction in (1, -1))
+        known = {lane}
+        while open_ and len(known) < FAR:
+            for following, way in self.beyond(*open_.popleft()):
+                if (following.road, following.section) == (road, section):
+                    return following.lane
+                if following not in known:
+                    known.add(following)
+                    open_.append((following, way))
+        return None
 
     def beyond_road(self, road: str, direction: int) -> Iterator[tuple[str, int]]:
         """Yield the roads after leaving a road in `direction`, with the direction of entry."""

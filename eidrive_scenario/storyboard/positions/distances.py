@@ -10,6 +10,7 @@ from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
+from eidrive_scenario.tolerances import EPSILON
 
 Box = tuple[float, float, float, float, float, float, float]
 """x, y, z of the center, length, width, height [m], yaw [rad]."""
@@ -117,9 +118,16 @@ def closing_speed(
         return sum((b - a) * (v - w) for a, b, v, w in axes) / gap if gap > 0.0 else 0.0
     axis = 0 if kind == "longitudinal" else 1
     now = _offsets(context, a, here, there, frame, algorithm)[axis]
-    moved = _predicted(context, here, mine), _predicted(context, there, theirs)
-    then = _offsets(context, a, *moved, frame, algorithm)[axis]
-    return math.copysign(1.0, now) * (now - then) / TIME_DELTA
+    sign = math.copysign(1.0, now)
+
+    def after(duration: float) -> float:
+        own, other = _moved(context, here, mine, duration), _moved(context, there, theirs, duration)
+        return _offsets(context, a, own, other, frame, algorithm)[axis]
+
+    if kind == "longitudinal":
+        return sign * (now - after(TIME_DELTA)) / TIME_DELTA
+    # A motion along a bend changes lateral distances in second order of time, which cancels between both directions.
+    return 0.0 if abs(now) < EPSILON else sign * (after(-TIME_DELTA) - after(TIME_DELTA)) / (2.0 * TIME_DELTA)
 
 
 def _velocity(context: ConditionContext, name: str) -> tuple[float, float, float]:
@@ -127,11 +135,11 @@ def _velocity(context: ConditionContext, name: str) -> tuple[float, float, float
     return x, y, z
 
 
-def _predicted(
-    context: ConditionContext, place: ResolvedPosition, velocity: tuple[float, float, float]
+def _moved(
+    context: ConditionContext, place: ResolvedPosition, velocity: tuple[float, float, float], duration: float
 ) -> ResolvedPosition:
-    """Return the position after TIME_DELTA at this velocity."""
-    x, y = place.pose.x + velocity[0] * TIME_DELTA, place.pose.y + velocity[1] * TIME_DELTA
+    """Return the position after a duration [s] at this velocity."""
+    x, y = place.pose.x + velocity[0] * duration, place.pose.y + velocity[1] * duration
     location = context.roads.locate_at(x, y, place.location) if context.roads is not None else None
     return ResolvedPosition(place.pose._replace(x=x, y=y), location)
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from opendrive_xml import lane_xml, lanes_xml, map_xml, ring_xml, road_xml, section_xml
 
-from eidrive_scenario.evaluation.surroundings import Surroundings
+from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.view import WorldView
 
@@ -105,3 +106,79 @@ def test_actors_away_from_the_lane_have_no_relation() -> None:
 
 def test_absent_actor_has_no_relations() -> None:
     assert list(Surroundings(ROADS).relations(view(Lead=at("1", -1, 20.0)), "Ego")) == []
+
+
+def relation(roads: RoadNetwork, own: tuple[str, int, float], other: tuple[str, int, float]) -> Relation:
+    """Return the relation to another car, both at road, lane and s, in the direction of their lanes."""
+
+    def pose(road: str, lane: int, s: float) -> Pose:
+        place = roads.lane_pose_at(road, lane, s)
+        return place.x, place.y, place.h + (0.0 if roads.driving_direction(road, lane) > 0 else math.pi), 5.0
+
+    (found,) = Surroundings(roads).relations(view(Ego=pose(*own), Lead=pose(*other)), "Ego")
+    return found
+
+
+SHIFT = 3.5
+"""Lateral shift of the lanes between s = 40 and s = 80 m [m]."""
+
+
+def shifted_road() -> RoadNetwork:
+    """Return a road whose lanes shift to the left by one width, between 40 and 80 m, by its lane offset."""
+    cubic = f'<laneOffset s="40" a="0" b="0" c="{3 * SHIFT / 40**2}" d="{-2 * SHIFT / 40**3}"/>'
+    offsets = f'<laneOffset s="0" a="0" b="0" c="0" d="0"/>{cubic}<laneOffset s="80" a="{SHIFT}" b="0" c="0" d="0"/>'
+    return RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=offsets + lanes_xml(1, 2))))
+
+
+@pytest.mark.parametrize(("own", "lead"), [(-1, 120.0), (-2, 120.0), (-1, 60.0)])
+def test_car_in_the_same_lane_after_a_lane_offset_leads(own: int, lead: float) -> None:
+    found = relation(shifted_road(), ("1", own, 20.0), ("1", own, lead))
+    assert found.leads
+    assert found.left == pytest.approx(0.0, abs=1e-9)
+
+
+def test_car_straight_ahead_in_another_lane_after_a_lane_offset_does_not_lead() -> None:
+    """After the shift, lane -2 is where lane -1 was."""
+    found = relation(shifted_road(), ("1", -1, 20.0), ("1", -2, 120.0))
+    assert not found.leads
+    assert found.left == pytest.approx(-3.5)
+
+
+@pytest.mark.parametrize(("lane", "leads"), [(-2, True), (-1, False)])
+def test_lane_beside_a_new_lane_continues(lane: int, leads: bool) -> None:
+    """From 60 m on a pocket lane -1 begins, and the lane continues as -2."""
+    before = section_xml(lane_xml(1), lane_xml(-1, link='<successor id="-2"/>'))
+    after = section_xml(lane_xml(1), lane_xml(-1) + lane_xml(-2, link='<predecessor id="-1"/>'), s=60)
+    roads = RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=before + after)))
+    found = relation(roads, ("1", -1, 20.0), ("1", lane, 120.0))
+    assert found.leads is leads
+    behind = relation(roads, ("1", -2, 70.0), ("1", -1, 50.0))
+    assert behind.left == pytest.approx(0.0)
+    assert behind.ahead == pytest.approx(-20.0)
+
+
+def test_car_beyond_the_end_of_the_own_lane_is_beside() -> None:
+    """Lane -2 ends at 60 m."""
+    lanes = lanes_xml(1, 2) + lanes_xml(1, 1, s=60)
+    roads = RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes)))
+    assert relation(roads, ("1", -2, 20.0), ("1", -1, 120.0)).left == pytest.approx(3.5)
+    assert relation(roads, ("1", -1, 20.0), ("1", -1, 120.0)).leads
+
+
+@pytest.mark.parametrize(("lane", "radius"), [(-2, 25.25), (-1, 21.75), (1, 18.25), (2, 14.75)])
+def test_gap_in_a_bend_is_measured_along_the_lane(lane: int, radius: float) -> None:
+    """A third of a circle on the first of two half circles of 20 m, and over their joint."""
+    sides = [
+        "".join(lane_xml(n, link=f'<predecessor id="{n}"/><successor id="{n}"/>') for n in numbers)
+        for numbers in ((2, 1), (-1, -2))
+    ]
+    roads = RoadNetwork.parse(ring_xml(20.0, section_xml(*sides)))
+    way = roads.driving_direction("a", lane)
+    for first, second in (((1, 5.0), (1, 5.0 + 20.0 * math.pi / 3.0)), ((1, 50.0), (2, 50.0 + 20.0 * math.pi / 3.0))):
+        places = []
+        for _, s in (first, second)[::way]:
+            half = 20.0 * math.pi
+            places.append(("a", lane, s) if s < half else ("b", lane, s - half))
+        found = relation(roads, *places)
+        assert found.ahead == pytest.approx(radius * math.pi / 3.0, rel=2e-3)
+        assert found.leads

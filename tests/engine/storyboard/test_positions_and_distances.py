@@ -280,3 +280,55 @@ def test_closing_speed_in_bend_follows_the_measured_distance(
         offset=points,
     )
     assert closing_speed(made, "A", "B", frame=frame, kind=kind) == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize("frame", ["road", "lane"])
+def test_cars_in_one_lane_of_a_bend_have_no_lateral_closing_speed(context: Any, bend: Any, frame: str) -> None:
+    """Both drive along the lane. Straight on, they would leave it to the outside."""
+    for offset, s in ((0.0, 20.0), (0.0, 33.3), (0.4, 50.0), (-1.0, 11.0)):
+        made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
+        places = [bend.location("1", -1, 30.0), bend.location("1", -1, s, offset)]
+        poses = [bend.pose(place) for place in places]
+        for name, pose, place in zip("AB", poses, places, strict=True):
+            made.add_actor(name, ResolvedPosition(pose, place))
+        zeros, points = np.zeros(2), np.zeros((2, 3))
+        velocity = np.array(
+            [(speed * math.cos(p.h), speed * math.sin(p.h), 0.0) for p, speed in zip(poses, (20.0, 8.0), strict=True)]
+        )
+        made.view = WorldView(
+            0.0, 0, ("A", "B"), ("car", "car"), points, zeros, zeros, zeros, velocity, points, zeros,
+            np.array([20.0, 8.0]), points, points,
+        )  # fmt: skip
+        assert closing_speed(made, "A", "B", frame=frame, kind="lateral") == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.element("RelativeRoadPosition", "RelativeLanePosition")
+@pytest.mark.parametrize("lane", [-1, -2, 1])
+@pytest.mark.parametrize("ahead", [True, False])
+def test_relative_position_on_the_next_road_is_measured_along_its_reference_line(
+    context: Any, lane: int, ahead: bool
+) -> None:
+    """A straight road continues with a bend of 30 m radius: 40 m of road are 42.7 to 50.7 m of lane."""
+    links = lane_links_xml(before=lane, after=lane)
+    lanes = section_xml(
+        *(
+            (lane_xml(1, 4.0, link=links), "")
+            if lane > 0
+            else ("", "".join(lane_xml(n, 4.0, link=lane_links_xml(n, n)) for n in (-1, -2)))
+        )
+    )
+    first = road_xml("1", length=100.0, link=successor_xml("2"), lanes=lanes)
+    second = road_xml("2", length=80.0, x=100.0, curvature=1.0 / 30.0, link=predecessor_xml("1"), lanes=lanes)
+    roads = RoadNetwork.parse(map_xml(first, second))
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
+    here = roads.location("1", lane, 90.0) if ahead else roads.location("2", lane, 40.0)
+    made.add_actor("A", ResolvedPosition(roads.pose(here), here))
+    ds, expected = (50.0, ("2", 40.0)) if ahead else (-50.0, ("1", 90.0))
+    for position in (
+        model.Position(relative_road_position=model.RelativeRoadPosition(entity_ref="A", ds=ds, dt=0)),
+        model.Position(relative_lane_position=model.RelativeLanePosition(entity_ref="A", d_lane=0, ds=ds)),
+    ):
+        found = resolve_position(position, made).location
+        assert found is not None
+        assert (found.road, found.lane) == (expected[0], lane)
+        assert found.s == pytest.approx(expected[1], abs=1e-6)
