@@ -137,7 +137,7 @@ def test_car_in_the_same_lane_after_a_lane_offset_leads(own: int, lead: float) -
     assert found.left == pytest.approx(0.0, abs=1e-9)
 
 
-def test_car_straight_ahead_in_another_lane_after_a_lane_offset_does_not_lead() -> None:
+def test_car_straight_ahead_after_a_lane_offset_does_not_lead() -> None:
     """After the shift, lane -2 is where lane -1 was."""
     found = relation(shifted_road(), ("1", -1, 20.0), ("1", -2, 120.0))
     assert not found.leads

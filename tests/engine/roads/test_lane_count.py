@@ -40,7 +40,7 @@ def test_lanes_are_counted_from_the_lane_that_continues(
     assert roads.lanes_between(roads.location(*a), roads.location(*b)) == lanes
 
 
-def test_lanes_of_a_road_in_the_other_direction_are_counted_in_the_direction_of_the_first() -> None:
+def test_lanes_of_opposite_roads_are_counted_from_the_first_road() -> None:
     """Head to head: lane -1 of the first road continues as lane 1 of the second one, whose s runs backward."""
     first = road_xml(
         "1",
