@@ -244,14 +244,16 @@ class RoadNetwork(RoadAttributes):
         choose: BranchSelector | None = None,
         visit: int = 0,
         to_end: bool = False,
+        by_reference_line: bool = False,
     ) -> LaneLocation | None:
         """Return the location `distance` [m] further along the lane in its driving direction (backwards if negative).
 
         The path passes links and junctions. At a fork the branch is selected by the route, else by `choose(branches)`,
         else it is that of the default route. If the lane ends, the result is None, or its end with `to_end`. `visit`
-        is the visit of the route (`Route.visit`), which may pass a road several times.
+        is the visit of the route (`Route.visit`), which may pass a road several times. The distance is measured along
+        the lane, or along the reference lines.
         """
-        return self.movement.advance(location, distance, route, choose, visit, to_end)
+        return self.movement.advance(location, distance, route, choose, visit, to_end, by_reference_line)
 
     def route(
         self,

@@ -38,9 +38,13 @@ class RoadDistances:
     def placed(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float, int] | None:
         """Return `between`, and +1 if s of both roads increases in the same direction along the chain, else -1."""
         direction = driving_direction(self._roads[a.road], a.lane)
+        options: list[tuple[float, float, int, float, int]] = []
         if a.road == b.road:
-            return (b.s - a.s) * direction, (b.t - a.t) * direction, 1
-        options = []
+            ahead, left_of_a = (b.s - a.s) * direction, (b.t - a.t) * direction
+            if 2.0 * abs(ahead) <= self._roads[a.road].length:  # The way around a closed track is not shorter.
+                return ahead, left_of_a, 1
+            sense = 1 if ahead > 0.0 else -1
+            options.append((abs(ahead) * self._per_meter(a.road, by), abs(ahead), sense, left_of_a, 1))
         for sense in (1, -1):
             way = self._from(a.road, direction * sense, by).get(b.road)
             if way is not None:

@@ -71,12 +71,13 @@ class Movement:
         choose: BranchSelector | None = None,
         visit: int = 0,
         to_end: bool = False,
+        by_reference_line: bool = False,
     ) -> LaneLocation | None:
         """Return the location `distance` [m] further in the driving direction (backwards if negative), or None.
 
-        The distance is measured on the path at the offset of the location. Where the lane forks, the branch is selected
-        by the route, else by `choose`, else it is that of the default route. If the lane ends, the result is None, or
-        the end of the lane with `to_end`.
+        The distance is measured on the path at the offset of the location, or along the reference lines. Where the lane
+        forks, the branch is selected by the route, else by `choose`, else it is that of the default route. If the lane
+        ends, the result is None, or the end of the lane with `to_end`.
         """
         road = self._roads[location.road]
         section, lane = lane_at(road, location.lane, location.s)
@@ -88,7 +89,10 @@ class Movement:
         if not with_traffic or direction < 0:
             section, lane = _section_behind(road, section, lane, s, direction)
         while True:
-            s, remaining = _along(road, section, lane, s, offset, direction, remaining)
+            if by_reference_line:
+                s, remaining = _along_reference_line(road, section, s, direction, remaining)
+            else:
+                s, remaining = _along(road, section, lane, s, offset, direction, remaining)
             inside = section.index == len(road.sections) - 1 if direction > 0 else True
             if remaining <= 0.0 and (inside or s < section.end):
                 break
@@ -206,6 +210,23 @@ def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, dire
     return section, lane
 
 
+def _along_reference_line(
+    road: Road, section: LaneSection, s: float, direction: int, remaining: float
+) -> tuple[float, float]:
+    """Return s after `remaining` [m] of the reference line or at the end of the section, and the rest of the length."""
+    room = abs(_end_of(road, section, direction) - s)
+    if remaining < room:
+        return s + direction * remaining, 0.0
+    return _end_of(road, section, direction), max(remaining - room, 0.0)
+
+
+def _end_of(road: Road, section: LaneSection, direction: int) -> float:
+    """Return s at the end of a section in a direction."""
+    if section.index == len(road.sections) - 1 and direction > 0:
+        return road.length
+    return section.end if direction > 0 else section.s
+
+
 def _along(
     road: Road, section: LaneSection, lane: Lane, s: float, offset: float, direction: int, remaining: float
 ) -> tuple[float, float]:
@@ -213,9 +234,7 @@ def _along(
 
     The result is exact on a line or arc at constant t, else by the midpoint rule.
     """
-    end = section.end if direction > 0 else section.s
-    if section.index == len(road.sections) - 1 and direction > 0:
-        end = road.length
+    end = _end_of(road, section, direction)
     steady = road.lane_offset.is_constant and (lane.id == 0 or lane.center.is_constant)
     while remaining > 0.0:
         room = (end - s) * direction

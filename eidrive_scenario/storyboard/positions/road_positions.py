@@ -11,10 +11,6 @@ from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.orientations import oriented
 from eidrive_scenario.storyboard.positions.position_errors import position_error, road_origin, roads_of
-from eidrive_scenario.tolerances import EPSILON
-
-MOST_CORRECTIONS = 60
-"""Maximum number of corrections of a distance along a lane to one along the reference line."""
 
 
 def road_position(frame: model.RoadPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
@@ -89,17 +85,9 @@ def along_reference(
     edge = here._replace(s=road.length if s > road.length else 0.0)
     if here.lane not in roads.lane_ids(here.road, edge.s):
         edge = roads.road_location(here.road, edge.s, here.t)
-    way = roads.driving_direction(here.road, here.lane)
-    there = roads.advance(edge, rest * way, route=route)
-    # The lane beyond is longer or shorter than the reference line.
-    step = rest
-    for _ in range(MOST_CORRECTIONS):
-        apart = None if there is None else roads.distance(edge, there, route=route)
-        if apart is None or abs(rest * way - apart[0]) < EPSILON * EPSILON:
-            break
-        step += rest - apart[0] * way
-        there = roads.advance(edge, step * way, route=route)
-    return there
+    return roads.advance(
+        edge, rest * roads.driving_direction(here.road, here.lane), route=route, by_reference_line=True
+    )
 
 
 def count_lanes(lane: int, steps: int) -> int:

@@ -8,7 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
+from opendrive_xml import (
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    ring_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
@@ -332,3 +341,64 @@ def test_relative_position_on_the_next_road_is_measured_along_its_reference_line
         assert found is not None
         assert (found.road, found.lane) == (expected[0], lane)
         assert found.s == pytest.approx(expected[1], abs=1e-6)
+
+
+@pytest.fixture(scope="module")
+def ring() -> RoadNetwork:
+    """Closed track of two roads, half circles with a radius of 50 m, counter-clockwise."""
+    lanes = section_xml(lane_xml(1, 4.0, link=lane_links_xml(1, 1)), lane_xml(-1, 4.0, link=lane_links_xml(-1, -1)))
+    return RoadNetwork.parse(ring_xml(50.0, lanes))
+
+
+HALF = 50.0 * math.pi
+"""Length of each road of the ring [m]."""
+
+
+@pytest.mark.parametrize("ds", [20.0, 150.0, 170.0, 220.0, 300.0, 400.0, -20.0, -170.0, -250.0])
+@pytest.mark.parametrize("lane", [-1, 1])
+def test_relative_road_position_on_a_closed_track_is_the_driven_distance(
+    context: Any, ring: RoadNetwork, ds: float, lane: int
+) -> None:
+    made = RuntimeContext(context.scenario, ring, dt=0.1, seed=0, empty_view=context.view)
+    here = ring.location("a", lane, HALF - 30.0)
+    made.add_actor("A", ResolvedPosition(ring.pose(here), here))
+    frame = model.RelativeRoadPosition(entity_ref="A", ds=ds, dt=0)
+    found = resolve_position(model.Position(relative_road_position=frame), made).location
+    assert found is not None
+    road, s = divmod((HALF - 30.0 + ds) % (2.0 * HALF), HALF)
+    assert (found.road, found.lane) == ("ab"[int(road)], lane)
+    assert found.s == pytest.approx(s)
+
+
+@pytest.mark.parametrize("one_road", [False, True])
+@pytest.mark.parametrize("lane", [-1, 1])
+def test_distance_on_a_closed_track_is_the_shorter_way(one_road: bool, lane: int) -> None:
+    """A road of 300 m and one of 14 m, or one road linked with itself, on a circle with a radius of 50 m."""
+    around = 100.0 * math.pi
+    lanes = section_xml(lane_xml(1, 4.0, link=lane_links_xml(1, 1)), lane_xml(-1, 4.0, link=lane_links_xml(-1, -1)))
+
+    def part(number: str, other: str, begin: float, length: float) -> str:
+        angle = begin / 50.0
+        return road_xml(
+            number,
+            x=50.0 * math.cos(angle),
+            y=50.0 * math.sin(angle),
+            hdg=angle + math.pi / 2.0,
+            length=length,
+            curvature=0.02,
+            link=predecessor_xml(other) + successor_xml(other),
+            lanes=lanes,
+        )
+
+    parts = (
+        [part("1", "1", 0.0, around)]
+        if one_road
+        else [part("1", "2", 0.0, 300.0), part("2", "1", 300.0, around - 300.0)]
+    )
+    roads = RoadNetwork.parse(map_xml(*parts))
+    way = -lane
+    for a, b in ((290.0, 10.0), (10.0, 290.0), (20.0, 120.0), (120.0, 20.0), (5.0, 299.0)):
+        found = roads.distance(roads.location("1", lane, a), roads.location("1", lane, b))
+        ahead = (b - a + around / 2.0) % around - around / 2.0
+        assert found == pytest.approx((ahead * way, 0.0))
+        assert roads.orientation(roads.location("1", lane, a), roads.location("1", lane, b)) == 1
