@@ -276,16 +276,16 @@ class RoadNetwork(RoadAttributes):
         return parts[0] if len(parts) == 1 else concatenate_routes(parts)
 
     def distance(
-        self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", route: Route | None = None
+        self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", route: Route | None = None, sense: int = 0
     ) -> tuple[float, float] | None:
         """Return the distances from a to b ahead and to the left [m] in road coordinates, or None.
 
         They refer to the driving direction of the lane of a, and are negative for behind and right. They are measured
-        along connected roads, or along `route`. The result is None if the roads are not connected or the route misses a
-        location.
+        along connected roads, with `sense` 1 ahead only and -1 behind only, or along `route`. The result is None if the
+        roads are not connected or the route misses a location.
         """
         if route is None:
-            return self._distances.between(a, b, by)
+            return self._distances.between(a, b, by, sense)
         return route.distance(a, b)
 
     def orientation(self, a: LaneLocation, b: LaneLocation) -> int | None:

@@ -6,6 +6,7 @@ Road 1 runs from x = 0 to 200, road 2 from x = 400 back to 200. Lanes -1 and -2 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_xml, successor_xml
@@ -97,3 +98,17 @@ def test_clearance_against_the_lane_counts_lanes_of_the_own_direction(
             init=init,
         )
         assert played.begun("event 0") == wanted
+
+
+@pytest.mark.element("LaneOffsetAction")
+@pytest.mark.parametrize("continuous", ["true", "false"])
+def test_lane_offset_is_kept_on_a_road_with_opposite_direction(run: Run, continuous: str) -> None:
+    """t of road 1 points to the left of the vehicle, t of road 2 to its right."""
+    offset = f"""<PrivateAction><LateralAction><LaneOffsetAction continuous="{continuous}">
+      <LaneOffsetActionDynamics dynamicsShape="cubic" maxLateralAcc="1"/><LaneOffsetTarget>
+      <AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
+    init = put("Ego", 1, -1, 100.0) + set_speed("Ego", 20.0)
+    played = run(8, ("Ego", offset), driven=False, street=head_to_head(), init=init)
+    y = [float(frame.view.position[0, 1]) for frame in played.frames]
+    assert y[-1] == pytest.approx(-1.0, abs=1e-6)
+    assert max(abs(two - one) for one, two in pairwise(y)) < 0.1

@@ -141,3 +141,22 @@ def test_trailer_on_a_slope_stands_on_the_road(run: Run, elevation: str, height:
             climb = (height(x + 1e-4) - height(x - 1e-4)) / 2e-4
             assert frame.view.pitch[row] == pytest.approx(-math.atan(climb), abs=1e-4)
     assert played.x("Trailer")[-1] > 240.0
+
+
+DELETE = """<GlobalAction><EntityAction entityRef="{}"><DeleteEntityAction/></EntityAction></GlobalAction>"""
+
+
+def test_deleted_trailer_leaves_its_vehicle(run: Run) -> None:
+    played = play(run, 4, ("Truck", COUPLE), ("Truck", DRIVE), ("Truck", DELETE.format("Trailer"), after(2.0)))
+    present = ["Trailer" in frame.view.names for frame in played.frames]
+    assert present == [True] * 42 + [False] * (len(present) - 42)
+    assert played.x("Truck")[-1] == pytest.approx(240.0, abs=0.6)
+
+
+def test_trailer_of_a_deleted_vehicle_stops_at_its_position(run: Run) -> None:
+    again = f"<GlobalAction>{PLACE.format('Truck', 400)}</GlobalAction>"
+    steps = ("Truck", COUPLE), ("Truck", DRIVE), ("Ego", DELETE.format("Truck"), after(2.0)), ("Ego", again, after(3.0))
+    played = play(run, 4, *steps)
+    trailer = played.x("Trailer")
+    assert trailer[-1] == trailer[43] == pytest.approx(216.0, abs=0.6)
+    assert played.of("Trailer", "speed")[-1] == 0.0

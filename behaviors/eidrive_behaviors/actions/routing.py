@@ -54,6 +54,8 @@ class AssignRouteAction(ActionBehaviour):
             if here is None:
                 raise
             path = build_route(route, roads, place, seed=seed, again=True)
+            message = f"no way leads from {self.actor.name!r} to route {route.name!r}"
+            self.context.warn(*self.error(message, "start the action on the way to its first waypoint").diagnostics)
         assign_route(self, path)
         return Status.SUCCESS
 
@@ -65,7 +67,7 @@ class AssignRouteAction(ActionBehaviour):
 
 
 class AcquirePositionAction(ActionBehaviour):
-    """Shortest route to a position over the lanes; a straight line without roads."""
+    """Shortest route to a position over the lanes; for a vehicle with a driver off the road a straight line."""
 
     immediate = True
     action: model.AcquirePositionAction
@@ -85,6 +87,11 @@ class AcquirePositionAction(ActionBehaviour):
             check_way(self, math.hypot(place.pose.x - start.x, place.pose.y - start.y))
             goal = self.actor.goal
             self.actor.set_goal(replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]])))
+        elif self.context.roads is not None and place.location is None:
+            raise self.error("the position is not on a road", "move it onto a lane")
+        else:
+            message = f"{self.actor.name!r} is not on a road: it does not turn to the position"
+            self.context.warn(*self.error(message, "place the entity on a lane").diagnostics)
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -16,12 +16,15 @@ from eidrive_scenario.api.actions import (
     ResolvedPosition,
     TrajectoryCurve,
     TrajectoryProgress,
+    facing,
     model,
     resolve_position,
     trajectory_of,
 )
 from eidrive_scenario.api.common import EPSILON
 
+JUST_PASSED = 10.0
+"""Distance behind the actor up to which it has passed its target [m]; it drives around to a target farther behind."""
 ON_LINE = 0.1
 """Maximum speed difference to the linear last phase at which the first phase ends [m/s]."""
 HARD = 8.0
@@ -168,9 +171,10 @@ class SynchronizeAction(ActionBehaviour):
         return speed + acceleration * dt
 
     def _distance(self, name: str, position: model.Position, sense: float) -> float:
-        """Return the distance of an entity to its target [m]; negative if the target is behind it on its trajectory.
+        """Return the distance of an entity to its target in its direction of motion [m]; negative after the target.
 
-        `sense` is -1 for an entity that drives backwards.
+        It is measured along its trajectory, its route, or the shortest way over the roads ahead. `sense` is -1 for an
+        entity that drives backwards.
         """
         actor = self.context.actors[name]
         if actor.progress is not None:
@@ -182,8 +186,16 @@ class SynchronizeAction(ActionBehaviour):
         start = self.context.location(name)
         if roads is None or start is None or place.location is None:
             return straight
+        sense *= facing(self.context, name, start)
+        route = actor.motion.route
+        on_route = None if route is None else roads.distance(start, place.location, route=route)
+        if on_route is not None:
+            return on_route[0] * sense
         found = roads.distance(start, place.location)
-        return straight if found is None else abs(found[0])
+        if found is None or found[0] * sense >= 0.0:
+            return straight if found is None else abs(found[0])
+        behind, ahead = abs(found[0]), roads.distance(start, place.location, sense=1 if sense > 0.0 else -1)
+        return behind if behind < JUST_PASSED or ahead is None else abs(ahead[0])
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
         """Return the distance along the trajectory of the entity, in its direction of motion [m]."""

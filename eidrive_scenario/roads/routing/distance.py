@@ -26,26 +26,34 @@ class RoadDistances:
         self._speed = speed
         self._found: dict[tuple[str, int, Chain], dict[str, tuple[float, float, int]]] = {}
 
-    def between(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float] | None:
+    def between(
+        self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", only: int = 0
+    ) -> tuple[float, float] | None:
         """Return the distances from a to b ahead and to the left in the driving direction of the lane of a [m].
 
         They are measured along the reference lines of the chain of roads that `by` selects. Behind and right are
         negative. The result is None if no chain of roads connects the locations.
+
+        only  1 for ways ahead only, -1 for ways behind
         """
-        found = self.placed(a, b, by)
+        found = self.placed(a, b, by, only)
         return None if found is None else found[:2]
 
-    def placed(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float, int] | None:
+    def placed(
+        self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", only: int = 0
+    ) -> tuple[float, float, int] | None:
         """Return `between`, and +1 if s of both roads increases in the same direction along the chain, else -1."""
         direction = driving_direction(self._roads[a.road], a.lane)
         options: list[tuple[float, float, int, float, int]] = []
         if a.road == b.road:
             ahead, left_of_a = (b.s - a.s) * direction, (b.t - a.t) * direction
-            if 2.0 * abs(ahead) <= self._roads[a.road].length:  # The way around a closed track is not shorter.
-                return ahead, left_of_a, 1
             sense = 1 if ahead > 0.0 else -1
-            options.append((abs(ahead) * self._per_meter(a.road, by), abs(ahead), sense, left_of_a, 1))
-        for sense in (1, -1):
+            is_shortest = 2.0 * abs(ahead) <= self._roads[a.road].length  # as the way around a closed track is longer
+            if is_shortest and only in (0, sense):
+                return ahead, left_of_a, 1
+            if only in (0, sense):
+                options.append((abs(ahead) * self._per_meter(a.road, by), abs(ahead), sense, left_of_a, 1))
+        for sense in (only,) if only else (1, -1):
             way = self._from(a.road, direction * sense, by).get(b.road)
             if way is not None:
                 cost, gap, entered = way

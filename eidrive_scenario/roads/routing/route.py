@@ -91,6 +91,11 @@ class Route:
         return tuple(legs)
 
     @property
+    def reference_length(self) -> float:
+        """Length from start to end along the reference lines of the roads [m]."""
+        return sum(abs(leg.s_end - leg.s) for leg in self.legs)
+
+    @property
     def length(self) -> float:
         """Length from start to end along the center lines of the lanes [m]."""
         return float(self._path[1][-1])
@@ -117,7 +122,20 @@ class Route:
         before = index if owner[index] == owner[index + 1] else index + 1
         span = along[index + 1] - along[before]
         part = (distance - along[before]) / span if span > 0.0 else 0.0
-        s = float(places[before] + (places[index + 1] - places[before]) * min(max(part, 0.0), 1.0))
+        return self._location(
+            leg, float(places[before] + (places[index + 1] - places[before]) * min(max(part, 0.0), 1.0))
+        )
+
+    def location_by_reference_line(self, distance: float) -> LaneLocation:
+        """Return the location on the center line at a distance along the reference lines of the route."""
+        for leg in self.legs:
+            span = abs(leg.s_end - leg.s)
+            if distance <= span:
+                return self._location(leg, leg.s + max(distance, 0.0) * leg.direction)
+            distance -= span
+        return self._location(self.legs[-1], self.legs[-1].s_end)
+
+    def _location(self, leg: Leg, s: float) -> LaneLocation:
         road = self.roads[leg.road]
         section = road.sections[leg.section]
         t = self._t(leg, s)
@@ -157,7 +175,7 @@ class Route:
         sense = pass_a[1] * driving_direction(self.roads[a.road], a.lane)
         along = pass_b[0] - pass_a[0]
         if self.closed:
-            total = sum(abs(leg.s_end - leg.s) for leg in self.legs)
+            total = self.reference_length
             along = (along + 0.5 * total) % total - 0.5 * total
         return along * sense, (b.t * pass_b[1] - a.t * pass_a[1]) * sense
 

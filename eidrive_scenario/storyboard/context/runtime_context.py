@@ -13,6 +13,7 @@ from eidrive_scenario.storyboard.context.preemption import DomainHolder, Pending
 from eidrive_scenario.storyboard.context.protocols import E, EntityAbsentError, PositionCache
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.trailers import disconnect
 from eidrive_scenario.storyboard.state.background import BackgroundTrafficPort
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.state.domains import Domain
@@ -181,8 +182,9 @@ class RuntimeContext:
             self.commands.spawns[name] = actor.motion.placement()
 
     def remove_actor(self, name: str) -> None:
-        """Remove an actor from the world and end the actions that control it."""
+        """Remove an actor from the world, disconnected from trailers, and end the actions that control it."""
         actor = self.actors[name]
+        disconnect(self.actors, name)
         if actor.present:
             actor.present = False
             if self.commands.spawns.pop(name, None) is None:

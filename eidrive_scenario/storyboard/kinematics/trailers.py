@@ -116,3 +116,15 @@ def _coupler(actor: Actor) -> float:
     return (
         entity.trailer_coupler.dx if isinstance(entity, model.Vehicle) and entity.trailer_coupler is not None else 0.0
     )
+
+
+def disconnect(actors: Mapping[str, Actor], name: str) -> None:
+    """Disconnect an actor that leaves from its towing vehicle and from its trailer, which stops at its position."""
+    for actor in actors.values():
+        if actor.trailer == name:
+            actor.set_trailer(None)
+    trailer = actors.get(actors[name].trailer or "")
+    actors[name].set_trailer(None)
+    if trailer is not None and trailer.present:
+        trailer.motion.set_speed(0.0)
+        trailer.motion.snap_to_lane()

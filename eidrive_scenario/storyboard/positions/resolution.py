@@ -95,10 +95,10 @@ def _route(frame: model.RoutePosition, context: ConditionContext, actor: str | N
         return in_lane(roads, here.road, here.lane, here.s, here.offset, frame.orientation)
     if not isinstance(within, model.PositionInRoadCoordinates | model.PositionInLaneCoordinates):
         raise position_error(frame, f"unsupported coordinates {type(within).__name__}")
-    here = path.location_at(within.path_s)
-    if not -1e-3 <= within.path_s <= path.length + 1e-3:
+    here, length = path.location_by_reference_line(within.path_s), path.reference_length
+    if not -1e-3 <= within.path_s <= length + 1e-3:
         raise position_error(
-            frame, "pathS is outside of the route", f"got {within.path_s:g} m; expected 0 to {path.length:.1f} m"
+            frame, "pathS is outside of the route", f"got {within.path_s:g} m; expected 0 to {length:.1f} m"
         )
     if isinstance(within, model.PositionInRoadCoordinates):
         return in_road(roads, here.road, here.s, within.t, frame.orientation, here.lane)

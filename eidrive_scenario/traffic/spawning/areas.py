@@ -77,6 +77,8 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
         chain = _chain(ends, one.road, two.road)
         leaving, *between, entering = chain
         forward = leaving.side > 0
+        if one.s is None and number == 0 and not forward:
+            here = first
         parts.append((Stretch(one.road, here if forward else 0.0, first if forward else here, one.lanes), forward))
         for entry in between[::2]:
             whole = roads.road(entry.road).length

@@ -402,3 +402,29 @@ def test_distance_on_a_closed_track_is_the_shorter_way(one_road: bool, lane: int
         ahead = (b - a + around / 2.0) % around - around / 2.0
         assert found == pytest.approx((ahead * way, 0.0))
         assert roads.orientation(roads.location("1", lane, a), roads.location("1", lane, b)) == 1
+
+
+@pytest.mark.element("RoutePosition")
+@pytest.mark.parametrize("lane", [-1, -2])
+def test_route_position_is_measured_along_the_reference_line(context: Any, bend: Any, lane: int) -> None:
+    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
+    route = model.Route(closed=False, name="way", waypoint=(waypoint(lane, 5.0), waypoint(lane, 75.0)))
+    for within in (
+        {"from_lane_coordinates": model.PositionInLaneCoordinates(lane_id=str(lane), path_s=69.5)},
+        {"from_road_coordinates": model.PositionInRoadCoordinates(path_s=69.5, t=-2)},
+    ):
+        frame = model.RoutePosition(
+            route_ref=model.RouteRef(route=route), in_route_position=model.InRoutePosition(**within)
+        )
+        found = resolve_position(model.Position(route_position=frame), made).location
+        assert found is not None
+        assert found.s == pytest.approx(74.5)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_distance_in_one_sense_leads_around_a_closed_track(ring: RoadNetwork, sense: int) -> None:
+    for lane in (-1, 1):
+        a, b = ring.location("a", lane, 20.0), ring.location("a", lane, 50.0)
+        ahead = 30.0 * -lane
+        expected = ahead if ahead * sense > 0.0 else ahead - math.copysign(2.0 * HALF, ahead)
+        assert ring.distance(a, b, sense=sense) == pytest.approx((expected, 0.0))

@@ -54,6 +54,20 @@ def test_cursor_without_s_is_start_or_end_of_its_road() -> None:
     assert road_range(street(), [Cursor("1"), Cursor("1")]) == [Stretch("1", 0.0, 1000.0)]
 
 
+def test_cursor_without_s_is_the_end_of_a_road_that_is_left_at_its_start() -> None:
+    """Roads 1 and 2 begin at the same point."""
+    lanes = section_xml(*[lane_xml(number, link=lane_links_xml(before=-number)) for number in (1, -1)])
+    roads = RoadNetwork.parse(
+        map_xml(
+            road_xml("1", link=predecessor_xml("2", "start"), lanes=lanes),
+            road_xml("2", hdg=math.pi, link=predecessor_xml("1", "start"), lanes=lanes),
+        )
+    )
+    whole = [Stretch("1", 0.0, 100.0), Stretch("2", 0.0, 100.0)]
+    assert road_range(roads, [Cursor("1"), Cursor("2")]) == whole
+    assert road_range(roads, [Cursor("2"), Cursor("1")]) == whole[::-1]
+
+
 def test_lanes_of_cursor_are_valid_up_to_the_next_cursor() -> None:
     cursors = [Cursor("1", 100.0, (-1,)), Cursor("1", 200.0, (-2,)), Cursor("1", 300.0)]
     assert road_range(street(), cursors) == [Stretch("1", 100.0, 200.0, (-1,)), Stretch("1", 200.0, 300.0, (-2,))]
