@@ -54,7 +54,7 @@ def test_cursor_without_s_is_start_or_end_of_its_road() -> None:
     assert road_range(street(), [Cursor("1"), Cursor("1")]) == [Stretch("1", 0.0, 1000.0)]
 
 
-def test_cursor_without_s_of_a_road_left_at_its_start_is_its_end() -> None:
+def test_cursor_without_s_may_be_the_end_of_its_road() -> None:
     """Roads 1 and 2 begin at the same point."""
     lanes = section_xml(*[lane_xml(number, link=lane_links_xml(before=-number)) for number in (1, -1)])
     roads = RoadNetwork.parse(
