@@ -1,4 +1,4 @@
-"""Intersection of rays and upright boxes, and rays that start behind a box."""
+"""Intersection of rays and boxes, and rays that start behind the body of their sensor."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.world.view import WorldView
 
 Point = tuple[float, float, float]
 
@@ -41,12 +43,46 @@ def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array
     return enter, leave
 
 
+def set_upright(points: Array, view: WorldView, rows: Integers) -> Array:
+    """Return points (P, K, 3) turned like the bodies (P,) that are set upright at their reference points."""
+    return _turned(points, view, rows, upright=True)
+
+
+def tilted(points: Array, view: WorldView, rows: Integers) -> Array:
+    """Return points (P, K, 3) of upright bodies (P,) after the pitch and roll of the bodies."""
+    return _turned(points, view, rows, upright=False)
+
+
+def _turned(points: Array, view: WorldView, rows: Integers, *, upright: bool) -> Array:
+    if view.is_upright:
+        return points
+    yaw, pitch, roll = view.yaw[rows], view.pitch[rows], view.roll[rows]
+    tilt = rotation_matrix(yaw, pitch, roll) @ rotation_matrix(yaw).transpose(0, 2, 1)
+    turn = tilt.transpose(0, 2, 1) if upright else tilt
+    pivots = view.position[rows][:, None]
+    moved: Array = pivots + np.einsum("pij,pkj->pki", turn, points - pivots)
+    return moved
+
+
+def starts_behind_bodies(origins: Array, targets: Array, view: WorldView, rows: Integers) -> Array:
+    """Return starts (P, K, 3) of rays (P, K, 3) behind the bodies (P,) of their sensors, as `ray_starts`."""
+    if view.is_upright:
+        return ray_starts(origins, targets, view.boxes[rows])
+    ends = set_upright(origins, view, rows), set_upright(targets, view, rows)
+    return np.asarray(origins + _shares_behind(*ends, view.boxes[rows])[..., None] * (targets - origins))
+
+
 def ray_starts(origins: Array, targets: Array, boxes: Array) -> Array:
-    """Return starts (P, K, 3) of rays (P, K, 3) behind boxes (P, 7); unchanged if a ray does not intersect its box."""
+    """Return starts (P, K, 3) of rays (P, K, 3) behind upright boxes (P, 7); unchanged if a ray does not intersect its
+    box."""
+    return np.asarray(origins + _shares_behind(origins, targets, boxes)[..., None] * (targets - origins))
+
+
+def _shares_behind(origins: Array, targets: Array, boxes: Array) -> Array:
+    """Return the shares (P, K) of the rays at which they start."""
     enter, leave = crossing(origins, targets, boxes)
     crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
-    share = np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
-    return np.asarray(origins + share[..., None] * (targets - origins))
+    return np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
 
 
 def few_ray_starts(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:

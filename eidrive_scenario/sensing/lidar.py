@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.crossing import crossing, ray_starts
+from eidrive_scenario.sensing.crossing import crossing, set_upright, starts_behind_bodies
 from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
@@ -57,7 +57,7 @@ class Lidar(Sensor):
         rays = directions @ pose[:3, :3].T
         origin = np.broadcast_to(pose[:3, 3], directions.shape)
         targets = origin + settings.range * rays
-        clear, starts, near = self._beyond_own_body(origin, targets, view.boxes[row])
+        clear, starts, near = self._beyond_own_body(origin, targets, view, row)
         sensor_name = {"sensor": self.name} if view.unseen_by else {}
         hits = scene.scan(row, pose[:3, 3], starts, targets[clear], near, **sensor_name)
         rows = np.asarray(hits.rows)
@@ -85,14 +85,18 @@ class Lidar(Sensor):
             directions[selected] * length[:, None], back.intensity[kept], pose, ring[selected], azimuth[selected]
         )
 
-    def _beyond_own_body(self, origin: Array, targets: Array, own: Array) -> tuple[Integers, Array, NDArray[np.bool_]]:
+    def _beyond_own_body(
+        self, origin: Array, targets: Array, view: WorldView, row: int
+    ) -> tuple[Integers, Array, NDArray[np.bool_]]:
         """Return the rows (K,) of rays that do not hit the ego body, their starts, and whether they pass near it."""
         if self._on_mast:
-            starts = ray_starts(origin[None], targets[None], own[None])[0]
+            starts = starts_behind_bodies(origin[None], targets[None], view, np.array([row]))[0]
             return np.arange(len(origin)), starts, np.zeros(len(origin), dtype=bool)
+        own, rows = view.boxes[row], np.array([row])
+        begin, end = set_upright(origin[None], view, rows)[0], set_upright(targets[None], view, rows)[0]
         around = own + np.array([0.0, 0.0, 0.0, *(2.0 * _NEAR,) * 3, 0.0])
-        near = np.flatnonzero(_meets(origin, targets, around))
-        hit = near[_meets(origin[near], targets[near], own)]
+        near = np.flatnonzero(_meets(begin, end, around))
+        hit = near[_meets(begin[near], end[near], own)]
         passes = np.zeros(len(origin), dtype=bool)
         passes[near] = True
         clear = np.delete(np.arange(len(origin)), hit)

@@ -32,8 +32,11 @@ class Mounting(msgspec.Struct, frozen=True):
     pitch: float = 0.0
 
     def position(self, view: WorldView, row: int) -> tuple[float, float, float]:
-        """Return the position in the world [m]; pitch and roll are neglected, as in the boxes of the view."""
-        x, y, z, yaw, *_ = view.states[row]
+        """Return the position in the world [m]."""
+        x, y, z, yaw, pitch, roll, *_ = view.states[row]
+        if pitch or roll:
+            along, aside, up = (rotation_matrix(yaw, pitch, roll) @ (self.x, self.y, self.z)).tolist()
+            return x + along, y + aside, z + up
         cos, sin = math.cos(yaw), math.sin(yaw)
         return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, z + self.z
 

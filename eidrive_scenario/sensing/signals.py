@@ -9,7 +9,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import RoadNetwork, Signal
-from eidrive_scenario.sensing.crossing import ray_starts
+from eidrive_scenario.sensing.crossing import starts_behind_bodies
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.scene import NOTHING, Scene
@@ -61,7 +61,7 @@ class SignalSensor:
             return ()
         faces = self._faces[near]
         # A light beside a truck is lower than its roof.
-        starts = ray_starts(np.broadcast_to(origin, (1, *faces.shape)), faces[None], view.boxes[row : row + 1])[0]
+        starts = starts_behind_bodies(np.broadcast_to(origin, (1, *faces.shape)), faces[None], view, np.array([row]))[0]
         hits = scene.raycast(starts, faces)
         visible = near[np.asarray(hits.rows) == NOTHING]
         return tuple(SignalReading(self._ids[index], states.get(self._ids[index], "")) for index in visible.tolist())

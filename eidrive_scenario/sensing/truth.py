@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import BOX_SAMPLES, points_of_boxes
-from eidrive_scenario.sensing.crossing import few_ray_starts, ray_starts
+from eidrive_scenario.sensing.crossing import few_ray_starts, starts_behind_bodies, tilted
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
 from eidrive_scenario.sensing.scene import NOTHING, Point, Scene
@@ -165,9 +165,9 @@ def visibilities(
     sensor_of = np.arange(len(sensors)).repeat([len(rows) for rows in targets])
     target_of = np.concatenate([np.asarray(rows, dtype=np.intp) for rows in targets])
     mounts = np.array([sensor.mounting.position(view, row) for sensor, row in zip(sensors, own, strict=True)])
-    points = points_of_boxes(boxes[target_of], SAMPLES)
+    points = tilted(points_of_boxes(boxes[target_of], SAMPLES), view, target_of)
     origins = mounts[sensor_of][:, None].repeat(len(SAMPLES), axis=1)
-    starts = ray_starts(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
+    starts = starts_behind_bodies(origins, points, view, np.asarray(own, dtype=np.intp)[sensor_of])
     begin, end = starts.reshape(-1, 3), points.reshape(-1, 3)
     if name or len(begin) > MANY_RAYS:
         rows = (scene.raycast(begin, end, sensor=name) if name else scene.raycast(begin, end)).rows
@@ -182,7 +182,9 @@ def visibilities(
 def few_visibilities(
     sensors: Sequence[TruthSensor], own: Sequence[int], targets: Sequence[Sequence[int]], scene: Scene, view: WorldView
 ) -> list[float]:
-    """Return the same as `visibilities` in scalar arithmetic."""
+    """Return the same as `visibilities`, in scalar arithmetic if all bodies are upright."""
+    if not view.is_upright:
+        return visibilities(sensors, own, targets, scene, view)
     boxes = view.plain_boxes
     starts: list[Point] = []
     points: list[Point] = []

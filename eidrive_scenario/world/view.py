@@ -138,6 +138,11 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
         return self.boxes[:, :3]
 
     @cached_property
+    def is_upright(self) -> bool:
+        """Whether pitch and roll of all actors are 0, so that their bodies are in their boxes."""
+        return not self.kinematics[:, 4:6].any()
+
+    @cached_property
     def plain_boxes(self) -> Sequence[Sequence[float]]:
         """Rows of `boxes` as scalars, for access to single actors, where arrays are slow."""
         if len(self.names) <= FEW:

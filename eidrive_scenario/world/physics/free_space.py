@@ -30,7 +30,6 @@ class FreeSpace:
     def __init__(self, scenery: Scenery) -> None:
         self._scenery = scenery
         self._circles: Array | None = None
-        self._upright: tuple[WorldView, bool] | None = None
         self._gaps: dict[tuple[str, str], tuple[float, float, float, float, float]] = {}
         """Ends of the line between two actors, and its distance from the nearest static object [m]."""
 
@@ -48,7 +47,7 @@ class FreeSpace:
         """
         boxes = view.plain_boxes
         body, other = boxes[own], boxes[target]
-        if origin[2] <= 0.0 or other[2] < other[5] / 2.0 or not (self._scenery.level and self._is_upright(view)):
+        if origin[2] <= 0.0 or other[2] < other[5] / 2.0 or not (self._scenery.level and view.is_upright):
             return False
         x, y = origin[0], origin[1]
         dx, dy = other[0] - x, other[1] - y
@@ -83,7 +82,7 @@ class FreeSpace:
 
         All are True if few rays are given, if roads are not in the plane, or if an actor is not upright.
         """
-        if len(targets) < FEW or apex[2] <= 0.0 or not (self._scenery.level and self._is_upright(view)):
+        if len(targets) < FEW or apex[2] <= 0.0 or not (self._scenery.level and view.is_upright):
             return np.ones(len(targets), dtype=bool)
         x, y, z, length, width, height, _ = np.delete(view.boxes, own, axis=0).T
         actors = np.stack([x, y, np.hypot(length, width) / 2.0, z + height / 2.0])
@@ -93,12 +92,6 @@ class FreeSpace:
         if self._circles is None:
             self._circles = self._scenery.circles()
         return self._circles
-
-    def _is_upright(self, view: WorldView) -> bool:
-        """Whether the pitch and roll of all actors are 0, so that their bodies are in their bounding boxes."""
-        if self._upright is None or self._upright[0] is not view:
-            self._upright = view, not view.kinematics[:, 4:6].any()
-        return self._upright[1]
 
     def _is_clear_of_scenery(
         self, pair: tuple[str, str], x: float, y: float, to_x: float, to_y: float, width: float
