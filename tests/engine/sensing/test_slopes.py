@@ -79,7 +79,8 @@ def test_rays_near_the_own_body_are_not_lost(roads: RoadNetwork) -> None:
             settings = LidarSettings(channels=32, points_per_second=32 * 360 * 20, range_noise=0.0, dropoff=0.0)
             cloud = Rig(BUS, {"lidar": settings}).read(world, world.view()).lidars["lidar"]
             near = np.linalg.norm(cloud.points, axis=1) < 80.0
-            backward = np.abs(np.abs(np.arctan2(cloud.points[:, 1], cloud.points[:, 0])) - math.pi) < 0.03  # within the width of the road
+            azimuth = np.arctan2(cloud.points[:, 1], cloud.points[:, 0])
+            backward = np.abs(np.abs(azimuth) - math.pi) < 0.03  # within the width of the road
             ranges.append(np.linalg.norm(cloud.points[near & backward], axis=1))
     assert len(ranges[0]) == len(ranges[1]) > 2
     assert np.sort(ranges[0]) == pytest.approx(np.sort(ranges[1]), abs=0.02)
