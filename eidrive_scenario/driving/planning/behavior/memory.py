@@ -88,8 +88,6 @@ class KnownObject(msgspec.Struct):
     """Speed over about the last second [m/s]."""
     z: float = 0.0
     """Height of the lower side of its box [m]."""
-    height: float = 0.0
-    """Height of its box [m]."""
 
     @property
     def speed(self) -> float:
@@ -224,7 +222,7 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         known = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
         known.mean_speed, known.ellipse = known.speed, ellipse if variance > 0.0 else (1.0, 0.0, 0.0)
         known.first_seen, known.mean_place = now, (x, y)
-        known.z, known.height = z - height / 2.0, height
+        known.z = z - height / 2.0
         found.append(known)
     return found
 
@@ -305,7 +303,7 @@ def _take_over(known: KnownObject, fresh: KnownObject, step: float, shares: _Sha
     known.row, known.kind, known.seen = fresh.row, fresh.kind, fresh.seen
     known.x, known.y, known.yaw = fresh.x, fresh.y, fresh.yaw
     known.length, known.width = fresh.length, fresh.width
-    known.z, known.height = fresh.z, fresh.height
+    known.z = fresh.z
     known.error, known.ellipse, known.existence = fresh.error, fresh.ellipse, fresh.existence
     x, y = known.mean_place
     known.mean_place = x + shares.place * (fresh.x - x), y + shares.place * (fresh.y - y)
