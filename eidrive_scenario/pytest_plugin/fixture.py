@@ -114,10 +114,10 @@ def _read_rate(marker: pytest.Mark) -> RatioTest | None:
         return None
     from eidrive_scenario.experiments.statistics.sequential import RatioTest, success_rate
 
-    if isinstance(given, RatioTest):
-        return given
     if marker.kwargs.get("seeds") is not None:
         raise ValueError("marker scenario: seeds and success_rate exclude each other")
+    if isinstance(given, RatioTest):
+        return given
     if not isinstance(given, float):
         raise ValueError(f"success_rate: not a rate (got {given!r}; expected 0.9 or success_rate(at_least=0.9))")
     return success_rate(given)

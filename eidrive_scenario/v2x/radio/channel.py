@@ -29,7 +29,6 @@ from eidrive_scenario.v2x.radio.csma import Csma
 from eidrive_scenario.v2x.radio.events import DroppedBlock, ReceptionBlock
 from eidrive_scenario.v2x.radio.jamming import Jamming
 from eidrive_scenario.v2x.radio.link_counter_table import LinkCounterTable
-from eidrive_scenario.v2x.radio.preambles import PreambleDetection
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
@@ -37,7 +36,7 @@ from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.v2x.statistics.links import ABSENT
-from eidrive_scenario.v2x.statistics.reception_log import Entry
+from eidrive_scenario.v2x.statistics.reception_log import queue_entry
 
 
 class RadioChannel(QueuedChannel):
@@ -77,7 +76,6 @@ class RadioChannel(QueuedChannel):
         self._rows: dict[str, int] = {}
         self._receivers: dict[str, tuple[list[str], Integers]] = {}
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
-        self._preambles = PreambleDetection(profile.sensing) if profile.technology == "80211p" else None
         self._access = self._new_access(())
         self._access.fading = self._fading
         self._counters = LinkCounterTable(())
@@ -188,8 +186,6 @@ class RadioChannel(QueuedChannel):
         """Replace the stations. Pending messages of removed stations are lost."""
         self._entry_times = {name: self._entry_times.get(name, now) for name in names}
         self._counters.flush_into(self._links)
-        if self._preambles is not None:
-            self._preambles.rearrange([self._rows.get(name) for name in names])
         lost = self._access.rearrange(names)
         gone = [entry for entry in self._open if entry.message.sender not in names]
         self._open = [entry for entry in self._open if entry not in gone]
@@ -227,8 +223,6 @@ class RadioChannel(QueuedChannel):
         started, dropped = self._access.advance(now, power)
         for entry in dropped:
             self._drop(entry)
-        if self._preambles is not None:
-            self._preambles.start(started, self._rows, power)
         under_way = [*self._open, *started]
         ended = [entry for entry in under_way if entry.end <= now]
         self._open = [entry for entry in under_way if entry.end > now]
@@ -275,7 +269,7 @@ class RadioChannel(QueuedChannel):
             ends = np.array([entry.end + delay.seconds for entry in block.ended])
             block.arrives[delivered] = ends[places]
             for entry, arrives, reached in zip(block.ended, ends.tolist(), receivers, strict=True):
-                self._links.enqueue(_queue_entry(entry, arrives), *reached)
+                self._links.enqueue(queue_entry(entry.message, entry.sent, arrives), *reached)
             return
         arrivals = []
         for entry, reached in zip(block.ended, receivers, strict=True):
@@ -285,7 +279,7 @@ class RadioChannel(QueuedChannel):
                     link = (entry.message.sender, name)
                     arrives = self._last_arrival[link] = max(arrives, self._last_arrival.get(link, arrives))
                 arrivals.append(arrives)
-                self._links.enqueue(_queue_entry(entry, arrives), name)
+                self._links.enqueue(queue_entry(entry.message, entry.sent, arrives), name)
         block.arrives[delivered] = arrivals
 
     def _apply_loss(self, entry: Transmission, rows: Integers, causes: NDArray[np.int8], budget: Budget) -> Integers:
@@ -323,9 +317,3 @@ class RadioChannel(QueuedChannel):
 
 def _no_position(name: str) -> str:
     return f"station {name!r} has no antenna position in the radio environment"
-
-
-def _queue_entry(entry: Transmission, arrives: float) -> Entry:
-    """Return the queue entry of a message in flight that arrives at this time [s]."""
-    message = entry.message
-    return arrives, message.sender, message.number, entry.sent, ReceivedMessage(message, arrives)

@@ -13,6 +13,7 @@ from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate
+from eidrive_scenario.v2x.radio.preambles import PreambleDetection
 from eidrive_scenario.v2x.standards import SLOT
 
 AIFS = 32e-6 + 6 * SLOT
@@ -41,6 +42,7 @@ class Csma(MediumAccess):
         self.free_from = np.full(len(names), -math.inf)
         """Time from which each station senses an idle medium, by the transmissions so far [s]."""
         self._keys = self._backoff_keys()
+        self._preambles = PreambleDetection(len(names), sensing_dbm)
 
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
         started: list[Transmission] = []
@@ -72,6 +74,7 @@ class Csma(MediumAccess):
             started.append(transmission)
         if math.isfinite(until):
             self._measure(until)
+        self._preambles.detect(started, self._rows, power)
         return started, dropped
 
     def _backoff_keys(self) -> Keys:
@@ -132,6 +135,7 @@ class Csma(MediumAccess):
         self._slots, self._fixed = reorder_rows(self._slots, rows, math.nan), reorder_rows(self._fixed, rows, math.nan)
         self.free_from = reorder_rows(self.free_from, rows, -math.inf)
         self._keys = self._backoff_keys()
+        self._preambles.reorder(rows)
 
     def _draw(self, rows: NDArray[np.int64]) -> None:
         """Draw the backoff of the first message of these stations [slots]."""

@@ -22,17 +22,17 @@ class PreambleDetection:
     sensing_dbm  minimum power of a message to which a station locks [dBm]
     """
 
-    def __init__(self, sensing_dbm: float) -> None:
+    def __init__(self, count: int, sensing_dbm: float) -> None:
         self._sensing_dbm = sensing_dbm
-        self._until = np.zeros(0)
+        self._until = np.full(count, -math.inf)
         """Time until which each station is locked or transmits [s]."""
 
-    def rearrange(self, rows: Sequence[int | None]) -> None:
-        """Replace the stations; `rows` contains the former row of each station, None for new ones."""
+    def reorder(self, rows: Sequence[int | None]) -> None:
+        """Reorder the state of the stations; `rows` contains the former row of each station, None for new ones."""
         self._until = reorder_rows(self._until, rows, -math.inf)
 
-    def start(self, started: Sequence[Transmission], rows: Mapping[str, int], power: Array) -> None:
-        """Set `busy` of these transmissions: no transmission that starts earlier may be passed later.
+    def detect(self, started: Sequence[Transmission], rows: Mapping[str, int], power: Array) -> None:
+        """Set `busy` of these transmissions. Those of a later call may not start earlier.
 
         rows   row of each station
         power  (N, N) received power by sender (row) and receiver (column) [dBm]

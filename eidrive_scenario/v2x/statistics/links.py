@@ -8,7 +8,7 @@ from collections.abc import Callable
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.statistics.link_statistics import LinkCounters, LinkStatistics
-from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog
+from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog, queue_entry
 
 ABSENT = "absent"
 """Reason for the loss of a message whose sender or receiver has left the world."""
@@ -54,7 +54,7 @@ class Links:
                 f"delay of a message to {receiver!r} is invalid (got {delay}; expected at least 0 s, finite)"
             )
         arrives = now + delay
-        self.enqueue((arrives, message.sender, message.number, now, ReceivedMessage(message, arrives)), receiver)
+        self.enqueue(queue_entry(message, now, arrives), receiver)
         counters = self._count_sent(message, receiver)
         if distance is not None:
             counters.count_outcome(distance, True)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Integers
-from eidrive_scenario.v2x.messages.message import ReceivedMessage
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage
 from eidrive_scenario.v2x.statistics.age_of_information import AgeOfInformation
 
 Entry = tuple[float, str, int, float, ReceivedMessage]
@@ -17,6 +17,11 @@ Entry = tuple[float, str, int, float, ReceivedMessage]
 
 MAX_PENDING = 1 << 14
 """Maximum number of unprocessed messages, because each holds its content in memory."""
+
+
+def queue_entry(message: Message, sent: float, arrives: float) -> Entry:
+    """Return the queue entry of a message that was sent and arrives at these times [s]."""
+    return arrives, message.sender, message.number, sent, ReceivedMessage(message, arrives)
 
 
 class ReceptionStatistics(NamedTuple):

@@ -115,10 +115,18 @@ def test_option_applies_to_scenario_files(project: pytest.Pytester) -> None:
 
 @pytest.mark.parametrize(
     ("argument", "expected"),
-    [("success_rate=2", "not a rate"), ("success_rate=1.5", "rates"), ("success_rate=0.5, seeds=3", "exclude")],
+    [
+        ("success_rate=2", "not a rate"),
+        ("success_rate=1.5", "rates"),
+        ("success_rate=0.5, seeds=3", "exclude"),
+        ("success_rate=success_rate(at_least=0.5), seeds=3", "exclude"),
+    ],
 )
 def test_invalid_marker_is_an_error(project: pytest.Pytester, argument: str, expected: str) -> None:
-    text = f'import pytest\n@pytest.mark.scenario("drives/first", {argument})\ndef test_rate(run_scenario):\n    pass\n'
+    text = (
+        "import pytest\nfrom eidrive_scenario.api.run import success_rate\n"
+        f'@pytest.mark.scenario("drives/first", {argument})\ndef test_rate(run_scenario):\n    pass\n'
+    )
     project.makepyfile(test_rates=text)
     done = project.runpytest_subprocess("test_rates.py", "-p", "no:cacheprovider")
     assert done.ret != 0
