@@ -89,7 +89,17 @@ def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pos
     """
     section, lane = lane_at(road, lane_id, s)
     t, sideways = lane_t(road, section, lane, s)
-    t += offset
+    return pose_in_lane(road, section, lane, s, offset, t + offset, sideways)
+
+
+def pose_in_lane(
+    road: Road, section: LaneSection, lane: Lane, s: float, offset: float, t: float, sideways: float
+) -> Pose:
+    """Return the pose in a lane at s, t, with heading and pitch of the lane.
+
+    offset    offset from the center line of the lane [m], which is part of t
+    sideways  derivative of t by s
+    """
     x, y, h, curvature, speed = road.reference.at(s)
     ahead, left, roll = 0.0, t, 0.0
     if road.superelevation.is_zero:
@@ -132,6 +142,9 @@ def lane_height(lane: Lane, ds: float, offset: float) -> float:
 
 def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[float, float]:
     """Return t of the center line of a lane at s, and its derivative."""
+    steady, steady_center = road.lane_offset.constant_value, lane.center.constant_value
+    if steady is not None and steady_center is not None and lane.id:
+        return (steady + steady_center if lane.id > 0 else steady - steady_center), 0.0
     t, slope = road.lane_offset.value_and_slope(s)
     if lane.id == 0:
         return t, slope

@@ -19,7 +19,7 @@ ROUNDING = 1e-6
 class Polynomials:
     """Function of s on [0, ∞). Each piece extends to the start of the next; before the first the value is 0."""
 
-    __slots__ = ("_constant", "pieces", "starts")
+    __slots__ = ("constant_value", "is_constant", "is_zero", "pieces", "starts")
 
     def __init__(self, pieces: Iterable[Piece] = ()) -> None:
         ordered = sorted(pieces, key=lambda piece: piece[0])
@@ -30,35 +30,30 @@ class Polynomials:
         self.pieces: list[Piece] = ordered
         self.starts = [piece[0] for piece in ordered]
         single = len(ordered) == 1 and ordered[0][2:] == (0.0, 0.0, 0.0)
-        self._constant: float | None = ordered[0][1] if single else None
+        self.constant_value: float | None = ordered[0][1] if single else None
+        """Value of a function with a single, constant piece; None for others."""
+        self.is_constant = single
+        """True if the function has a single, constant piece."""
+        self.is_zero = self.constant_value == 0.0
+        """True if the function is 0 everywhere."""
 
     @classmethod
     def constant(cls, value: float) -> Polynomials:
         """Return the constant function `value`."""
         return cls([(0.0, value, 0.0, 0.0, 0.0)])
 
-    @property
-    def is_zero(self) -> bool:
-        """True if the function is 0 everywhere."""
-        return self._constant == 0.0
-
-    @property
-    def is_constant(self) -> bool:
-        """True if the function has a single, constant piece."""
-        return self._constant is not None
-
     def value(self, s: float) -> float:
         """Return the value at s."""
-        if self._constant is not None:
-            return self._constant
+        if self.constant_value is not None:
+            return self.constant_value
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
         return a + ds * (b + ds * (c + ds * d))
 
     def value_and_slope(self, s: float) -> tuple[float, float]:
         """Return the value and the derivative at s."""
-        if self._constant is not None:
-            return self._constant, 0.0
+        if self.constant_value is not None:
+            return self.constant_value, 0.0
         start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
         return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
@@ -124,7 +119,7 @@ class PolynomialTable:
         self._pieces = pieces
         """Start and coefficients a, b, c, d of each piece."""
         self._a = np.ascontiguousarray(pieces[:, 1])
-        self._constant = bool(np.all(pieces[:, 2:] == 0.0))
+        self.constant_value = bool(np.all(pieces[:, 2:] == 0.0))
         self._single = len(pieces) == len(functions)
 
     def _piece(self, function: Integers, s: Array) -> Integers:
@@ -136,7 +131,7 @@ class PolynomialTable:
     def value(self, function: Integers, s: Array) -> Array:
         """Return the values of functions `function` (N,) at s (N,)."""
         piece = self._piece(function, s)
-        if self._constant:
+        if self.constant_value:
             return self._a.take(piece)
         start, a, b, c, d = self._pieces.take(piece, axis=0).T
         ds = s - start
@@ -145,7 +140,7 @@ class PolynomialTable:
     def value_and_slope(self, function: Integers, s: Array) -> tuple[Array, Array]:
         """Return the values and derivatives of functions at s."""
         piece = self._piece(function, s)
-        if self._constant:
+        if self.constant_value:
             return self._a.take(piece), np.zeros(piece.shape)
         start, a, b, c, d = self._pieces.take(piece, axis=0).T
         ds = s - start
@@ -162,7 +157,7 @@ class PolynomialTable:
     @property
     def is_zero(self) -> bool:
         """True if all functions are 0 everywhere."""
-        return self._constant and not self._a.any()
+        return self.constant_value and not self._a.any()
 
 
 def _begins_function_or_value(pieces: Array, owner: Integers) -> Bools:

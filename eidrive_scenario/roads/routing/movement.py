@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.roads.geometry.poses import LEAST_STRETCH, lane_at, lane_t
+from eidrive_scenario.roads.geometry.poses import LEAST_STRETCH, lane_at, lane_t, pose_in_lane
 from eidrive_scenario.roads.model.curves import Arc
-from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
+from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.routing.links import LaneLinks
 
@@ -117,6 +117,28 @@ class Movement:
             s = section.s if direction > 0 else section.end
         t, _ = lane_t(road, section, lane, s)
         return LaneLocation(road.id, lane.id, s, offset, t + offset)
+
+    def step_in_section(self, location: LaneLocation, distance: float) -> tuple[LaneLocation, Pose] | None:
+        """Return the location of `advance`, and the pose there with the heading of the lane along s.
+
+        The result is None if the step leaves the lane section, or if the lane does not exist.
+        """
+        number, s, offset = location.lane, location.s, location.offset
+        road = self._roads[location.road]
+        section = road.section_at(s)
+        lane = section.lanes.get(number)
+        if lane is None or not 0.0 <= s <= road.length:
+            return None
+        direction = driving_direction(road, number) if distance >= 0.0 else -driving_direction(road, number)
+        if direction < 0 and s == section.s and section.index > 0:
+            return None
+        s, remaining = _along(road, section, lane, s, offset, direction, abs(distance))
+        inside = direction < 0 or s < section.end or section.index == len(road.sections) - 1
+        if remaining > 0.0 or not inside:
+            return None
+        t, sideways = lane_t(road, section, lane, s)
+        t += offset
+        return LaneLocation(road.id, number, s, offset, t), pose_in_lane(road, section, lane, s, offset, t, sideways)
 
     def _next(
         self,

@@ -192,26 +192,43 @@ class Motion(MotionState):
                 distance = total = math.copysign(steering.distance, distance)
             if steering.shortens_distance:
                 distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
+        lane_pose: Pose | None = None
         if distance != 0.0:
-            reached = self.ahead(here, distance * self.direction)
-            if reached is None:
-                reached = self._lane_end(here, distance * self.direction)
-                if self._end_of_road:
-                    self._speed = 0.0
-                self._end_of_road = True
-            else:
-                self._end_of_road = False
-            if self._route is not None and reached.road != here.road:
-                self._visit = self._route.visit(reached.road, self._visit)
-            self._enter_lap(here, reached)
-            here = reached
+            here, lane_pose = self._advance(here, distance * self.direction)
         if steering is not None:
             self._heading = wrap_angle(
                 (0.0 if self.direction > 0 else math.pi) + self._angle_to_lane(steering, left, distance, total, dt)
             )
+        if lane_pose is None:
+            lane_pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
+            way = self.roads.driving_direction(here.road, here.lane)
         self._location = here
-        pose = self.pose_on(here, self._heading)
-        self._pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
+        x, y, z, h, p, r = lane_pose.turned(self._heading if way > 0 else self._heading + math.pi)
+        self._pose = Pose(x, y, z if self._lift == 0.0 else z + self._lift, wrap_angle(h), p, r)
+
+    def _advance(self, here: LaneLocation, distance: float) -> tuple[LaneLocation, Pose | None]:
+        """Return the location at a distance along lane and route [m] or at the end of the lane, where the actor stops.
+
+        The pose with the heading of the lane along s is returned as well if the actor remains in its lane section.
+        """
+        assert self.roads is not None
+        within = self.roads.movement.step_in_section(here, distance)
+        if within is not None:
+            self._end_of_road = False
+            self._enter_lap(here, within[0])
+            return within
+        reached = self.ahead(here, distance)
+        if reached is None:
+            reached = self._lane_end(here, distance)
+            if self._end_of_road:
+                self._speed = 0.0
+            self._end_of_road = True
+        else:
+            self._end_of_road = False
+        if self._route is not None and reached.road != here.road:
+            self._visit = self._route.visit(reached.road, self._visit)
+        self._enter_lap(here, reached)
+        return reached, None
 
     def _step_towards_route(self, distance: float) -> LateralStep | None:
         """Return the lateral step towards a lane that continues along the route; None if the current one does."""

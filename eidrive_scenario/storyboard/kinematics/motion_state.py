@@ -80,14 +80,6 @@ class MotionState:
         """+1 if the actor points along the driving direction of its lane, otherwise -1."""
         return 1 if math.cos(self._heading) >= 0.0 else -1
 
-    def pose_on(self, here: LaneLocation, heading: float) -> Pose:
-        """Return the pose at a lane location with an angle to the driving direction [rad]."""
-        assert self.roads is not None
-        pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
-        turn = heading if self.roads.driving_direction(here.road, here.lane) > 0 else heading + math.pi
-        x, y, z, h, p, r = pose.turned(turn)
-        return Pose(x, y, z, wrap_angle(h), p, r)
-
     def _set_location(self, location: LaneLocation | None) -> None:
         """Set the lane location if it is at the pose of the actor, and not beyond the end of a road."""
         self._location, self._lift = None, 0.0
