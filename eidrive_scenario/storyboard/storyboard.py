@@ -146,6 +146,8 @@ class Storyboard:
         Return towing vehicles and trailers, from front to end of each train.
         """
         towed_pairs = list(pairs(self.context.actors))
+        if not towed_pairs:
+            return towed_pairs
         self.context.commands.trailers = frozenset(frozenset((front.name, back.name)) for front, back in towed_pairs)
         for front, back in towed_pairs:
             if front.present and (not back.present or self.context.view.tick < 0):

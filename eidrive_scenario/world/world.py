@@ -187,8 +187,9 @@ class World:
 
         A placement of a driven actor is a teleport. Raise SimulationError if a name is not present.
         """
-        if absent := {*placements, *controls} - self._bodies.keys():
-            self._body(min(absent))
+        present = self._bodies.keys()
+        if not (placements.keys() <= present and controls.keys() <= present):
+            self._body(min({*placements, *controls} - present))
         for name, body in self._bodies.items():
             placement = placements.get(name)
             if isinstance(body, ScriptedBody):

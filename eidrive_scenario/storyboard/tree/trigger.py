@@ -188,6 +188,8 @@ class WaitForTrigger(py_trees.behaviour.Behaviour):
 
     def is_fired(self) -> bool:
         """Tick without the generator of `tick_once`, as triggers are evaluated in every tick; True if it fires."""
-        self.initialise()
-        self.status = self.update()
-        return self.status is Status.SUCCESS
+        if self.status is Status.INVALID:
+            self.trigger.reset()
+        is_fired = self.trigger.evaluate(self.context)
+        self.status = Status.SUCCESS if is_fired else Status.RUNNING
+        return is_fired

@@ -37,6 +37,8 @@ class Couplings:
 
     def update(self, bodies: Mapping[str, Body]) -> None:
         """Set which bodies collide; those of a disconnected trailer and its vehicle only after they have parted."""
+        if not self.pairs and not self._apart:
+            return
         for pair in sorted(self.pairs | self._apart.keys(), key=sorted):
             if not pair <= bodies.keys():
                 self._apart.pop(pair, None)
