@@ -29,6 +29,8 @@ class ConditionEvaluator:
         self.name = name
         self.edge = edge
         self.delay = delay
+        self._is_plain = edge == "none" and delay <= 0.0
+        """Whether the result is the value of the condition."""
         self.evaluations = 0
         """Number of evaluations of the condition."""
         self.reset()
@@ -40,7 +42,7 @@ class ConditionEvaluator:
         self.result = False
         """Last result with edge and delay."""
         self.triggering: tuple[str, ...] = ()
-        """Entities of the last result: those that fulfill the condition; on a falling edge, those that did before."""
+        """Entities of a true result: those that fulfill the condition; on a falling edge, those that did before."""
         self._fulfilled: tuple[str, ...] = ()
         self._evaluated_at: int | None = None
         self._edge_in_tick = False
@@ -58,6 +60,11 @@ class ConditionEvaluator:
         self.evaluations += 1
         held: object = condition.holds(context)
         result = held if held is True or held is False else truth(condition, held)
+        if self._is_plain:
+            self.value = self.result = result
+            if result:
+                self.triggering = getattr(condition, "fulfilled", ())
+            return result
         if self.edge == "none":
             self.value = result
         else:
@@ -146,10 +153,7 @@ class Trigger:
 
     def evaluate(self, context: RuntimeContext) -> bool:
         """Whether the trigger fires; `why` then describes the reason."""
-        fired = []
-        for group in self.groups:
-            if group.evaluate(context):
-                fired.append(group)
+        fired = [group for group in self.groups if group.evaluate(context)]
         if fired:
             self.why = " and ".join(monitor.why(context) for monitor in fired[0].monitors)
             names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
