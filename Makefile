@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce docs check-docs check-standards bench bench-compare bench-history eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
+.PHONY: help install demo test lint reproduce docs check-docs check-standards bench bench-compare bench-corpora bench-history eval closed-loop planners corner-cases driven-files long-drives heat-maps library-pictures weather-sheet pages clean
 
 help:           ## print this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -57,6 +57,10 @@ bench: install  ## measure the figures of docs/performance.md, and the time per 
 bench-compare: install  ## measure the commits BASE and HEAD in turn, and print the ratios
 	@test -n "$(BASE)" || { echo 'BASE is not set: the commit to compare with, as in make bench-compare BASE=main~5'; exit 2; }
 	$(BIN)/python benchmarks/compare.py $(BASE)
+
+bench-corpora: install  ## run the suites of EIDRIVE_CORPORA with the commits BASE and HEAD in turn, and print the ratios
+	@test -n "$(BASE)" || { echo 'BASE is not set: the commit to compare with, as in make bench-corpora BASE=main~5'; exit 2; }
+	$(BIN)/python benchmarks/compare_corpora.py $(BASE) --processes
 
 bench-history: install  ## add the figures of the current commit to benchmarks/history.csv
 	$(BIN)/python benchmarks/history.py

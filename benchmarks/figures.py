@@ -120,15 +120,16 @@ def command_time(*arguments: str) -> float:
     times = []
     variables = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     for _ in range(4):
-        before = _children_time()
+        before = children_time()
         subprocess.run(
             (*COMMAND, *arguments), check=True, stdout=subprocess.DEVNULL, cwd=tempfile.gettempdir(), env=variables
         )
-        times.append(_children_time() - before)
+        times.append(children_time() - before)
     return min(times[1:])
 
 
-def _children_time() -> float:
+def children_time() -> float:
+    """Return the processor time of the processes that this one has started and that have ended [s]."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 

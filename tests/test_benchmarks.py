@@ -126,3 +126,32 @@ def test_comparison_with_unknown_commit_is_an_error() -> None:
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert done.returncode == 1
     assert "git rev-parse" in done.stderr
+
+
+def test_ratios_of_suites_are_those_of_sums_and_their_geometric_mean() -> None:
+    from compare_corpora import summary
+
+    line = summary("one process", [(4.0, 2.0), (1.0, 2.0)])
+    assert "ratio of the sums 0.800, geometric mean of the ratios 1.000 (0.50 to 2.00)" in line
+
+
+@pytest.mark.skipif(not is_repository(), reason="not a checkout of git")
+def test_comparison_of_suites_counts_scenarios_that_end_by_themselves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One scenario ends after 3 s, one only after the limit of 10 s, and one is invalid."""
+    text = (ROOT / "tests/data/passing_by.xosc").read_text(encoding="utf-8")
+    (tmp_path / "ends.xosc").write_text(text, encoding="utf-8")
+    (tmp_path / "lasts.xosc").write_text(text.replace('name="End" parameterType="double" value="3.0"',
+                                                      'name="End" parameterType="double" value="30.0"'))  # fmt: skip
+    (tmp_path / "invalid.xosc").write_text("<OpenSCENARIO/>", encoding="utf-8")
+    monkeypatch.setenv("EIDRIVE_CORPORA", str(tmp_path))
+    command = (sys.executable, str(BENCHMARKS / "compare_corpora.py"), "HEAD", "--limit", "10", "--repeats", "1")
+    done = subprocess.run((*command, "--csv", str(tmp_path / "times.csv")), check=True, capture_output=True, text=True)
+    assert done.stdout.startswith("1 scenarios that end by themselves")
+    with (tmp_path / "times.csv").open(newline="", encoding="utf-8") as stream:
+        (row,) = csv.DictReader(stream)
+    assert row["scenario"] == "ends"
+    assert float(row["base_s"]) > 0.0
+    assert float(row["head_s"]) > 0.0
+    assert row["head_process_s"] == ""
