@@ -174,6 +174,25 @@ def test_absent_actor_is_deleted(tmp_path: Path) -> None:
     assert [entity.id for entity in second.entities] == ["A"]
 
 
+def test_scenes_of_absent_station_are_deleted_once(tmp_path: Path) -> None:
+    """The station leaves in frame 1, returns in frame 3, and drives no longer in frame 4."""
+    plan = Plan(np.array([[0.0, 0.0], [5.0, 0.0]]), np.ones(2), "drive")
+    own = detected(0.0, [(5.0, 0.0, 0.5, 4.0, 2.0, 1.5, 0.0)])
+    here, parked = {"Ego": step(own, plan=plan)}, {"Ego": step(own, drives=False)}
+    steps = [here, {}, {}, here, parked]
+    bodies: list[dict[str, Body]] = [{"Ego": {}} if one else {} for one in steps]
+    frames = [Frame(view(body, tick), one) for tick, (body, one) in enumerate(zip(bodies, steps, strict=True))]
+    topics = exported(tmp_path, *frames)
+    for part, expected in (
+        ("detections", [(0.0, 1), (0.1, 0), (0.3, 1), (0.4, 1)]),
+        ("plan", [(0.0, 1), (0.1, 0), (0.3, 1), (0.4, 0)]),
+    ):
+        scenes = topics[f"/stations/Ego/{part}"]
+        assert all(scene.deletions for scene in scenes if not scene.entities)
+        times = [(list(scene.entities) or list(scene.deletions))[0].timestamp.ToNanoseconds() / 1e9 for scene in scenes]
+        assert [(time, len(scene.entities)) for time, scene in zip(times, scenes, strict=True)] == expected
+
+
 def test_violation_is_logged_at_its_time(tmp_path: Path) -> None:
     result = run_and_save(PASSING_BY, settings=RunSettings(parameters={"OtherY": "0"}), out=tmp_path)
     assert result.recording is not None
