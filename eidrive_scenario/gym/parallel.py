@@ -102,8 +102,6 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         self.close()
         known = {key: value for key, value in (options or {}).items() if key in OPTIONS}
         episode = self._episode = self._runs.start(int(self._generator.integers(MAX_SEED)), known)
-        while episode.result is None and not self._present(episode):
-            episode.advance(lambda perceived: {})
         self.agents = self._present(episode)
         if not self.agents:
             raise SettingError(Diagnostic("no controlled station enters the world", "select other stations"))
@@ -137,21 +135,35 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             return {name: action for name, action in decided.items() if name in perceived}
 
         terms: dict[str, list[dict[str, float]]] = {name: [] for name in acting}
+        absent = set[str]()
         for _ in range(self._runs.ticks_per_step):
+            self._begin_returned(episode, absent)
             live = [name for name in acting if name in episode.perceived]
             routes = {name: self._interfaces[name].route(episode.perceived[name]) for name in live}
             transition = episode.advance(decide)
             for name in live:
                 terms[name].append(self._interfaces[name].reward_terms(transition, routes[name], episode))
+            absent.update(name for name in acting if name not in episode.perceived)
             if episode.result is not None:
                 break
-        return self._outcome(episode, acting, terms)
+        return self._outcome(episode, acting, terms, absent)
 
-    def _outcome(self, episode: Episode, acting: list[str], terms: Mapping[str, list[dict[str, float]]]) -> Outcome:
+    def _begin_returned(self, episode: Episode, absent: set[str]) -> None:
+        """Begin the episodes of stations that have returned, and remove them from the absent ones."""
+        for name in [name for name in self._present(episode) if name in absent]:
+            self._interfaces[name].begin(episode)
+            absent.remove(name)
+
+    def _outcome(
+        self, episode: Episode, acting: list[str], terms: Mapping[str, list[dict[str, float]]], absent: set[str]
+    ) -> Outcome:
+        self._begin_returned(episode, absent)
+        left = frozenset(absent)
         while episode.result is None and not self._present(episode):
             episode.advance(lambda perceived: {})
         result = episode.result
         present = [] if result is not None else self._present(episode)
+        self._begin_returned(episode, absent)
         entering = [name for name in present if name not in acting]
         for name in entering:
             self._interfaces[name].begin(episode)
@@ -164,7 +176,7 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
                 found.append(self._interfaces[name].rewards.terms_of_end(result))
                 info |= final_info(result)
             info["reward_terms"] = summed = sum_terms(found)
-            truncated = episode.is_truncated
+            truncated = episode.is_truncated and name not in left
             terminated = not truncated and (result is not None or name not in present)
             observations[name], rewards[name] = self._interfaces[name].observe(episode), sum(summed.values())
             ends[name], limits[name], infos[name] = terminated, truncated, info

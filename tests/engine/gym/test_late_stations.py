@@ -1,0 +1,90 @@
+"""Stations that enter the world late, leave it, and return."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from openscenario_xml import agent_xml, road_file_xml, round_car_xml, scenario_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    end_xml,
+    event_xml,
+    global_xml,
+    group_xml,
+    lane_position_xml,
+    maneuver_xml,
+    time_xml,
+    trigger_xml,
+)
+
+from eidrive_scenario.gym import EidriveEnv, EidriveParallelEnv
+
+ADDED, DELETED, RETURNED = 1.0, 2.0, 2.5
+"""Times of the actions on Ego [s]; it is in the views of the following time steps."""
+DT = 0.05
+
+
+def visits(seconds: float = 4.0) -> bytes:
+    """Return a scenario in which Ego enters the world twice, behind another car that stands."""
+    add = f"<AddEntityAction><Position>{lane_position_xml(-1, 20.0)}</Position></AddEntityAction>"
+    events = [
+        event_xml(name, global_xml(f'<EntityAction entityRef="Ego">{action}</EntityAction>'), trigger_xml(at(time)))
+        for name, action, time in (
+            ("add", add, ADDED),
+            ("delete", "<DeleteEntityAction/>", DELETED),
+            ("return", add, RETURNED),
+        )
+    ]
+    return scenario_xml(
+        road=road_file_xml("eidrive_library/roads/two_lane_road.xodr"),
+        entities=round_car_xml("Ego", agent_xml(planner="route", target_speed=10)),
+        story=acts_xml(act_xml(group_xml(maneuver_xml("".join(events))))),
+        stop=end_xml(seconds),
+    )
+
+
+def at(time: float) -> str:
+    return condition_xml(time_xml(time, "greaterOrEqual"))
+
+
+def test_limit_of_steps_counts_from_the_entry_of_the_station() -> None:
+    env = EidriveEnv(visits(), max_steps=6, ticks_per_step=2)
+    _, info = env.reset(seed=1)
+    start = info["time"]
+    assert start == pytest.approx(ADDED + DT)
+    outcomes = [env.step([0.0]) for _ in range(6)]
+    assert [outcome[2:4] for outcome in outcomes] == [(False, False)] * 5 + [(False, True)]
+    info = outcomes[-1][-1]
+    assert info["time"] == pytest.approx(start + 12 * DT)
+    assert info["result"].settings.time_limit == pytest.approx(info["time"])
+
+
+@pytest.mark.parametrize(("max_steps", "end_reason"), [(None, "stop trigger"), (40, "time limit")])
+def test_departure_terminates_although_the_station_returns(max_steps: int | None, end_reason: str) -> None:
+    env = EidriveEnv(visits(), max_steps=max_steps)
+    _, info = env.reset(seed=1)
+    start, count, ended = info["time"], 0, False
+    while not ended:
+        observation, _, terminated, truncated, info = env.step([0.0])
+        ended, count = terminated or truncated, count + 1
+    assert (terminated, truncated, info["end_reason"]) == (True, False, end_reason)
+    assert count == round((DELETED + DT - start) / DT)
+    assert not any(np.any(part) for part in observation.values())
+
+
+def test_agent_that_returns_begins_anew() -> None:
+    """At its second entry, as at its first one, the station has its route ahead and no last control."""
+    env = EidriveParallelEnv(visits(), action={"kind": "target_speed", "max_speed": 10.0})
+    observations, _ = env.reset(seed=1)
+    first = observations["Ego"]
+    time = ADDED
+    while time < RETURNED:
+        observations, _, ends, limits, infos = env.step({"Ego": [1.0]})
+        time = infos["Ego"]["time"]
+    assert (ends, limits, env.agents) == ({"Ego": False}, {"Ego": False}, ["Ego"])
+    assert time == pytest.approx(RETURNED + DT)
+    assert np.array_equal(observations["Ego"]["route"], first["route"])
+    assert not observations["Ego"]["ego"][5:].any()
+    env.close()
