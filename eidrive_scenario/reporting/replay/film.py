@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from subprocess import PIPE, Popen
@@ -21,7 +21,9 @@ from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, describe_error
 from eidrive_scenario.reporting.replay.page import readable_roads, run_settings, station_settings
-from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
+from eidrive_scenario.reporting.replay.page_values import decisive_instant
+from eidrive_scenario.reporting.replay.series import SeriesBuilder
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.tolerances import TIME_TOLERANCE
@@ -42,12 +44,10 @@ class RecordedStation:
     Without stations, the snapshots contain the ground truth, and the view follows the first actor. Raise InputError if
     the recording contains no readable frame, SettingError if it has no such station or actor.
 
-    metrics  of the result of the run, which determine the decisive instant
+    result  of the run, which determines the decisive instant
     """
 
-    def __init__(
-        self, recording: Recording, name: str | None = None, *, metrics: Mapping[str, float | None] | None = None
-    ) -> None:
+    def __init__(self, recording: Recording, name: str | None = None, *, result: ReportedRun | None = None) -> None:
         report = DamageReport()
         for line in recording.damage:
             report.add(line)
@@ -77,7 +77,7 @@ class RecordedStation:
             known = ", ".join([*stations, *(actor for actor in actors if actor not in stations)][:12])
             raise SettingError(Diagnostic(f"--station: the run has no actor {name!r}", f"known: {known}"))
         self.name = name or next(iter([*driven, *stations, *actors]))
-        decisive = series.contact or closest_approach(metrics or {}) or series.decisive
+        decisive = decisive_instant({"contact": series.contact, "decisive": series.decisive}, result)
         self.decisive: float = decisive["time"] if decisive is not None else self.times[0]
         """Decisive instant [s]."""
         self.damage = report.lines()
