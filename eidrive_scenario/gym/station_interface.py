@@ -131,7 +131,8 @@ class StationInterface:
         perceived = episode.perceived.get(self.name)
         if perceived is not None and transition.after is not transition.before:
             self.encoder.receive(perceived)
-        return self.rewards.terms_of_tick(transition.before, transition.after, step, route)
+        attached = episode.simulation.world.attached(self.name)
+        return self.rewards.terms_of_tick(transition.before, transition.after, step, route, attached)
 
     def route(self, perceived: StationPerception) -> Array:
         """Return the points (M, 2) of the route in the world frame [m]; the first segment is that at the vehicle."""
