@@ -27,6 +27,7 @@ from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.world.view import WorldView
 
 FILM_SIZE, GIF_SIZE = (1280, 720), (640, 360)
 """Width and height of films and GIF files [pixels]."""
@@ -59,11 +60,11 @@ class RecordedStation:
         """Times of the frames [s]."""
         driven: dict[str, None] = {}
         stations: dict[str, None] = {}
-        actors: dict[str, None] = {}
+        actors: dict[str, tuple[float, float]] = {}
         for frame in recording.frames(lambda reason: report.add("frames cannot be decoded", shorten(reason, 200))):
             if math.isfinite(frame.view.time):
                 self.times.append(frame.view.time)
-            actors.update(dict.fromkeys(frame.view.names))
+            _add_entries(actors, frame.view)
             stations.update(dict.fromkeys(frame.steps))
             driven.update(dict.fromkeys(key for key, step in frame.steps.items() if step.control is not None))
             try:
@@ -77,6 +78,7 @@ class RecordedStation:
             known = ", ".join([*stations, *(actor for actor in actors if actor not in stations)][:12])
             raise SettingError(Diagnostic(f"--station: the run has no actor {name!r}", f"known: {known}"))
         self.name = name or next(iter([*driven, *stations, *actors]))
+        self._entry = actors.get(self.name, (0.0, 0.0))
         decisive = decisive_instant({"contact": series.contact, "decisive": series.decisive}, result)
         self.decisive: float = decisive["time"] if decisive is not None else self.times[0]
         """Decisive instant [s]."""
@@ -120,8 +122,8 @@ class RecordedStation:
                     shown = wanted
 
     def _centered(self) -> Iterator[tuple[StationSnapshot, tuple[float, float]]]:
-        """Yield the snapshots at finite times, with the last position of the station [m]."""
-        center = (0.0, 0.0)
+        """Yield the snapshots at finite times, with the last or else the first position of the station [m]."""
+        center = self._entry
         for snapshot in self.snapshots():
             if not math.isfinite(snapshot.time):
                 continue
@@ -136,6 +138,14 @@ class RecordedStation:
             return snapshot_picture(snapshot, self.roads, center, size=size)
         except UNDRAWABLE:
             return None
+
+
+def _add_entries(actors: dict[str, tuple[float, float]], view: WorldView) -> None:
+    """Add the actors that enter the world in this view, with their positions [m]."""
+    for name in view.names:
+        if name not in actors:
+            x, y = view.centers[view.row(name), :2].tolist()
+            actors[name] = (x, y) if math.isfinite(x + y) else (0.0, 0.0)
 
 
 def write_png(station: RecordedStation, path: Path, time: float | None = None) -> None:
