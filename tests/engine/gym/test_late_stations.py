@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from openscenario_xml import agent_xml, road_file_xml, round_car_xml, scenario_xml
+from pettingzoo.test import parallel_api_test
 from storyboard_xml import (
     act_xml,
     acts_xml,
@@ -13,8 +14,10 @@ from storyboard_xml import (
     event_xml,
     global_xml,
     group_xml,
+    init_xml,
     lane_position_xml,
     maneuver_xml,
+    teleport_xml,
     time_xml,
     trigger_xml,
 )
@@ -74,17 +77,27 @@ def test_departure_terminates_although_the_station_returns(max_steps: int | None
     assert not any(np.any(part) for part in observation.values())
 
 
-def test_agent_that_returns_begins_anew() -> None:
-    """At its second entry, as at its first one, the station has its route ahead and no last control."""
-    env = EidriveParallelEnv(visits(), action={"kind": "target_speed", "max_speed": 10.0})
-    observations, _ = env.reset(seed=1)
-    first = observations["Ego"]
-    time = ADDED
-    while time < RETURNED:
-        observations, _, ends, limits, infos = env.step({"Ego": [1.0]})
-        time = infos["Ego"]["time"]
-    assert (ends, limits, env.agents) == ({"Ego": False}, {"Ego": False}, ["Ego"])
-    assert time == pytest.approx(RETURNED + DT)
-    assert np.array_equal(observations["Ego"]["route"], first["route"])
-    assert not observations["Ego"]["ego"][5:].any()
-    env.close()
+@pytest.mark.parametrize("ticks_per_step", [1, 40])
+def test_agent_does_not_return_with_its_station(ticks_per_step: int) -> None:
+    """PettingZoo: an agent cannot be revived. One of the steps of 40 ticks contains departure and return."""
+    single = EidriveEnv(visits(), ticks_per_step=ticks_per_step)
+    env = EidriveParallelEnv(visits(), ticks_per_step=ticks_per_step)
+    single.reset(seed=1)
+    env.reset(seed=1)
+    terminated = False
+    while not terminated:
+        _, reward, terminated, _, info = single.step([1.0])
+        observations, rewards, ends, limits, infos = env.step({"Ego": [1.0]})
+        assert (rewards["Ego"], ends["Ego"], limits["Ego"]) == (reward, terminated, False)
+    assert (env.agents, infos["Ego"]["trace_hash"]) == ([], info["trace_hash"])
+    assert not any(np.any(part) for part in observations["Ego"].values())
+
+
+def test_checks_of_pettingzoo_accept_departure_and_return() -> None:
+    other = round_car_xml("Other", agent_xml(planner="route", target_speed=10))
+    parts = visits().replace(b"</Entities>", other.encode() + b"</Entities>")
+    start = init_xml("Other", teleport_xml(lane_position_xml(-1, 60.0))).encode()
+    scenario = parts.replace(b"<Actions></Actions>", b"<Actions>" + start + b"</Actions>")
+    env = EidriveParallelEnv(scenario)
+    assert env.possible_agents == ["Ego", "Other"]
+    parallel_api_test(env, num_cycles=100)
