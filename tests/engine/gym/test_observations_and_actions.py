@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 from lone_car import lone_car
-from openscenario_xml import agent_xml, road_file_xml, round_car_xml, scenario_xml
+from openscenario_xml import agent_xml, parameters_xml, road_file_xml, round_car_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 
 from eidrive_scenario.detections import CLASSES, Detections
@@ -219,4 +220,19 @@ def test_time_to_collision_of_reward_ignores_the_own_trailer() -> None:
     env.reset(seed=1)
     *_, info = env.step([0.0])
     assert info["reward_terms"]["time_to_collision"] == 0.0
+    env.close()
+
+
+def test_steering_is_a_share_of_the_maximum_of_the_vehicle_of_the_episode() -> None:
+    declared = parameters_xml(Steering=("double", "0.5"))
+    parameter = re.sub(rb'maxSteering="0?[.]\d+"', b'maxSteering="$Steering"', lone_car(), count=1)
+    env = EidriveEnv(parameter.replace(b"<CatalogLocations", declared.encode() + b"<CatalogLocations"), action="pedals")
+    for angle in (0.25, 0.5):
+        env.reset(seed=1, options={"parameters": {"Steering": angle}})
+        env.step([0.0, -1.0])
+        assert env._episode is not None
+        assert env._episode.last_frame is not None
+        control = env._episode.last_frame.steps["Ego"].control
+        assert control is not None
+        assert control.steering == -angle
     env.close()
