@@ -70,7 +70,7 @@ def link_scene(foxglove: Foxglove, frame: Frame) -> Any:
     for event in frame.links:
         if event.sender == event.receiver or event.sender not in view or event.receiver not in view:
             continue
-        entity = add_entity(update, f"{event.sender} to {event.receiver}", view.time)
+        entity = add_entity(update, f"{event.sender} to {event.receiver}, message {event.number}", view.time)
         entity.lifetime.FromMilliseconds(round(LINK_LIFETIME * 1000))
         ends = view.centers[[view.row(event.sender), view.row(event.receiver)]] + (0.0, 0.0, 1.0)
         _add_line(foxglove, entity, ends.tolist(), _DRIVES if event.outcome == "delivered" else _BRAKES)

@@ -29,7 +29,7 @@ from eidrive_scenario.recording.camera_images import camera_file, image_file
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings
-from eidrive_scenario.v2x.messages.message import LinkEvent, Message, StationState
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.v2x.messages.point_cloud import compress
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
@@ -264,6 +264,22 @@ def test_shared_point_cloud_is_packed_as_floats(tmp_path: Path) -> None:
     assert table[np.argsort(table[:, 0])] == pytest.approx(points, abs=0.11)
 
 
+def test_boxes_of_both_messages_of_a_sender_are_one_entity(tmp_path: Path) -> None:
+    """An entity replaces the former one of its id on the topic: a CAM must not hide the boxes of a CPM."""
+    state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    boxes = [(x, 0.0, 0.5, 4.0, 2.0, 1.5, 0.0) for x in (10.0, 20.0, 30.0)]
+    messages = (
+        Message("B", 0, 0.0, state, detected(0.0, boxes[:2]), 100, kind="cpm"),
+        Message("B", 1, 0.0, state, detected(0.0, boxes[2:]), 100, kind="cam"),
+    )
+    inbox = tuple(ReceivedMessage(message, 0.0) for message in messages)
+    listening = replace(step(detected(0.0, [])), inbox=inbox)
+    (scene,) = exported(tmp_path, Frame(view({"A": {}}), {"A": listening}))["/stations/A/received"]
+    (entity,) = scene.entities
+    assert entity.id == "B"
+    assert [cube.pose.position.x for cube in entity.cubes] == [10.0, 20.0, 30.0]
+
+
 def test_messages_are_lines_from_sender_to_receiver(tmp_path: Path) -> None:
     links = (
         LinkEvent("B", "A", 0, 0.0, "delivered", 0.0, "", 100),
@@ -277,6 +293,13 @@ def test_messages_are_lines_from_sender_to_receiver(tmp_path: Path) -> None:
     assert (first.lines[0].color.g > first.lines[0].color.r) != (second.lines[0].color.g > second.lines[0].color.r)
     levels = [type(entry).Level.Name(entry.level) for entry in topics["/log/messages"]]
     assert levels == ["DEBUG", "WARNING", "WARNING"]
+
+
+def test_line_of_a_message_does_not_replace_that_of_another(tmp_path: Path) -> None:
+    """A sender may send a CAM and a CPM in one time step."""
+    links = (LinkEvent("B", "A", 0, 0.0, "lost", None, "", 9), LinkEvent("B", "A", 1, 0.0, "delivered", 0.0, "", 9))
+    (scene,) = exported(tmp_path, Frame(view({"A": {}, "B": {}}), links=links))["/messages"]
+    assert len({entity.id for entity in scene.entities}) == 2
 
 
 def test_location_fix_follows_the_reference_of_the_map(tmp_path: Path) -> None:
