@@ -118,7 +118,7 @@ class Topics:
             yield Entry(f"{base}/{part}", box_scene(self._foxglove, lists, color, time))
         if step.control is not None:
             height = float(frame.view.position[frame.view.row(name), 2]) if name in frame.view else 0.0
-            yield Entry(f"{base}/plan", plan_scene(self._foxglove, step.plan, height, time))
+            yield Entry(f"{base}/plan", plan_scene(self._foxglove, step.plan, self._run.roads, height, time))
         yield Entry(f"/metrics/stations/{escaped(name)}", station_numbers(step))
         for message in step.outbox:
             if message.points is not None:

@@ -124,6 +124,17 @@ def test_plan_is_line_along_its_points(scenario_1: tuple[list[Frame], Topics, di
     assert colors == {(False, False), (True, True)}
 
 
+def test_plan_follows_the_slope_of_the_road(tmp_path: Path) -> None:
+    """From s = 240 m to 300 m the road rises by 0.06 from 2.7 m; its start is at x = -348 m, y = 7.5 m."""
+    s = np.linspace(240.0, 300.0, 7)
+    points = np.column_stack([s - 348.0, np.full(7, 5.0)])
+    body: Body = {"position": (240.0 - 348.0, 5.0, 2.7)}
+    steps = {"Ego": step(detected(0.0, []), plan=Plan(points, np.ones(7), "drive"))}
+    topics = exported(tmp_path, Frame(view({"Ego": body}), steps), road=ROADS / "crest_road.xodr")
+    (line,) = topics["/stations/Ego/plan"][0].entities[0].lines
+    assert [one.z for one in line.points] == pytest.approx((2.7 + 0.06 * (s - 240.0) + 0.3).tolist(), abs=1e-6)
+
+
 def test_log_contains_storyboard_decisions_and_outcomes(
     scenario_1: tuple[list[Frame], Topics, dict[str, str]],
 ) -> None:
