@@ -93,11 +93,24 @@ def test_agent_does_not_return_with_its_station(ticks_per_step: int) -> None:
     assert not any(np.any(part) for part in observations["Ego"].values())
 
 
-def test_checks_of_pettingzoo_accept_departure_and_return() -> None:
+def two_stations() -> bytes:
+    """Return the visits of Ego with a car that is always present, which stands at s = 60 m."""
     other = round_car_xml("Other", agent_xml(planner="route", target_speed=10))
     parts = visits().replace(b"</Entities>", other.encode() + b"</Entities>")
     start = init_xml("Other", teleport_xml(lane_position_xml(-1, 60.0))).encode()
-    scenario = parts.replace(b"<Actions></Actions>", b"<Actions>" + start + b"</Actions>")
-    env = EidriveParallelEnv(scenario)
+    return parts.replace(b"<Actions></Actions>", b"<Actions>" + start + b"</Actions>")
+
+
+def test_checks_of_pettingzoo_accept_departure_and_return() -> None:
+    env = EidriveParallelEnv(two_stations())
     assert env.possible_agents == ["Ego", "Other"]
     parallel_api_test(env, num_cycles=100)
+
+
+def test_picture_before_the_entry_of_its_station_shows_the_station_that_is_present() -> None:
+    """The road begins at x = -80 m, and the center of the box is 1.5 m ahead of the rear axle."""
+    env = EidriveParallelEnv(two_stations(), render_mode="rgb_array")
+    env.reset(seed=1)
+    assert env._renderer is not None
+    assert env._renderer._center == pytest.approx((60.0 - 80.0 + 1.5, 0.0))
+    env.close()
