@@ -107,7 +107,7 @@ def test_checks_of_pettingzoo_accept_departure_and_return() -> None:
     parallel_api_test(env, num_cycles=100)
 
 
-def test_picture_before_the_entry_of_its_station_shows_the_station_that_is_present() -> None:
+def test_picture_before_entry_of_its_station_shows_a_present_one() -> None:
     """The road begins at x = -80 m, and the center of the box is 1.5 m ahead of the rear axle."""
     env = EidriveParallelEnv(two_stations(), render_mode="rgb_array")
     env.reset(seed=1)

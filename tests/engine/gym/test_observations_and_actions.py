@@ -223,7 +223,7 @@ def test_time_to_collision_of_reward_ignores_the_own_trailer() -> None:
     env.close()
 
 
-def test_steering_is_a_share_of_the_maximum_of_the_vehicle_of_the_episode() -> None:
+def test_steering_is_a_share_of_the_maximum_of_the_episode() -> None:
     declared = parameters_xml(Steering=("double", "0.5"))
     parameter = re.sub(rb'maxSteering="0?[.]\d+"', b'maxSteering="$Steering"', lone_car(), count=1)
     env = EidriveEnv(parameter.replace(b"<CatalogLocations", declared.encode() + b"<CatalogLocations"), action="pedals")
