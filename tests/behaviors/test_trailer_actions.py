@@ -73,7 +73,7 @@ def test_driven_vehicle_does_not_perceive_its_trailer(run: Run) -> None:
 
 @pytest.mark.element("ConnectTrailerAction")
 def test_trailer_of_driven_vehicle_keeps_its_distance(run: Run) -> None:
-    """The physics moves the truck by up to 0.4 m in a step; a change of its acceleration moves it by few millimeters."""
+    """The physics moves the truck by up to 0.4 m in a step; a change of its acceleration moves it by millimeters."""
     stack = """<ObjectController><Controller name="Stack"><Properties><Property name="module" value="eidrive"/>
       <Property name="planner" value="route"/><Property name="target_speed" value="8"/></Properties></Controller>
       </ObjectController>"""
