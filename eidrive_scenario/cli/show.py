@@ -164,8 +164,8 @@ def view(
         from eidrive_scenario.reporting.run_report.reported_run import parse_run
 
         result = result_of(path)
-        metrics = parse_run(result, path.with_name(RESULT)).metrics if result is not None else None
-        recorded = film.RecordedStation(opened, station, metrics=metrics)
+        outcome = parse_run(result, path.with_name(RESULT)) if result is not None else None
+        recorded = film.RecordedStation(opened, station, result=outcome)
         damage = recorded.damage
         if png is not None:
             film.write_png(recorded, png, at)

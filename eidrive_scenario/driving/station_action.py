@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
+from numbers import Integral, Real
+from typing import Any
 
 import msgspec
 
@@ -54,14 +55,21 @@ class StationAction(msgspec.Struct, frozen=True):
         return Goal(speed) if goal is None else msgspec.structs.replace(goal, speed=speed, acceleration=0.0)
 
     def shared(self, detections: Detections) -> Detections:
-        """Return the detections that messages contain. Raise SettingError for a row that they do not have."""
+        """Return the detections that messages contain.
+
+        Raise SettingError for a row that they do not have, or that is given twice.
+        """
         if self.share is None:
             return detections
-        wrong = next((row for row in self.share if not 0 <= row < len(detections)), None)
-        if wrong is not None:
-            message = f"share of an action contains the row {quoted(wrong)}"
-            raise SettingError(Diagnostic(message, f"the station has {len(detections)} own detections"))
-        return detections.subset(self.share)
+        rows: list[Any] = list(self.share)
+        last = len(detections) - 1
+        for index, row in enumerate(rows):
+            if not (isinstance(row, Integral) and 0 <= int(row) <= last):
+                message = f"share of an action contains the row {quoted(row)}"
+                raise SettingError(Diagnostic(message, f"the station has {last + 1} own detections"))
+            if row in rows[:index]:
+                raise SettingError(Diagnostic(f"share of an action contains the row {row} twice", "give each row once"))
+        return detections.subset(rows)
 
 
 OWN_DECISIONS = StationAction()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -66,8 +66,10 @@ def nearest_pair(view: WorldView, below: float) -> tuple[float, str, str] | None
     return found
 
 
-def min_time_to_collision(view: WorldView, name: str, limit: float) -> float:
+def min_time_to_collision(view: WorldView, name: str, limit: float, attached: Collection[str] = ()) -> float:
     """Return the smallest time until the box of an actor touches that of another [s]; infinite above the limit [s].
+
+    attached  actors that are ignored: the other bodies of the road train
 
     Velocities and headings are constant: the definition of the criterion `time_to_collision`.
     """
@@ -81,7 +83,7 @@ def min_time_to_collision(view: WorldView, name: str, limit: float) -> float:
             moving.velocity_y - state.velocity_y,
             moving.velocity_z - state.velocity_z,
         )
-        if row == own:
+        if row == own or (attached and view.names[row] in attached):
             continue
         # Circles around both boxes touch before the boxes.
         gap = math.hypot(other[0] - box[0], other[1] - box[1]) - _radius(box) - _radius(other)

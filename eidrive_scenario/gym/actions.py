@@ -15,7 +15,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.gym.action_settings import ActionSettings, MetaSpeed, Pedals, SendMessages, TargetSpeed
 from eidrive_scenario.gym.libraries import spaces
 from eidrive_scenario.gym.object_table import nearest_rows
-from eidrive_scenario.world.actor import ActorSpec, Control
+from eidrive_scenario.world.actor import Control
 
 _TOLERANCE = 1e-6
 """Excess over the bounds of a space that is accepted, for rounding."""
@@ -27,15 +27,19 @@ class ActionDecoder:
     Of several actions the space is a `Dict` by their kinds.
     """
 
-    def __init__(self, actions: Sequence[ActionSettings], spec: ActorSpec) -> None:
+    def __init__(self, actions: Sequence[ActionSettings]) -> None:
         self._actions = actions
-        self._spec = spec
+        self._max_steering = 0.0
         self._level = 0
         by_kind: dict[str, spaces.Space[Any]] = {action.kind: _space(action) for action in actions}
         self.space: spaces.Space[Any] = spaces.Dict(by_kind) if len(actions) > 1 else by_kind[actions[0].kind]
 
-    def reset(self, speed: float) -> None:
-        """Begin an episode at a speed [m/s]: relative speeds start from the nearest one."""
+    def reset(self, speed: float, max_steering: float) -> None:
+        """Begin an episode at a speed [m/s], with a maximum steering angle [rad].
+
+        Relative speeds start from the one that is nearest to the speed.
+        """
+        self._max_steering = max_steering
         for action in self._actions:
             if isinstance(action, MetaSpeed):
                 self._level = min(range(len(action.speeds)), key=lambda level: abs(action.speeds[level] - speed))
@@ -63,7 +67,7 @@ class ActionDecoder:
             return replace(decided, target_speed=(share + 1.0) / 2.0 * action.max_speed)
         if isinstance(action, Pedals):
             pedal, wheel = _numbers(given, 2)
-            steering = wheel * self._spec.max_steering
+            steering = wheel * self._max_steering
             return replace(decided, control=Control(max(pedal, 0.0), max(-pedal, 0.0), steering))
         if isinstance(action, MetaSpeed):
             last = len(action.speeds) - 1

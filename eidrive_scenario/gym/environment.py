@@ -87,8 +87,6 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
         self.close()
         drawn = int(self.np_random.integers(MAX_SEED))
         episode = self._episode = self._runs.start(drawn, options)
-        while self.station not in episode.perceived and episode.result is None:
-            episode.advance(lambda perceived: {})
         if self.station not in episode.perceived:
             raise SettingError(Diagnostic(f"station {self.station!r} never enters the world", "select another one"))
         self._interface.begin(episode)
@@ -127,7 +125,8 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
             if episode.result is not None or name not in episode.perceived:
                 break
         observation = interface.observe(episode)
-        while episode.result is None and name not in episode.perceived:
+        has_left = episode.result is None and name not in episode.perceived
+        while has_left and episode.result is None:
             episode.advance(lambda perceived: {})
         info: dict[str, Any] = {"time": episode.start.view.time}
         if episode.result is not None:
@@ -135,7 +134,7 @@ class EidriveEnv(gymnasium.Env[Any, Any]):
             info |= final_info(episode.result)
         info["reward_terms"] = summed = sum_terms(terms)
         ended = episode.result is not None
-        truncated = episode.is_truncated
+        truncated = episode.is_truncated and not has_left
         return observation, sum(summed.values()), ended and not truncated, truncated, info
 
     def render(self) -> Any:

@@ -79,6 +79,13 @@ class Episode:
         """Whether the run has ended by its time limit."""
         return self.result is not None and self.result.end_reason == TIME_LIMIT
 
+    def limit_time(self, duration: float) -> None:
+        """End the run after this duration from now on [s] at the latest."""
+        simulation = self.simulation
+        limit = min(simulation.settings.time_limit, self.start.view.time + duration)
+        simulation.settings = replace(simulation.settings, time_limit=limit)
+        simulation.resolved = replace(simulation.resolved, time_limit=limit)
+
     def close(self) -> None:
         """Free the world."""
         self.simulation.close()

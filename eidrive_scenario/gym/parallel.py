@@ -35,9 +35,9 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
 
     stations  controlled stations; None: all that drive
 
-    The other arguments are those of `EidriveEnv`, and apply to each station. An agent exists while its station is in
-    the world. All agents end with the run: at the first contact of any of them unless `terminate_on_collision` is off.
-    Pictures follow the first station.
+    The other arguments are those of `EidriveEnv`, and apply to each station. An agent exists from the entry of its
+    station until it leaves the world, and does not return. All agents end with the run: at the first contact of any of
+    them unless `terminate_on_collision` is off. Pictures follow the first station.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -74,6 +74,8 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         self._interfaces = self._runs.interfaces
         self.possible_agents = list(self._interfaces)
         self.agents: list[str] = []
+        self._left = set[str]()
+        """Stations that have left the world in this episode, and may have returned without an agent."""
         self.render_mode = render_mode
         self._renderer = build_renderer(render_mode, render, self.possible_agents[0])
         frame_rate = frames_per_second(self._runs.settings, ticks_per_step)
@@ -100,10 +102,9 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         if seed is not None:
             self._generator, _ = gymnasium.utils.seeding.np_random(seed)
         self.close()
+        self._left = set()
         known = {key: value for key, value in (options or {}).items() if key in OPTIONS}
         episode = self._episode = self._runs.start(int(self._generator.integers(MAX_SEED)), known)
-        while episode.result is None and not self._present(episode):
-            episode.advance(lambda perceived: {})
         self.agents = self._present(episode)
         if not self.agents:
             raise SettingError(Diagnostic("no controlled station enters the world", "select other stations"))
@@ -131,18 +132,20 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         acting, decided = list(self.agents), dict[str, StationAction]()
 
         def decide(perceived: Mapping[str, StationPerception]) -> Mapping[str, StationAction]:
-            for name in acting:
-                if name in perceived and (name not in decided or decided[name].share is not None):
+            live = [name for name in acting if name in perceived and name not in self._left]
+            for name in live:
+                if name not in decided or decided[name].share is not None:
                     decided[name] = self._interfaces[name].decode(actions[name], perceived[name])
-            return {name: action for name, action in decided.items() if name in perceived}
+            return {name: decided[name] for name in live}
 
         terms: dict[str, list[dict[str, float]]] = {name: [] for name in acting}
         for _ in range(self._runs.ticks_per_step):
-            live = [name for name in acting if name in episode.perceived]
+            live = [name for name in acting if name in self._present(episode)]
             routes = {name: self._interfaces[name].route(episode.perceived[name]) for name in live}
             transition = episode.advance(decide)
             for name in live:
                 terms[name].append(self._interfaces[name].reward_terms(transition, routes[name], episode))
+            self._left.update(name for name in acting if name not in episode.perceived)
             if episode.result is not None:
                 break
         return self._outcome(episode, acting, terms)
@@ -158,16 +161,17 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         outcome: Outcome = {}, {}, {}, {}, {}
         observations, rewards, ends, limits, infos = outcome
         for name in [*acting, *entering]:
+            interface, has_left = self._interfaces[name], name in self._left
             found = [*terms.get(name, ())]
             info: dict[str, Any] = {"time": episode.start.view.time}
             if result is not None:
-                found.append(self._interfaces[name].rewards.terms_of_end(result))
+                found.append(interface.rewards.terms_of_end(result))
                 info |= final_info(result)
             info["reward_terms"] = summed = sum_terms(found)
-            truncated = episode.is_truncated
-            terminated = not truncated and (result is not None or name not in present)
-            observations[name], rewards[name] = self._interfaces[name].observe(episode), sum(summed.values())
-            ends[name], limits[name], infos[name] = terminated, truncated, info
+            truncated = episode.is_truncated and not has_left
+            terminated = not truncated and (result is not None or has_left)
+            observations[name] = interface.encoder.zeros() if has_left else interface.observe(episode)
+            rewards[name], ends[name], limits[name], infos[name] = sum(summed.values()), terminated, truncated, info
         self.agents = present
         return outcome
 
@@ -193,7 +197,8 @@ class EidriveParallelEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         return self._renderer.picture()
 
     def _present(self, episode: Episode) -> list[str]:
-        return [name for name in self.possible_agents if name in episode.perceived]
+        """Return the agents of the current tick."""
+        return [name for name in self.possible_agents if name in episode.perceived and name not in self._left]
 
     def close(self) -> None:
         """Free the world of the running episode."""

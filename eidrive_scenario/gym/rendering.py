@@ -14,6 +14,7 @@ from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world.view import WorldView
 
 
 class Renderer:
@@ -28,13 +29,20 @@ class Renderer:
         self._center = 0.0, 0.0
 
     def begin(self, episode: Episode) -> None:
-        """Begin an episode at its current instant, and observe its ticks."""
+        """Begin an episode at its current instant, and observe its ticks.
+
+        Until the station enters the world, the pictures show the place of the first station that is present.
+        """
         simulation = episode.simulation
         known = getattr(simulation.stack, "settings", {})
         self._builder = SnapshotBuilder(self._station, known.get(self._station, DEFAULT_SETTINGS))
         if simulation.roads is not self._roads[0]:
             self._roads = simulation.roads, network_drawing(simulation.roads)
         episode.observers.append(self._observe)
+        view = episode.start.view
+        first = next((name for name in episode.perceived if name in view), None)
+        if first is not None:
+            self._set_center(view, first)
         self._observe(episode)
 
     def _observe(self, episode: Episode) -> None:
@@ -53,8 +61,11 @@ class Renderer:
             )
         self._snapshot = self._builder.observe(Frame(view, steps, links=() if last is None else last.links))
         if self._station in view:
-            x, y, _ = view.centers[view.row(self._station)].tolist()
-            self._center = x, y
+            self._set_center(view, self._station)
+
+    def _set_center(self, view: WorldView, name: str) -> None:
+        x, y, _ = view.centers[view.row(name)].tolist()
+        self._center = x, y
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the picture (height, width, 3) in the order red, green, blue."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Annotated
 
 from pydantic import Field
@@ -55,12 +56,18 @@ class Rewards:
         return self.settings.progress != 0.0
 
     def terms_of_tick(
-        self, before: WorldView, after: WorldView, step: AgentStep | None, route: Array
+        self,
+        before: WorldView,
+        after: WorldView,
+        step: AgentStep | None,
+        route: Array,
+        attached: Collection[str] = (),
     ) -> dict[str, float]:
         """Return the terms of one tick. The views are the ground truth before and after it.
 
-        step   step of the station in this tick
-        route  points (M, 2) of the route from the point at the vehicle on, before the tick [m]
+        step      step of the station in this tick
+        route     points (M, 2) of the route from the point at the vehicle on, before the tick [m]
+        attached  trailers of the station, which are no other actors for the time to collision
         """
         name, weight = self._station, self.settings
         terms = dict.fromkeys(("progress", "collision", "comfort", "time_to_collision", "communication", "time"), 0.0)
@@ -78,7 +85,7 @@ class Rewards:
         felt = now.acceleration_x**2 + now.acceleration_y**2
         terms["comfort"] = weight.comfort * felt * duration
         if weight.time_to_collision:
-            left = min_time_to_collision(after, name, weight.ttc_limit)
+            left = min_time_to_collision(after, name, weight.ttc_limit, attached)
             terms["time_to_collision"] = weight.time_to_collision * max(0.0, 1.0 - left / weight.ttc_limit) * duration
         if step is not None:
             terms["communication"] = weight.communication * sum(message.size for message in step.outbox) / 1000.0

@@ -41,8 +41,10 @@ class Runs:
         terminate_on_collision: bool,
     ) -> None:
         self._source = source if isinstance(source, Scenario | ConcreteRun) else load_scenario(source)
-        self.settings = _with_steps(settings or RunSettings(), max_steps, ticks_per_step)
+        _check_steps(max_steps, ticks_per_step)
+        self.settings = settings or RunSettings()
         self.ticks_per_step = ticks_per_step
+        self._duration = None if max_steps is None else max_steps * ticks_per_step * self.settings.dt
         with Simulation(self._source, settings=self.settings, load_weights=False) as simulation:
             known, drivers = tuple(simulation.stack.controllable), tuple(simulation.stack.possible_drivers)
             names = _stations(stations, known, drivers, single=single)
@@ -52,11 +54,11 @@ class Runs:
         self._episode(DEFAULT_SEED, self.settings, load_weights=False).close()
 
     def start(self, drawn_seed: int, options: Mapping[str, Any] | None) -> Episode:
-        """Return an episode at its first tick.
+        """Return an episode at the first tick in which a controlled station is present, or that has ended.
 
         drawn_seed  seed of the run, unless the options contain one
 
-        Raise SettingError for unknown options.
+        The steps are counted from that tick on. Raise SettingError for unknown options.
         """
         given = options or {}
         unknown = next((key for key in given if key not in OPTIONS), None)
@@ -70,6 +72,10 @@ class Runs:
         episode = self._episode(given.get("seed", drawn_seed), settings)
         try:
             episode.begin()
+            while episode.result is None and not any(name in episode.perceived for name in self.interfaces):
+                episode.advance(lambda perceived: {})
+            if self._duration is not None and episode.result is None:
+                episode.limit_time(self._duration)
         except BaseException:
             episode.close()
             raise
@@ -86,14 +92,11 @@ class Runs:
         )
 
 
-def _with_steps(settings: RunSettings, max_steps: int | None, ticks_per_step: int) -> RunSettings:
-    """Return settings whose time limit is at most that of the steps."""
+def _check_steps(max_steps: int | None, ticks_per_step: int) -> None:
+    """Raise SettingError unless both are positive integers."""
     for name, value in (("max_steps", max_steps), ("ticks_per_step", ticks_per_step)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
             raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a positive integer"))
-    if max_steps is None:
-        return settings
-    return replace(settings, time_limit=min(settings.time_limit, max_steps * ticks_per_step * settings.dt))
 
 
 def _stations(

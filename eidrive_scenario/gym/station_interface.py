@@ -77,11 +77,11 @@ class StationInterface:
         if driving and not drives:
             message = f"action {driving[0]!r} drives, and the station {name!r} does not"
             raise SettingError(Diagnostic(message, "give the action send or share"))
-        scenario = simulation.scenario
-        self.spec: ActorSpec = actor_spec(name, scenario.entities[name])
+        self.spec: ActorSpec = actor_spec(name, simulation.scenario.entities[name])
+        """Body of the station, which the parameters of an episode may select."""
         senders = [station for station in simulation.stack.controllable if station != name]
         self.encoder = ObservationEncoder(settings.observation, senders)
-        self.decoder = ActionDecoder(self.actions, self.spec)
+        self.decoder = ActionDecoder(self.actions)
         self.rewards = Rewards(settings.reward, name)
         self._needs_route = drives and (self.encoder.needs_route or self.rewards.needs_route)
         self._planner: RoutePlanner | None = None
@@ -97,16 +97,17 @@ class StationInterface:
     def begin(self, episode: Episode) -> None:
         """Begin an episode in which the station is present."""
         self.encoder.reset()
-        perceived = episode.perceived[self.name]
+        simulation, perceived = episode.simulation, episode.perceived[self.name]
+        self.spec = actor_spec(self.name, simulation.scenario.entities[self.name])
         self._control, self._planner, self._route = None, None, (-1.0, NO_ROUTE)
         if self._needs_route:
-            simulation = episode.simulation
             own: AgentSettings = simulation.stack.settings[self.name]  # type: ignore[attr-defined]
             own = own.model_copy(update={"obey_signals": False})
             dt, seed = simulation.settings.dt, simulation.seed
             self._planner = RoutePlanner(own, self.spec, simulation.roads, dt=dt, seed=seed)
         requested = None if perceived.goal is None else perceived.goal.speed
-        self.decoder.reset(perceived.ego.speed if requested is None else requested)
+        speed = perceived.ego.speed if requested is None else requested
+        self.decoder.reset(speed, self.spec.max_steering)
         self.encoder.receive(perceived)
 
     def decode(self, action: Any, perceived: StationPerception) -> StationAction:
@@ -131,7 +132,8 @@ class StationInterface:
         perceived = episode.perceived.get(self.name)
         if perceived is not None and transition.after is not transition.before:
             self.encoder.receive(perceived)
-        return self.rewards.terms_of_tick(transition.before, transition.after, step, route)
+        attached = episode.simulation.world.attached(self.name)
+        return self.rewards.terms_of_tick(transition.before, transition.after, step, route, attached)
 
     def route(self, perceived: StationPerception) -> Array:
         """Return the points (M, 2) of the route in the world frame [m]; the first segment is that at the vehicle."""

@@ -18,7 +18,13 @@ from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.requested_routes import RequestedRoutes
-from eidrive_scenario.storyboard.kinematics.trailers import check_acyclic, declared_trailer, pairs, pose_behind
+from eidrive_scenario.storyboard.kinematics.trailers import (
+    check_acyclic,
+    declared_trailer,
+    next_displacement,
+    pairs,
+    pose_behind,
+)
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
@@ -132,7 +138,9 @@ class Storyboard:
         _check_placements(commands.placements)
         for front, back in towed_pairs:
             if front.present and back.present:
-                back.motion.set_towed_state(pose_behind(front, back, straight=front.motion.teleported), front.motion)
+                displacement = next_displacement(front, view, self.dt)
+                pose = pose_behind(front, back, displacement, straight=front.motion.teleported)
+                back.motion.set_towed_state(pose, front.motion)
                 commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.teleported)
         if self.context.traffic.started:
             appearances = self.context.appearances.items()

@@ -71,6 +71,19 @@ def test_driven_vehicle_does_not_perceive_its_trailer(run: Run) -> None:
     assert counts[13:] == [0] * len(counts[13:]) != []
 
 
+@pytest.mark.element("ConnectTrailerAction")
+def test_trailer_of_driven_vehicle_keeps_its_distance(run: Run) -> None:
+    """The physics moves the truck by up to 0.4 m in a step; a change of its acceleration moves it by millimeters."""
+    stack = """<ObjectController><Controller name="Stack"><Properties><Property name="module" value="eidrive"/>
+      <Property name="planner" value="route"/><Property name="target_speed" value="8"/></Properties></Controller>
+      </ObjectController>"""
+    driven = TRAIN.replace("</Vehicle></ScenarioObject>", f"</Vehicle>{stack}</ScenarioObject>", 1)
+    played = play(run, 6, ("Truck", COUPLE), train=driven)
+    assert max(played.of("Truck", "speed")) > 6.0
+    apart = [front - back for front, back in zip(played.x("Truck"), played.x("Trailer"), strict=True)]
+    assert apart == pytest.approx([4.0] * len(apart), abs=0.01)
+
+
 def test_unconnected_trailer_does_not_move(run: Run) -> None:
     played = play(run, 2, ("Truck", DRIVE))
     assert played.x("Trailer") == [196.0] * len(played.frames)

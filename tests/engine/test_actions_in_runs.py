@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from lone_car import lone_car
+from written_recording import detected
 
 from eidrive_scenario.driving.stack import EmptyStack
 from eidrive_scenario.driving.station_action import StationAction
@@ -136,5 +137,9 @@ def test_actions_that_no_station_can_execute_are_errors() -> None:
         simulation.set_action("RSU", StationAction(share=(99,)))
         with pytest.raises(SettingError, match="share of an action contains the row 99"):
             simulation.tick()
+    objects = detected(0.0, [(5.0, 0.0, 0.75, 4.0, 2.0, 1.5, 0.0)])
+    for share, problem in (((0, 0), "row 0 twice"), ((0.5,), "row 0.5")):
+        with pytest.raises(SettingError, match=f"share of an action contains the {problem}"):
+            StationAction(share=share).shared(objects)  # type: ignore[arg-type]
     with Simulation(ONE, stack=EmptyStack) as empty, pytest.raises(SettingError, match="has no station"):
         empty.set_action("Ego", StationAction())

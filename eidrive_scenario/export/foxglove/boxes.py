@@ -84,21 +84,30 @@ def add_text(entity: Any, text: str, position: tuple[float, float, float], size:
 
 
 def box_scene(foxglove: Foxglove, lists: Iterable[tuple[str, Detections]], color: Color, time: float) -> Any:
-    """Return a scene of perceived boxes with class and confidence, one entity per list and its name."""
+    """Return a scene of perceived boxes with class and confidence, one entity per name with all its lists."""
     update = foxglove.scene()
     deletion = update.deletions.add(type=foxglove.deletion.ALL)
     set_stamp(deletion.timestamp, time)
+    by_name: dict[str, list[Detections]] = {}
     for name, objects in lists:
+        by_name.setdefault(name, []).append(objects)
+    for name, all_objects in by_name.items():
         entity = add_entity(update, name, time)
-        rows = zip(objects.boxes.tolist(), objects.classes, objects.confidence.tolist(), strict=True)
-        for (x, y, z, length, width, height, yaw), category, confidence in rows:
-            if not np.isfinite([x, y, z, length, width, height, yaw]).all():
-                continue
-            cube = entity.cubes.add()
-            set_vector(cube.pose.position, (x, y, z))
-            set_rotation(cube.pose.orientation, yaw)
-            set_vector(cube.size, (length, width, height))
-            set_color(cube.color, color)
-            add_text(entity, f"{category} {confidence:.2f}", (x, y, z + 0.5 * height + 0.3), 0.5)
-        entity.metadata.add(key="objects", value=str(len(objects)))
+        for objects in all_objects:
+            _add_boxes(entity, objects, color)
+        entity.metadata.add(key="objects", value=str(sum(map(len, all_objects))))
     return update
+
+
+def _add_boxes(entity: Any, objects: Detections, color: Color) -> None:
+    """Add the boxes that are finite."""
+    rows = zip(objects.boxes.tolist(), objects.classes, objects.confidence.tolist(), strict=True)
+    for (x, y, z, length, width, height, yaw), category, confidence in rows:
+        if not np.isfinite([x, y, z, length, width, height, yaw]).all():
+            continue
+        cube = entity.cubes.add()
+        set_vector(cube.pose.position, (x, y, z))
+        set_rotation(cube.pose.orientation, yaw)
+        set_vector(cube.size, (length, width, height))
+        set_color(cube.color, color)
+        add_text(entity, f"{category} {confidence:.2f}", (x, y, z + 0.5 * height + 0.3), 0.5)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.export.foxglove.boxes import add_entity
 from eidrive_scenario.export.foxglove.schemas import Color, Foxglove, set_color, set_rotation, set_stamp
@@ -23,7 +24,7 @@ _EDGE: Color = (0.45, 0.45, 0.45, 1.0)
 _DRIVES: Color = (0.2, 0.85, 0.35, 1.0)
 _BRAKES: Color = (0.95, 0.25, 0.2, 1.0)
 _ABOVE = 0.3
-"""Height of a planned path above the reference point of its vehicle [m]."""
+"""Height of a planned path above the road [m]."""
 _THICKNESS = 0.15
 """Thickness of lines [m]."""
 
@@ -44,10 +45,10 @@ def map_scene(foxglove: Foxglove, roads: RoadNetwork, time: float) -> Any:
     return update
 
 
-def plan_scene(foxglove: Foxglove, plan: Plan | None, height: float, time: float) -> Any:
+def plan_scene(foxglove: Foxglove, plan: Plan | None, roads: RoadNetwork | None, height: float, time: float) -> Any:
     """Return a scene with the path of a plan, green, or red if it brakes; without a plan the path is deleted.
 
-    height  of the reference point of the vehicle, on which the path lies [m]
+    height  of the reference point of the vehicle [m], on which the path lies where there is no road
     """
     update = foxglove.scene()
     if plan is None or len(plan.points) < 2:
@@ -55,12 +56,26 @@ def plan_scene(foxglove: Foxglove, plan: Plan | None, height: float, time: float
         set_stamp(deletion.timestamp, time)
         return update
     entity = add_entity(update, "plan", time)
-    points = np.column_stack([plan.points[:, :2], np.full(len(plan.points), height + _ABOVE)])
+    points = np.column_stack([plan.points[:, :2], _surface_heights(roads, plan.points, height) + _ABOVE])
     _add_line(foxglove, entity, points.tolist(), _DRIVES if plan.braking is None else _BRAKES)
     braking = "" if plan.braking is None else f"{plan.braking:.2f} m/s²"
     for key, value in (("reason", plan.reason), ("braking", braking), ("speed", f"{plan.speeds[0]:.2f} m/s")):
         entity.metadata.add(key=key, value=value)
     return update
+
+
+def _surface_heights(roads: RoadNetwork | None, points: Array, height: float) -> Array:
+    """Return the heights (N,) of the roads below points (N, 2); `height` where there is none [m]."""
+    heights = np.full(len(points), height)
+    if roads is None or roads.is_level:
+        return heights
+    found = roads.locate(points[:, 0], points[:, 1], heights)
+    for road in np.unique(found.road[found.found]):
+        rows = (found.found & (found.road == road)).nonzero()[0]
+        place = found.location(int(rows[0]))
+        if place is not None:
+            heights[rows] = roads.road_pose(place.road, found.s[rows], found.t[rows]).z
+    return heights
 
 
 def link_scene(foxglove: Foxglove, frame: Frame) -> Any:
@@ -70,7 +85,7 @@ def link_scene(foxglove: Foxglove, frame: Frame) -> Any:
     for event in frame.links:
         if event.sender == event.receiver or event.sender not in view or event.receiver not in view:
             continue
-        entity = add_entity(update, f"{event.sender} to {event.receiver}", view.time)
+        entity = add_entity(update, f"{event.sender} to {event.receiver}, message {event.number}", view.time)
         entity.lifetime.FromMilliseconds(round(LINK_LIFETIME * 1000))
         ends = view.centers[[view.row(event.sender), view.row(event.receiver)]] + (0.0, 0.0, 1.0)
         _add_line(foxglove, entity, ends.tolist(), _DRIVES if event.outcome == "delivered" else _BRAKES)

@@ -58,6 +58,8 @@ class Topics:
         self._actors = ActorScene(foxglove)
         self._images = CameraImages(run.recording.path, run.warnings)
         self._snapshots: dict[str, SnapshotBuilder] = {}
+        self._shown: dict[str, None] = {}
+        """Topics of the scenes of stations in the last frame."""
         self._has_reference = run.roads is not None and bool(run.roads.header.geo_reference)
         self._begun = False
         self._time = 0.0
@@ -75,11 +77,7 @@ class Topics:
             yield Entry(f"/metrics/actors/{escaped(name)}", actor_numbers(frame.view, row))
         for name in frame.steps:
             self._snapshots.setdefault(name, SnapshotBuilder(name))
-        for name, builder in self._snapshots.items():
-            snapshot = builder.observe(frame)
-            if name in frame.steps:
-                lists = [(one.message.sender, one.message.detections) for one in snapshot.received]
-                yield from self._of_station(frame, name, frame.steps[name], lists)
+        yield from self._of_stations(frame)
         if frame.links:
             yield Entry("/messages", link_scene(self._foxglove, frame))
         for message in self._log.of_frame(frame):
@@ -93,6 +91,21 @@ class Topics:
         for message in self._log.at_end(self._time):
             yield Entry("/log", message)
 
+    def _of_stations(self, frame: Frame) -> Iterator[Entry]:
+        """Yield the messages of the stations. Scenes of those that have left, or drive no longer, are deleted."""
+        former, self._shown = self._shown, {}
+        for name, builder in self._snapshots.items():
+            snapshot = builder.observe(frame)
+            if name in frame.steps:
+                lists = [(one.message.sender, one.message.detections) for one in snapshot.received]
+                for entry in self._of_station(frame, name, frame.steps[name], lists):
+                    if isinstance(entry.message, self._foxglove.scene):
+                        self._shown[entry.topic] = None
+                    yield entry
+        for topic in former:
+            if topic not in self._shown:
+                yield Entry(topic, box_scene(self._foxglove, (), _OWN, frame.view.time))
+
     def _of_station(
         self, frame: Frame, name: str, step: AgentStep, received: list[tuple[str, Detections]]
     ) -> Iterator[Entry]:
@@ -105,7 +118,7 @@ class Topics:
             yield Entry(f"{base}/{part}", box_scene(self._foxglove, lists, color, time))
         if step.control is not None:
             height = float(frame.view.position[frame.view.row(name), 2]) if name in frame.view else 0.0
-            yield Entry(f"{base}/plan", plan_scene(self._foxglove, step.plan, height, time))
+            yield Entry(f"{base}/plan", plan_scene(self._foxglove, step.plan, self._run.roads, height, time))
         yield Entry(f"/metrics/stations/{escaped(name)}", station_numbers(step))
         for message in step.outbox:
             if message.points is not None:

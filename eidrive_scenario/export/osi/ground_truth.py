@@ -10,6 +10,7 @@ from eidrive_scenario.export.osi.lanes import LaneMap
 from eidrive_scenario.export.osi.moving_objects import ACTOR, VEHICLES, add_moving_objects
 from eidrive_scenario.export.osi.schemas import Osi
 from eidrive_scenario.export.osi.traffic_lights import TrafficLights
+from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.roads import RoadNetwork
@@ -18,21 +19,23 @@ _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
 
 
 class GroundTruthBuilder:
-    """Builder of the messages of one run. The first message contains the lanes and boundaries of the map."""
+    """Builder of the messages of one run. The first message contains the lanes and boundaries of the map.
 
-    def __init__(self, osi: Osi, roads: RoadNetwork | None, ids: Identifiers) -> None:
+    host  name of the host vehicle, or None
+    """
+
+    def __init__(self, osi: Osi, roads: RoadNetwork | None, ids: Identifiers, host: str | None) -> None:
         self._osi = osi
         self._roads = roads
         self._ids = ids
         self._lanes = LaneMap(osi, roads, ids)
         self._lights = TrafficLights(osi, roads, ids)
-        self._host: str | None = None
+        self._host = host
         self._has_map = False
 
     def build(self, frame: Frame) -> Any:
         """Return the message of the next frame."""
         message = self._osi.begin(self._osi.ground_truth(), frame.view.time)
-        self._host = self._host or host_vehicle(frame)
         if self._host is not None:
             message.host_vehicle_id.value = self._ids.of(ACTOR, self._host)
         if self._roads is not None:
@@ -57,10 +60,19 @@ class GroundTruthBuilder:
             offset.position.x, offset.position.y, offset.position.z, offset.yaw = x, y, z, turn
 
 
-def host_vehicle(frame: Frame) -> str | None:
-    """Return the host vehicle: the first station that drives, else an actor named as an ego, else the first vehicle."""
-    view = frame.view
-    driven = [name for name, step in frame.steps.items() if step.control is not None and name in view]
-    egos = [name for name in view.names if name.lower() in _EGOS]
-    vehicles = [name for name, category in zip(view.names, view.categories, strict=True) if category in VEHICLES]
-    return next(iter([*driven, *egos, *vehicles]), None)
+def host_vehicle(run: RecordedRun) -> str | None:
+    """Return the host vehicle of a run, which may enter the world later.
+
+    It is the first station that drives, else an actor named as an ego, else the first vehicle. The frames are read
+    until a station drives.
+    """
+    ego = vehicle = None
+    for frame in run.frames():
+        view = frame.view
+        driven = next((name for name, step in frame.steps.items() if step.control is not None and name in view), None)
+        if driven is not None:
+            return driven
+        ego = ego or next((name for name in view.names if name.lower() in _EGOS), None)
+        vehicles = (name for name, category in zip(view.names, view.categories, strict=True) if category in VEHICLES)
+        vehicle = vehicle or next(vehicles, None)
+    return ego or vehicle

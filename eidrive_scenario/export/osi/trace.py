@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from urllib.parse import quote
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
+from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder, host_vehicle
 from eidrive_scenario.export.osi.identifiers import Identifiers
 from eidrive_scenario.export.osi.schemas import Osi, nanoseconds
 from eidrive_scenario.export.osi.sensor_data import SensorDataBuilder
@@ -58,7 +58,7 @@ def check_osi() -> None:
 
 
 def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
-    builder = GroundTruthBuilder(osi, run.roads, Identifiers())
+    builder = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run))
     for frame in run.frames():
         for data in run.converted(frame, lambda one: [builder.build(one).SerializeToString()]):
             stream.write(struct.pack("<I", len(data)) + data)
@@ -129,7 +129,7 @@ class _Traces:
     def __init__(self, osi: Osi, run: RecordedRun) -> None:
         self._osi = osi
         self._sensors = Identifiers(_FIRST_SENSOR)
-        self._truth = GroundTruthBuilder(osi, run.roads, Identifiers())
+        self._truth = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run))
         self._title = run.title
         self._stations: dict[tuple[str, str], SensorDataBuilder] = {}
 

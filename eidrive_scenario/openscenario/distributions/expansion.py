@@ -10,7 +10,7 @@ from typing import overload
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestion
 from eidrive_scenario.files.bounded import is_folder, is_regular_file
-from eidrive_scenario.library import resolve_path
+from eidrive_scenario.library import from_library, resolve_path
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.concrete_run import ConcreteRun
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
@@ -81,12 +81,15 @@ class DistributionExpansion(Sequence[ConcreteRun]):
 def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansion:
     """Read a parameter value distribution.
 
-    seed  seed of the draws if a stochastic distribution has no randomSeed
+    source  path, library name, or any other source of `load_scenario`
+    seed    seed of the draws if a stochastic distribution has no randomSeed
 
     The path of the scenario is relative to the folder of the distribution. A missing scenario is an error for a
     distribution from a file, and a warning otherwise, as in Python. The scenario itself is not read: its parameters
     and their constraints are checked when a run is loaded. Raise ScenarioError with all errors of the file.
     """
+    if isinstance(source, str | Path):
+        source = from_library(source)
     document = open_document(source)
     collector = DiagnosticCollector()
     read = read_root(document, collector)

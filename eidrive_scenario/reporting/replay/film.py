@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from subprocess import PIPE, Popen
@@ -21,10 +21,13 @@ from eidrive_scenario.reporting.drawing.snapshot_picture import snapshot_picture
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 from eidrive_scenario.reporting.replay.frame_data import UNDRAWABLE, describe_error
 from eidrive_scenario.reporting.replay.page import readable_roads, run_settings, station_settings
-from eidrive_scenario.reporting.replay.series import SeriesBuilder, closest_approach
+from eidrive_scenario.reporting.replay.page_values import decisive_instant
+from eidrive_scenario.reporting.replay.series import SeriesBuilder
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.world.view import WorldView
 
 FILM_SIZE, GIF_SIZE = (1280, 720), (640, 360)
 """Width and height of films and GIF files [pixels]."""
@@ -42,12 +45,10 @@ class RecordedStation:
     Without stations, the snapshots contain the ground truth, and the view follows the first actor. Raise InputError if
     the recording contains no readable frame, SettingError if it has no such station or actor.
 
-    metrics  of the result of the run, which determine the decisive instant
+    result  of the run, which determines the decisive instant
     """
 
-    def __init__(
-        self, recording: Recording, name: str | None = None, *, metrics: Mapping[str, float | None] | None = None
-    ) -> None:
+    def __init__(self, recording: Recording, name: str | None = None, *, result: ReportedRun | None = None) -> None:
         report = DamageReport()
         for line in recording.damage:
             report.add(line)
@@ -59,11 +60,11 @@ class RecordedStation:
         """Times of the frames [s]."""
         driven: dict[str, None] = {}
         stations: dict[str, None] = {}
-        actors: dict[str, None] = {}
+        actors: dict[str, tuple[float, float]] = {}
         for frame in recording.frames(lambda reason: report.add("frames cannot be decoded", shorten(reason, 200))):
             if math.isfinite(frame.view.time):
                 self.times.append(frame.view.time)
-            actors.update(dict.fromkeys(frame.view.names))
+            _add_entries(actors, frame.view)
             stations.update(dict.fromkeys(frame.steps))
             driven.update(dict.fromkeys(key for key, step in frame.steps.items() if step.control is not None))
             try:
@@ -77,7 +78,8 @@ class RecordedStation:
             known = ", ".join([*stations, *(actor for actor in actors if actor not in stations)][:12])
             raise SettingError(Diagnostic(f"--station: the run has no actor {name!r}", f"known: {known}"))
         self.name = name or next(iter([*driven, *stations, *actors]))
-        decisive = series.contact or closest_approach(metrics or {}) or series.decisive
+        self._entry = actors.get(self.name, (0.0, 0.0))
+        decisive = decisive_instant({"contact": series.contact, "decisive": series.decisive}, result)
         self.decisive: float = decisive["time"] if decisive is not None else self.times[0]
         """Decisive instant [s]."""
         self.damage = report.lines()
@@ -120,8 +122,8 @@ class RecordedStation:
                     shown = wanted
 
     def _centered(self) -> Iterator[tuple[StationSnapshot, tuple[float, float]]]:
-        """Yield the snapshots at finite times, with the last position of the station [m]."""
-        center = (0.0, 0.0)
+        """Yield the snapshots at finite times, with the last or else the first position of the station [m]."""
+        center = self._entry
         for snapshot in self.snapshots():
             if not math.isfinite(snapshot.time):
                 continue
@@ -136,6 +138,14 @@ class RecordedStation:
             return snapshot_picture(snapshot, self.roads, center, size=size)
         except UNDRAWABLE:
             return None
+
+
+def _add_entries(actors: dict[str, tuple[float, float]], view: WorldView) -> None:
+    """Add the actors that enter the world in this view, with their positions [m]."""
+    for name in view.names:
+        if name not in actors:
+            x, y = view.centers[view.row(name), :2].tolist()
+            actors[name] = (x, y) if math.isfinite(x + y) else (0.0, 0.0)
 
 
 def write_png(station: RecordedStation, path: Path, time: float | None = None) -> None:

@@ -81,8 +81,11 @@ def page_values(
 def decisive_instant(data: Data, result: ReportedRun | None) -> dict[str, Any] | None:
     """Return the decisive instant of a run: its first contact, the smallest distance that a criterion measured, or the
     smallest gap of a driven vehicle; None without any of them."""
-    approach = closest_approach(result.metrics) if result is not None and data["contact"] is None else None
-    found: dict[str, Any] | None = approach or data["decisive"]
+    if result is not None and data["contact"] is None:
+        approach = closest_approach(result.metrics, [verdict.value for verdict in result.criteria])
+        if approach is not None:
+            return approach
+    found: dict[str, Any] | None = data["decisive"]
     return found
 
 

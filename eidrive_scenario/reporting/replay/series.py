@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -120,19 +120,27 @@ class SeriesBuilder:
             self._least = gap, time, pair
 
 
-def closest_approach(metrics: Mapping[str, float | None]) -> Values | None:
-    """Return the instant of the smallest distance between centers that a criterion `min_distance` measured, or None."""
+def closest_approach(metrics: Mapping[str, float | None], values: Sequence[float | None]) -> Values | None:
+    """Return the instant of the smallest distance that a criterion `min_distance` measured, or None.
+
+    values  those of the verdicts of the run: a criterion measures either the distance of the centers or that of the
+            bodies, and the time among its metrics is that of the measured one
+    """
     found = []
     for name, time in metrics.items():
         if name.startswith("min_distance.") and name.endswith(".time") and time is not None and math.isfinite(time):
             pair = name.removeprefix("min_distance.").removesuffix(".time")
-            distance = metrics.get(f"min_distance.{pair}.center")
-            if distance is not None and math.isfinite(distance):
-                found.append((distance, time, pair.replace(".", " and ")))
+            center, box = (metrics.get(f"min_distance.{pair}.{measure}") for measure in ("center", "box"))
+            # Of two criteria for one pair, the metrics contain the time of the last one
+            both = [value for value in values if value is not None and value in (center, box)]
+            measured = both[-1] if both else center
+            if measured is not None and math.isfinite(measured):
+                ends = "centers" if measured == center else "bodies"
+                found.append((measured, time, pair.replace(".", " and "), ends))
     if not found:
         return None
-    distance, time, pair = min(found)
-    return {"time": round(time, 4), "text": f"closest approach of {pair}: {distance:.2f} m between centers"}
+    distance, time, pair, ends = min(found)
+    return {"time": round(time, 4), "text": f"closest approach of {pair}: {distance:.2f} m between {ends}"}
 
 
 def _rounded(value: float, digits: int) -> float | None:

@@ -4,15 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.kinematics.actor import Actor
+from eidrive_scenario.world.view import WorldView
 
 AT_PLACE = 0.5
 """Maximum distance between a vehicle and its lane location if it follows the road [m]."""
+
+
+class Displacement(NamedTuple):
+    """Displacement in the horizontal plane [m] and change of heading [rad]."""
+
+    x: float
+    y: float
+    heading: float
+
+
+NO_DISPLACEMENT = Displacement(0.0, 0.0, 0.0)
 
 
 def declared_trailer(entity: model.Element) -> str | None:
@@ -57,8 +70,25 @@ def check_acyclic(actors: Mapping[str, Actor]) -> None:
         raise ScenarioError(diagnostics)
 
 
-def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:
-    """Return the pose of a trailer behind its towing vehicle.
+def next_displacement(front: Actor, view: WorldView, dt: float) -> Displacement:
+    """Return the displacement of a driven vehicle until the next view, at constant acceleration and yaw rate.
+
+    The physics moves it after the placement of its trailer. Other actors have their next poses already.
+    """
+    if not front.driven or front.motion.teleported or front.name not in view:
+        return NO_DISPLACEMENT
+    state, half = view.states[view.row(front.name)], 0.5 * dt * dt
+    return Displacement(
+        state.velocity_x * dt + state.acceleration_x * half,
+        state.velocity_y * dt + state.acceleration_y * half,
+        state.yaw_rate * dt,
+    )
+
+
+def pose_behind(
+    front: Actor, back: Actor, displacement: Displacement = NO_DISPLACEMENT, *, straight: bool = False
+) -> Pose:
+    """Return the pose of a trailer behind its towing vehicle after a displacement of the vehicle.
 
     The coupler is at the hitch. The axle of the trailer follows the hitch as in a single-track model without slip: it
     is at the reference point, with several axles at the end of `bar`. `straight` aligns the trailer with the vehicle.
@@ -66,13 +96,15 @@ def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:
     """
     pose = front.motion.pose
     hitch, reach = _hitch(front), _coupler(back)
-    x, y = pose.x + hitch * math.cos(pose.h), pose.y + hitch * math.sin(pose.h)
+    dx, dy, turn = displacement
+    direction = pose.h + turn
+    x, y = pose.x + dx + hitch * math.cos(direction), pose.y + dy + hitch * math.sin(direction)
     before = back.motion.pose
     axle_offset = bar(back.entity, reach) - reach
     axle_x, axle_y = before.x, before.y
     if axle_offset:
         axle_x, axle_y = before.x - axle_offset * math.cos(before.h), before.y - axle_offset * math.sin(before.h)
-    heading = pose.h if straight else math.atan2(y - axle_y, x - axle_x)
+    heading = direction if straight else math.atan2(y - axle_y, x - axle_x)
     x, y = x - reach * math.cos(heading), y - reach * math.sin(heading)
     if pose.p == pose.r == 0.0 and before.p == before.r == 0.0:
         return Pose(x, y, pose.z, heading, 0.0, 0.0)

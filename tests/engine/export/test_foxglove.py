@@ -5,19 +5,16 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
+from foxglove_topics import Topics, decoded, exported, point
 from msgspec.structs import replace
 from pyproj import Transformer
 from scipy.spatial.transform import Rotation
-from written_recording import Body, detected, step, view, write_run
+from written_recording import detected, step, view, write_run
 
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import InputError, SettingError
@@ -27,42 +24,12 @@ from eidrive_scenario.export.recorded_run import open_run
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.camera_images import camera_file, image_file
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings
-from eidrive_scenario.v2x.messages.message import LinkEvent, Message, StationState
+from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.messages.point_cloud import compress
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
-
-Topics = Mapping[str, list[Any]]
-
-
-def decoded(path: Path) -> tuple[Topics, dict[str, str]]:
-    """Return the messages and the schema of each topic. JSON messages are decoded as such."""
-    topics: dict[str, list[Any]] = {}
-    schemas: dict[str, str] = {}
-    with path.open("rb") as stream:
-        for schema, channel, message in make_reader(stream).iter_messages():
-            assert schema is not None
-            schemas[channel.topic] = schema.name
-            if channel.message_encoding == "json":
-                value = json.loads(message.data)
-            else:
-                decode = DecoderFactory().decoder_for(channel.message_encoding, schema)
-                assert decode is not None
-                value = decode(message.data)
-            topics.setdefault(channel.topic, []).append(value)
-    return topics, schemas
-
-
-def exported(folder: Path, *frames: Frame, road: Path | None = None) -> Topics:
-    write_foxglove(write_run(folder, frames, road=road), folder / "f.mcap")
-    return decoded(folder / "f.mcap")[0]
-
-
-def point(found: Any) -> list[float]:
-    return [found.x, found.y, found.z]
 
 
 @pytest.fixture(scope="module")
@@ -149,31 +116,6 @@ def test_metrics_are_numbers_for_plots(scenario_1: tuple[list[Frame], Topics, di
     assert counts == [len(frame.steps["Ego"].fused) for frame in frames]
 
 
-def test_map_lines_lie_on_lane_edges(tmp_path: Path) -> None:
-    road = ROADS / "coop_1.xodr"
-    (scene,) = exported(tmp_path, Frame(view({"A": {}})), road=road)["/map"]
-    network = RoadNetwork.load(road)
-    assert {entity.id for entity in scene.entities} == {f"road {name}" for name in network.roads}
-    for entity in scene.entities:
-        name = entity.id.removeprefix("road ")
-        lanes = network.roads[name].sections[0].lanes.values()
-        edges = {round(lane.side * lane.outer.value(0.0), 6) if lane.id else 0.0 for lane in lanes}
-        starts = np.array([point(line.points[0]) for line in entity.lines])
-        pose = network.road_pose_at(name, 0.0)
-        aside = (starts[:, 1] - pose.y) * math.cos(pose.h) - (starts[:, 0] - pose.x) * math.sin(pose.h)
-        along = (starts[:, 0] - pose.x) * math.cos(pose.h) + (starts[:, 1] - pose.y) * math.sin(pose.h)
-        shift = network.roads[name].lane_offset.value(0.0)
-        first = {round(value - shift, 6) for value, s in zip(aside.tolist(), along.tolist(), strict=True) if s < 1e-6}
-        assert first <= edges
-
-
-def test_absent_actor_is_deleted(tmp_path: Path) -> None:
-    both: dict[str, Body] = {"A": {}, "B": {}}
-    _, second = exported(tmp_path, Frame(view(both)), Frame(view({"A": {}}, 1)))["/ground_truth"]
-    assert [deletion.id for deletion in second.deletions] == ["B"]
-    assert [entity.id for entity in second.entities] == ["A"]
-
-
 def test_violation_is_logged_at_its_time(tmp_path: Path) -> None:
     result = run_and_save(PASSING_BY, settings=RunSettings(parameters={"OtherY": "0"}), out=tmp_path)
     assert result.recording is not None
@@ -243,21 +185,6 @@ def test_shared_point_cloud_is_packed_as_floats(tmp_path: Path) -> None:
     table = np.frombuffer(found.data, dtype="<f4").reshape(-1, found.point_stride // 4)
     assert [(field.name, field.offset) for field in found.fields] == [("x", 0), ("y", 4), ("z", 8)]
     assert table[np.argsort(table[:, 0])] == pytest.approx(points, abs=0.11)
-
-
-def test_messages_are_lines_from_sender_to_receiver(tmp_path: Path) -> None:
-    links = (
-        LinkEvent("B", "A", 0, 0.0, "delivered", 0.0, "", 100),
-        LinkEvent("A", "B", 0, 0.0, "lost", None, "error rate", 100),
-        LinkEvent("A", "Gone", 0, 0.0, "lost", None, "absent", 100),
-    )
-    bodies: dict[str, Body] = {"A": {}, "B": {"position": (10.0, 0.0, 0.0)}}
-    topics = exported(tmp_path, Frame(view(bodies), links=links))
-    first, second = topics["/messages"][0].entities
-    assert [one.x for one in first.lines[0].points] == [11.4, 1.4]
-    assert (first.lines[0].color.g > first.lines[0].color.r) != (second.lines[0].color.g > second.lines[0].color.r)
-    levels = [type(entry).Level.Name(entry.level) for entry in topics["/log/messages"]]
-    assert levels == ["DEBUG", "WARNING", "WARNING"]
 
 
 def test_location_fix_follows_the_reference_of_the_map(tmp_path: Path) -> None:

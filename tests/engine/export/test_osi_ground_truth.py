@@ -142,6 +142,16 @@ def test_host_vehicle_is_first_driven_station(tmp_path: Path) -> None:
     assert host.source_reference[0].identifier == ["Driven"]
 
 
+def test_host_vehicle_may_enter_later(tmp_path: Path) -> None:
+    """A station that drives is the host vehicle of the whole run, else an ego, else the first vehicle."""
+    early, late = Frame(view({"Car": {}})), Frame(view({"Car": {}, "Ego": {}}, tick=1))
+    driven = Frame(view({"Car": {}, "Ego": {}, "Driven": {}}, tick=2), {"Driven": step(detected(0.2, []))})
+    for frames, host in (([early], "Car"), ([early, late], "Ego"), ([early, late, driven], "Driven")):
+        truths = exported(tmp_path, *frames)
+        last = {found.id.value: found.source_reference[0].identifier[0] for found in truths[-1].moving_object}
+        assert [last[truth.host_vehicle_id.value] for truth in truths] == [host] * len(frames)
+
+
 def test_run_without_vehicle_has_no_host(tmp_path: Path) -> None:
     (truth,) = exported(tmp_path, Frame(view({"Walker": {"category": "pedestrian"}})))
     assert not truth.HasField("host_vehicle_id")

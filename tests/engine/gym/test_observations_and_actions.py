@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 from lone_car import lone_car
+from openscenario_xml import agent_xml, parameters_xml, road_file_xml, round_car_xml, scenario_xml
+from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
@@ -200,3 +203,36 @@ def test_nearest_rows_are_ordered_by_distance_then_row(count: int) -> None:
     ego = EgoState(0.0, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     expected = sorted((abs(x), row) for row, x in enumerate(boxes[:, 0].tolist()) if abs(x) <= 4.0)
     assert nearest_rows(objects, ego, 4.0) == [row for _, row in expected]
+
+
+def test_time_to_collision_of_reward_ignores_the_own_trailer() -> None:
+    """The box of the car ends at the hitch; that of the trailer begins 1 m ahead of its coupler."""
+    car = round_car_xml("Ego", agent_xml(planner="route", target_speed=10))
+    towing = '<TrailerHitch dx="-1"/><Trailer><TrailerRef entityRef="Box"/></Trailer></Vehicle>'
+    box = round_car_xml("Box").replace("</Vehicle>", '<TrailerCoupler dx="3"/></Vehicle>')
+    scenario = scenario_xml(
+        road=road_file_xml("eidrive_library/roads/two_lane_road.xodr"),
+        entities=car.replace("</Vehicle>", towing) + box.replace('vehicleCategory="car"', 'vehicleCategory="trailer"'),
+        init=init_xml("Ego", teleport_xml(lane_position_xml(-1, 40.0))),
+        stop=end_xml(2.0),
+    )
+    env = EidriveEnv(scenario)
+    env.reset(seed=1)
+    *_, info = env.step([0.0])
+    assert info["reward_terms"]["time_to_collision"] == 0.0
+    env.close()
+
+
+def test_steering_is_a_share_of_the_maximum_of_the_episode() -> None:
+    declared = parameters_xml(Steering=("double", "0.5"))
+    parameter = re.sub(rb'maxSteering="0?[.]\d+"', b'maxSteering="$Steering"', lone_car(), count=1)
+    env = EidriveEnv(parameter.replace(b"<CatalogLocations", declared.encode() + b"<CatalogLocations"), action="pedals")
+    for angle in (0.25, 0.5):
+        env.reset(seed=1, options={"parameters": {"Steering": angle}})
+        env.step([0.0, -1.0])
+        assert env._episode is not None
+        assert env._episode.last_frame is not None
+        control = env._episode.last_frame.steps["Ego"].control
+        assert control is not None
+        assert control.steering == -angle
+    env.close()

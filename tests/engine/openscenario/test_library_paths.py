@@ -41,6 +41,12 @@ def width_of_bus(path: Path) -> float:
     return load_scenario(path).entities["Bus"].bounding_box.dimensions.width
 
 
+def test_distribution_is_loaded_by_library_name() -> None:
+    by_name = load_distribution("ncap/crossing_car_participants")
+    by_path = load_distribution(library_path() / "ncap" / "crossing_car_participants.xosc")
+    assert [str(run) for run in by_name] == [str(run) for run in by_path] != []
+
+
 @pytest.mark.parametrize("place", [PLACE, f"{PLACE}/vehicles.xosc", "eidrive_library\\catalogs"])
 def test_library_catalog_is_found_from_any_folder(tmp_path: Path, place: str) -> None:
     path = write(tmp_path, place)

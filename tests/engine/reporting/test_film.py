@@ -65,6 +65,19 @@ def test_picture_shows_station_in_its_middle(street: Play, tmp_path: Path) -> No
     assert picture[height // 2 + 150, width // 2].min() > 200
 
 
+def test_picture_before_the_entry_of_the_station_shows_its_place(street: Play, tmp_path: Path) -> None:
+    """The ego enters in frame 40; the world is 1000 m away from its origin."""
+    frames = street(1)
+    shifted = [replace(frame.view, position=np.add(frame.view.position, (1000.0, 0.0, 0.0))) for frame in frames]
+    for tick, view in enumerate(shifted):
+        late = frames[tick].steps if tick >= 40 else {}
+        frames[tick] = replace(frames[tick], view=view if late else view.without(["Ego"]), steps=late)
+    station = recorded(frames, tmp_path)
+    entry = shifted[40].centers[shifted[40].row("Ego"), :2]
+    assert station.name == "Ego"
+    assert next(iter(station._centered()))[1] == pytest.approx(tuple(entry))
+
+
 @pytest.mark.parametrize("time", [-1.0, 99.0])
 def test_picture_outside_of_run_is_refused(street: Play, tmp_path: Path, time: float) -> None:
     with pytest.raises(SettingError, match="not in the run"):

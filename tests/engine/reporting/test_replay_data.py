@@ -185,18 +185,23 @@ def test_trailer_of_a_vehicle_is_not_decisive(street: Play) -> None:
     assert "0.00 m" not in decisive["text"]
 
 
-def test_closest_approach_is_read_from_metrics() -> None:
+def test_closest_approach_is_the_distance_that_a_criterion_measured() -> None:
+    """The bus comes nearer by its center, the car by its body, which is what its criterion measures."""
     metrics = {
         "min_distance.Ego.Car.center": 4.5,
+        "min_distance.Ego.Car.box": 0.4,
         "min_distance.Ego.Car.time": 3.0,
         "min_distance.Ego.Bus.center": 2.5,
+        "min_distance.Ego.Bus.box": 1.0,
         "min_distance.Ego.Bus.time": 7.0,
         "min_distance.Ego.Lost.center": None,
         "min_distance.Ego.Lost.time": 1.0,
     }
-    found = closest_approach(metrics)
-    assert found == {"time": 7.0, "text": "closest approach of Ego and Bus: 2.50 m between centers"}
-    assert closest_approach({"collision.count": 1.0}) is None
+    bus = {"time": 7.0, "text": "closest approach of Ego and Bus: 2.50 m between centers"}
+    assert closest_approach(metrics, [4.5, 2.5]) == closest_approach(metrics, []) == bus
+    car = {"time": 3.0, "text": "closest approach of Ego and Car: 0.40 m between bodies"}
+    assert closest_approach(metrics, [None, 0.4, 1.0]) == closest_approach(metrics, [4.5, 0.4]) == car
+    assert closest_approach({"collision.count": 1.0}, []) is None
 
 
 def test_messages_have_arrival_or_reason_of_loss() -> None:
