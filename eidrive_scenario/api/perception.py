@@ -9,6 +9,7 @@ from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.settings import TrackerKind
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.sensor import Sensor
@@ -24,6 +25,7 @@ __all__ = [
     "EgoState",
     "LidarReading",
     "MapContext",
+    "PoseUncertainty",
     "Readings",
     "Scene",
     "Sensor",

@@ -18,6 +18,7 @@ from eidrive_scenario.perception.tracking.association import make_plausible
 from eidrive_scenario.perception.tracking.existence import detected, likelihood_ratio, survived
 from eidrive_scenario.perception.tracking.existence import missed as after_miss
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
+from eidrive_scenario.perception.tracking.uncertain_pose import pose_jacobian
 
 TRACK = np.dtype(
     [
@@ -98,12 +99,9 @@ def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table
 def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
     """Return the covariance (N, 2, 2) of measured points (N, 2) caused by the pose covariance (3, 3) of a station.
 
-    The pose is x, y, yaw at (x, y). The result is J P Jᵀ with J = [I | R'(ψ) p] for p in the frame of the station. In
-    the world frame, R'(ψ) p is the vector from the station to the point, rotated by a right angle.
+    The pose is x, y, yaw at (x, y). The result is J P Jᵀ.
     """
-    jacobian = np.zeros((len(points), 2, 3))
-    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
-    jacobian[:, 0, 2], jacobian[:, 1, 2] = y - points[:, 1], points[:, 0] - x
+    jacobian = pose_jacobian(points, x, y)
     return np.asarray(jacobian @ covariance @ np.swapaxes(jacobian, 1, 2))
 
 

@@ -109,14 +109,20 @@ class Perception:
             _, found, past = self._computing.popleft()
             newest = self._track(found, past)
         if newest is None and self._tracker is not None:
+            self._set_pose(readings)
             newest = self._tracker.predict(now - self._latency)
             if self._tracker_checked and newest is not None:
                 check_detections(self._tracker, "predict", newest)
         return newest
 
+    def _set_pose(self, readings: Readings) -> None:
+        if self._tracker is not None and self._pose_noise is not None:
+            self._tracker.set_pose(self._pose_noise.uncertainty(readings))
+
     def _track(self, found: Detections, readings: Readings) -> Detections:
         if self._tracker is None:
             return found
+        self._set_pose(readings)
 
         def in_view(boxes: Array) -> Array:
             shares = self.detector.in_view(boxes, readings, found)

@@ -12,6 +12,7 @@ from pydantic import Field
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.localization import at_pose
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings
@@ -49,6 +50,11 @@ class PoseNoiseProcess:
     def covariance(self) -> Array:
         """Covariance (3, 3) of the errors of x, y [m] and yaw [rad]."""
         return np.diag(self._deviations**2)
+
+    def uncertainty(self, readings: Readings) -> PoseUncertainty:
+        """Return the uncertainty of the assumed pose in these readings."""
+        x, y, _ = readings.ego.position.tolist()
+        return PoseUncertainty(x, y, self.covariance, self.settings.correlation_time)
 
     def error(self, time: float) -> Array:
         """Return the error (3,) of x, y [m] and yaw [rad] at `time` [s], which does not decrease between calls."""

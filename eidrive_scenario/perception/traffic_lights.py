@@ -22,13 +22,16 @@ ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
 NEAR_SIDE = 10.0
 """Maximum distance of a light from the entry of its junction, along and across, at which it stands before it [m]."""
+OTHER_LEVEL = 3.5
+"""Difference of height from which on a road user is on another level than a road, such as a bridge [m]: less than the
+clearance of bridges, 4.5 m, by an error of 1 m."""
 SAME_WAY = math.cos(math.radians(45.0))
 
 
 class StopLine(NamedTuple):
     """Position at which a signal stops the traffic of one lane.
 
-    x, y      on the center of the lane [m];  heading  of its traffic [rad]
+    x, y, z   on the center of the lane [m];  heading  of its traffic [rad]
     beyond    a point that only the routes with this signal pass; None if the line alone determines them
     """
 
@@ -36,6 +39,7 @@ class StopLine(NamedTuple):
     kind: Kind
     x: float
     y: float
+    z: float
     heading: float
     beyond: tuple[float, float] | None
 
@@ -80,9 +84,9 @@ class SignalsAhead:
         self._states: dict[str, str] = {}
         self._on_path: list[tuple[float, StopLine]] = []
 
-    def follow(self, path: Array) -> None:
-        """Set the path (M, 2) along which distances count."""
-        self._on_path = sorted(places_along(self._lines, path)) if self._lines else []
+    def follow(self, path: Array, heights: Array | None = None) -> None:
+        """Set the path (M, 2) along which distances count; its heights (M,) [m] select among roads above each other."""
+        self._on_path = sorted(places_along(self._lines, path, heights)) if self._lines else []
 
     def update(self, readings: Iterable[SignalReading]) -> None:
         """Update the states of signals in sight."""
@@ -119,7 +123,7 @@ def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[S
         heading = pose.h + (0.0 if direction > 0 else math.pi)
         back = _distance_before(roads.signal_pose(signal), pose, heading) if beyond is not None else 0.0
         x, y = pose.x - back * math.cos(heading), pose.y - back * math.sin(heading)
-        yield StopLine(signal.id, kind, x, y, heading, beyond)
+        yield StopLine(signal.id, kind, x, y, pose.z, heading, beyond)
 
 
 def _distance_before(light: Pose, entry: Pose, heading: float) -> float:
@@ -130,8 +134,13 @@ def _distance_before(light: Pose, entry: Pose, heading: float) -> float:
     return before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
 
 
-def places_along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float, StopLine]]:
-    """Yield the lines that a path (M, 2) crosses, with the distance along it [m]."""
+def places_along(
+    lines: Sequence[StopLine], path: Array, heights: Array | None = None
+) -> Iterator[tuple[float, StopLine]]:
+    """Yield the lines that a path (M, 2) crosses, with the distance along it [m].
+
+    heights  of the path (M,) [m], for roads above each other; None: the roads are level
+    """
     step = np.diff(path, axis=0)
     length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
     start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
@@ -143,6 +152,8 @@ def places_along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float
             if ahead[0] * math.cos(line.heading) + ahead[1] * math.sin(line.heading) < SAME_WAY:
                 continue
             if line.beyond is not None and not any(index <= later < end for later in beyond):
+                continue
+            if heights is not None and abs(float(heights[index]) - line.z) > OTHER_LEVEL:
                 continue
             yield float(start[index] + share * length[index]), line
 

@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from msgspec.structs import replace
 from pydantic import BeforeValidator, NonNegativeFloat, PositiveFloat
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planner_settings import PlannerSettings, Polygon
+from eidrive_scenario.driving.planning.levels import is_on_level, path_heights
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
@@ -71,7 +74,7 @@ class ConflictAreaPlanner(RoutePlanner):
 
     The vehicle brakes with `conflict_deceleration` while the center of a known object lies in the area, and for
     `conflict_hold_time` [s] after the last such instant. Objects with an existence probability below `min_existence`
-    are ignored.
+    are ignored, and so are objects on another level than the path, such as below a bridge.
 
     Source: the cooperative scenarios of EI-Drive, with 35 ticks of 0.03 s after the last detection, brake 0.25 and
     throttle 0; steering continues. The deceleration of that brake is an assumption of this project.
@@ -89,7 +92,9 @@ class ConflictAreaPlanner(RoutePlanner):
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         plan = super().plan(ego, objects, goal, now)
         braking = self.planner_settings.conflict_deceleration
-        inside_area = self._in_areas(objects) if len(objects) else ()
+        path = self._path
+        heights = None if path is None else path_heights(path, self.roads, float(ego.position[2]))
+        inside_area = self._in_areas(objects, heights) if len(objects) else ()
         if inside_area:
             self._last_sighting = now
             reason = f"{objects.classes[inside_area[0]]} in the conflict area"
@@ -98,13 +103,21 @@ class ConflictAreaPlanner(RoutePlanner):
             return replace(plan, reason="an object was in the conflict area", braking=braking)
         return plan
 
-    def _in_areas(self, objects: Detections) -> tuple[int, ...]:
-        """Return the rows of the objects in an area whose existence probability reaches `min_existence`."""
+    def _in_areas(self, objects: Detections, heights: Array | None) -> tuple[int, ...]:
+        """Return the rows of the objects in an area whose existence probability reaches `min_existence`.
+
+        heights  of the path [m]; objects on another level, such as below a bridge, are in no area
+        """
         found = [
             index
             for index, (x, y) in enumerate(objects.boxes[:, :2].tolist())
             if any([point_in_polygon(x, y, area) for area in self.planner_settings.conflict_area])
         ]
+        path = self._path
+        if found and path is not None and heights is not None:
+            bottom = objects.boxes[:, 2] - objects.boxes[:, 5] / 2.0
+            places = np.column_stack([objects.boxes[:, :2], bottom])
+            found = [index for index in found if is_on_level(places[index], path.points, heights)]
         if not found:
             return ()
         existence = objects.confidence.tolist()

@@ -35,6 +35,8 @@ class PlannedPath:
         self.points = _apart(_smooth(_resample(line)))
         self.ends = ends
         self.limits = self._speed_limits()
+        self.heights: Array | None = None
+        """Heights of the road at the points (M,) [m], see `levels.path_heights`; None until they are computed."""
         self._x: list[float] = self.points[:, 0].tolist()
         self._y: list[float] = self.points[:, 1].tolist()
         step = np.diff(self.points, axis=0)

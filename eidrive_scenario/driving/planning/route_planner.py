@@ -10,6 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.levels import path_heights
 from eidrive_scenario.driving.planning.path import SPACING, PlannedPath
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
@@ -124,7 +125,7 @@ class RoutePlanner(Planner):
             return None
         if self._path_of_stops is not path:
             self._path_of_stops = path
-            self._stops.follow(path.points)
+            self._stops.follow(path.points, path_heights(path, self.roads, float(ego.position[2])))
         return self._stops.next(self._stops.place_of(self._progress, path.points, x, y), ego.speed, now)
 
     def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:

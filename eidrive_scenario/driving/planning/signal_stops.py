@@ -58,9 +58,9 @@ class SignalStops:
         """Last distance of the next stop line of each signal [m]."""
         self._along = np.zeros(1)
 
-    def follow(self, path: Array) -> None:
-        """Set the path (M, 2) of the vehicle."""
-        self.signals.follow(path)
+    def follow(self, path: Array, heights: Array | None = None) -> None:
+        """Set the path (M, 2) of the vehicle and the heights of the road along it (M,) [m]; None: roads are level."""
+        self.signals.follow(path, heights)
         self._along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
 
     def next(self, along: float, speed: float, now: float) -> StopPoint | None:

@@ -9,6 +9,7 @@ from typing import ClassVar
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.tracking.settings import TrackerKind
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 
 
 class TrackingMethod(ABC):
@@ -22,6 +23,13 @@ class TrackingMethod(ABC):
 
     def __init__(self, settings: TrackerKind) -> None:
         self.settings = settings
+
+    def set_pose(self, pose: PoseUncertainty) -> None:  # noqa: B027 - an optional hook
+        """Store the pose of the station and its uncertainty; called before each call below if the pose has random
+        errors.
+
+        Detections have a common error then, which their covariances do not contain.
+        """
 
     @abstractmethod
     def update(self, detections: Detections, in_view: Callable[[Array], Array] | None = None) -> Detections:

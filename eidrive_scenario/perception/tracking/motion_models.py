@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,10 @@ BACKWARDS = 0.5
 
 
 class Estimates(NamedTuple):
-    """States (N, D) of tracks and their covariances (N, D, D); x and y come first."""
+    """States (N, D) of tracks and their covariances (N, D, D); x and y come first.
+
+    States beyond those of a motion model are constant for it, and corrected by their correlation with the others.
+    """
 
     state: Array
     covariance: Array
@@ -37,7 +40,14 @@ class Estimates(NamedTuple):
 class MotionModel(ABC):
     """State of a track and its transition. Positions [m], angles [rad], all in the world frame."""
 
-    size: ClassVar[int]
+    size: int
+    """Number of states."""
+    measures_heading: bool = False
+    """Whether a box corrects the third state, a heading, by its axis."""
+
+    def no_tracks(self) -> Estimates:
+        """Return the estimates of no track."""
+        return Estimates(np.empty((0, self.size)), np.empty((0, self.size, self.size)))
 
     @abstractmethod
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
@@ -62,7 +72,7 @@ class ConstantVelocity(MotionModel):
     Bar-Shalom, Li and Kirubarajan, Estimation with applications to tracking and navigation, 2001, section 6.2.2.
     """
 
-    size: ClassVar[int] = 4
+    size = 4
 
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
         known = np.asarray(np.all(np.isfinite(velocity), axis=1))
@@ -74,9 +84,10 @@ class ConstantVelocity(MotionModel):
         return Estimates(state, covariance)
 
     def predict(self, tracks: Estimates, step: float) -> Estimates:
-        forward = np.eye(4)
+        size = tracks.state.shape[1]
+        forward = np.eye(size)
         forward[0, 2] = forward[1, 3] = step
-        drift = np.zeros((4, 4))
+        drift = np.zeros((size, size))
         drift[0, 0] = drift[1, 1] = step**3 / 3.0
         drift[2, 2] = drift[3, 3] = step
         drift[0, 2] = drift[2, 0] = drift[1, 3] = drift[3, 1] = step**2 / 2.0
@@ -97,7 +108,8 @@ class TurnRate(MotionModel):
     2008, section III.
     """
 
-    size: ClassVar[int] = 5
+    size = 5
+    measures_heading = True
 
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
         known = np.asarray(np.all(np.isfinite(velocity), axis=1))
@@ -113,27 +125,28 @@ class TurnRate(MotionModel):
         return Estimates(state, covariance)
 
     def predict(self, tracks: Estimates, step: float) -> Estimates:
-        x, y, heading, speed, turn = tracks.state.T
+        x, y, heading, speed, turn = tracks.state[:, :5].T
         half = 0.5 * turn * step
         # Chord of the arc: its length is v·T·sin(half)/half, its direction that at half the turn.
         shrink = np.sinc(half / np.pi)
         middle = heading + half
         cos, sin = np.cos(middle), np.sin(middle)
         chord = speed * step * shrink
-        state = np.stack([x + chord * cos, y + chord * sin, heading + turn * step, speed, turn], axis=1)
+        state = tracks.state.copy()
+        state[:, 0], state[:, 1], state[:, 2] = x + chord * cos, y + chord * sin, heading + turn * step
         slope = np.where(np.abs(half) > 1e-4, (np.cos(half) - shrink) / np.where(half == 0.0, 1.0, half), -half / 3.0)
         bend = speed * step * slope * 0.5 * step
-        forward: Array = np.broadcast_to(np.eye(5), (len(x), 5, 5)).copy()
+        forward: Array = np.broadcast_to(np.eye(state.shape[1]), tracks.covariance.shape).copy()
         forward[:, 0, 2], forward[:, 1, 2] = -chord * sin, chord * cos
         forward[:, 0, 3], forward[:, 1, 3] = step * shrink * cos, step * shrink * sin
         forward[:, 0, 4] = bend * cos - chord * sin * 0.5 * step
         forward[:, 1, 4] = bend * sin + chord * cos * 0.5 * step
         forward[:, 2, 4] = step
-        gain = np.zeros((len(x), 5, 2))
+        gain = np.zeros((*state.shape, 2))
         gain[:, 0, 0], gain[:, 1, 0], gain[:, 3, 0] = 0.5 * step * np.cos(heading), 0.5 * step * np.sin(heading), 1.0
         gain[:, 2, 1], gain[:, 4, 1] = 0.5 * step, 1.0
         density = step * np.array([ACCELERATION_DENSITY, TURN_DENSITY])
-        covariance = forward @ tracks.covariance @ _transposed(forward) + (gain * density) @ _transposed(gain)
+        covariance = forward @ tracks.covariance @ transposed(forward) + (gain * density) @ transposed(gain)
         return Estimates(state, covariance)
 
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
@@ -150,7 +163,8 @@ class TurnRate(MotionModel):
             # The same motion with the front at the other end: heading + pi, -speed.
             state[backwards, 2] += np.pi
             state[backwards, 3] *= -1.0
-            mirror = np.array([1.0, 1.0, 1.0, -1.0, 1.0])
+            mirror = np.ones(state.shape[1])
+            mirror[3] = -1.0
             covariance[backwards] *= mirror[:, None] * mirror
         state[:, 2] = wrap_angle(state[:, 2])
         return Estimates(state, covariance)
@@ -163,13 +177,14 @@ def _correct(tracks: Estimates, innovation: Array, noise: Array) -> Estimates:
     """Return the Kalman update in Joseph form; the first entries of the state are measured."""
     measured, size = innovation.shape[1], tracks.state.shape[1]
     spread = tracks.covariance[:, :measured, :measured] + noise
-    gain = _transposed(np.asarray(np.linalg.solve(spread, tracks.covariance[:, :measured]), dtype=np.float64))
+    gain = transposed(np.asarray(np.linalg.solve(spread, tracks.covariance[:, :measured]), dtype=np.float64))
     state = tracks.state + np.einsum("nij,nj->ni", gain, innovation)
     rest: Array = np.broadcast_to(np.eye(size), (len(state), size, size)).copy()
     rest[:, :, :measured] -= gain
-    covariance = rest @ tracks.covariance @ _transposed(rest) + gain @ noise @ _transposed(gain)
+    covariance = rest @ tracks.covariance @ transposed(rest) + gain @ noise @ transposed(gain)
     return Estimates(state, covariance)
 
 
-def _transposed(matrices: Array) -> Array:
+def transposed(matrices: Array) -> Array:
+    """Return the transposed matrices (N, M, K) of matrices (N, K, M)."""
     return np.swapaxes(matrices, 1, 2)

@@ -18,6 +18,7 @@ from eidrive_scenario.perception.tracking.history import TrackHistory
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerKind, TrackerSettings
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, UncertainPose
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
@@ -49,15 +50,22 @@ class Tracker(TrackingMethod):
         super().__init__(settings)
         if settings.kind == NO_TRACKER:
             raise ValueError("tracker settings: kind 'none' disables tracking (expected cv or ctrv)")
-        self._model = MODELS[settings.kind]()
+        self._model: MotionModel = MODELS[settings.kind]()
         self._gate = -2.0 * math.log1p(-settings.gate)
         self._time: float | None = None
-        self._tracks = Estimates(np.empty((0, self._model.size)), np.empty((0, self._model.size, self._model.size)))
+        self._tracks = self._model.no_tracks()
         self._shape = np.empty((0, 5))
         """z, length, width, height and yaw (N, 5)."""
         self._existence = np.empty(0)
         self._histories: list[TrackHistory] = []
         self._confirmed = 0
+
+    def set_pose(self, pose: PoseUncertainty) -> None:
+        if isinstance(self._model, UncertainPose):
+            self._model.pose = pose
+        elif self._time is None:
+            self._model = UncertainPose(self._model, pose)
+            self._tracks = self._model.no_tracks()
 
     def update(self, detections: Detections, in_view: Callable[[Array], Array] | None = None) -> Detections:
         """Return the confirmed objects at the time of these detections, with velocities, covariances and track numbers.

@@ -13,6 +13,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.planning.behavior.lane_courses import Course, LaneCourses
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
+from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.roads import RoadNetwork, outlines
 from eidrive_scenario.roads.model.location import LaneKey
 
@@ -81,7 +82,7 @@ class ConflictWays:
         self._lanes: dict[str, list[tuple[tuple[LaneKey, ...], Course, float]]] = {}
         self._courses = LaneCourses(roads, rules)
         crosswalks = [item for item in roads.objects if item.type == "crosswalk"]
-        self._crosswalks = [outline[:, :2] for item in crosswalks for outline in outlines(roads, item)]
+        self._crosswalks = [outline for item in crosswalks for outline in outlines(roads, item)]
 
     def along(self, line: ReferenceLine, passages: tuple[Passage, ...]) -> list[ConflictWay]:
         """Return the ways that meet a line, in the order of their zones.
@@ -163,6 +164,9 @@ class ConflictWays:
         dense = np.arange(max(passage.start - AROUND, 0.0), min(passage.end + AROUND, course.along[-1]), 0.5)
         x, y, _ = course.poses(dense, 0.0)
         s, d, _ = line.project(x, y, *window)
+        if line.heights is not None:
+            gap = np.interp(dense, course.along, course.heights) - np.interp(s, line.along, line.heights)
+            d = np.where(np.abs(gap) > OTHER_LEVEL, np.inf, d)
         first, last = float(line.along[window[0]]), float(line.along[min(window[1], len(line.along)) - 1])
         inside = (np.abs(d) < self._half_width + HALF_BODY) & (s >= first) & (s <= last)
         met = np.flatnonzero(inside)
@@ -179,9 +183,9 @@ class ConflictWays:
 
 
 def _beside_crosswalk(line: ReferenceLine, number: int, outline: Array, half_width: float) -> Iterator[ConflictWay]:
-    """Yield the ways of pedestrians from both ends of a crosswalk (M, 2) to each place where the line crosses it."""
-    center = outline.mean(axis=0)
-    reach = float(np.hypot(*(outline - center).T).max()) + line.spacing
+    """Yield the ways of pedestrians from both ends of a crosswalk (M, 3) to each place where the line crosses it."""
+    center = outline[:, :2].mean(axis=0)
+    reach = float(np.hypot(*(outline[:, :2] - center).T).max()) + line.spacing
     near = np.flatnonzero(np.hypot(*(line.points - center).T) <= reach)
     for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else ():
         window = max(int(run[0]) - 2, 0), min(int(run[-1]) + 3, len(line.points))
@@ -197,6 +201,8 @@ def _across_line(
     if left <= half_width or right >= -half_width or left - right > 2.0 * LONGEST_CROSSING:
         return
     start, end, middle = float(s.min()), float(s.max()), line.index_at(float(s.mean()))
+    if line.heights is not None and abs(float(line.heights[middle] - outline[:, 2].mean())) > OTHER_LEVEL:
+        return
     (x, y), (tx, ty) = line.points[middle].tolist(), line.tangent[middle].tolist()
     for side, far in ((1.0, left), (-1.0, -right)):
         distance = np.arange(0.0, max(far - half_width, 0.0) + WAITING, FOOT_SPACING)

@@ -214,12 +214,15 @@ class Decider:
         with_maneuvers: bool = False,
     ) -> Options:
         """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
-        hidden = math.inf
-        more = passing_profiles(situation, scene, self._settings, self._body) if with_maneuvers else []
+        hidden, expects_none = math.inf, False
+        more = []
+        if with_maneuvers:
+            more = passing_profiles(situation, scene, self._settings, self._body, self._current)
         if more:
             beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
             center = (situation.s + self._center, situation.d)
-            hidden = self._oncoming.first_hidden(scene, beside, center, situation.now)
+            hidden = self._oncoming.first_hidden(scene, beside, center)
+            expects_none = self._oncoming.expects_none(situation.now)
             profiles = profiles + more
         proposals: list[Proposal] = []
         walls: list[list[Wall]] = []
@@ -238,7 +241,7 @@ class Decider:
                 kind = proposal.precedence
                 if kind not in reactions:
                     before = [*crossing_walls(found, self._times, here, kind, reasons), *stops]
-                    reactions[kind] = before, leading(scene, way, found, situation.s + self._center, proposal)
+                    reactions[kind] = before, leading(scene, way, found, situation.s + self._center, proposal, profile)
                 walls.append(reactions[kind][0])
                 leads.append(reactions[kind][1])
             proposals += made
@@ -263,6 +266,7 @@ class Decider:
             situation.wanted,
             self._kept_names(situation),
             hidden,
+            expects_none=expects_none,
         )
         return Options(profiles, proposals, walls, rolled, evaluation)
 

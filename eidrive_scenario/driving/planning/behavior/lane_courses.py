@@ -169,7 +169,7 @@ class LaneCourses:
         section = self._roads.road(first.road).sections[first.section]
         width = section.lanes[first.lane].width
         half_width = max(width.value(0.0), width.value(section.length)) / 2.0
-        stops, passages = self._rules.stops_along(points), self._rules.passages(points, heights)
+        stops, passages = self._rules.stops_along(points, heights), self._rules.passages(points, heights)
         return Course(points, along, half_width, stops, passages, heights)
 
 

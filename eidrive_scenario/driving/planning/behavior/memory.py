@@ -12,6 +12,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import VULNERABLE, Detections
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 ON_FOOT = frozenset({"pedestrian"})
@@ -27,9 +28,6 @@ LARGEST_ERROR = 3.0
 """Maximum standard deviation that is considered [m]; above it the position says nothing."""
 SMOOTHING = 0.4
 """Weight of the newest difference quotient in the velocity of an object whose detector estimates none."""
-OTHER_LEVEL = 3.5
-"""Difference of height from which on a road user is on another level than a road, such as a bridge [m]: less than the
-clearance of bridges, 4.5 m, by an error of 1 m."""
 VELOCITY_ERROR = 1.5
 """Assumed standard deviation of a velocity per standard deviation of the position [1/s]."""
 LASTING = 1.0

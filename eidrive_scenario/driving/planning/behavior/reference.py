@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.levels import path_heights
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
@@ -99,19 +100,8 @@ class ReferenceLine:
 
     @cached_property
     def heights(self) -> Array | None:
-        """Heights of the road at the points (M,) [m]; None if all roads are level.
-
-        Each point is on the road of the one before or on one that continues it, where roads cross above each other.
-        """
-        roads = self._roads
-        if roads is None or roads.is_level:
-            return None
-        place, z, found = None, self._z, []
-        for x, y in self.points.tolist():
-            place = roads.locate_at(x, y, place, z, reach=5.0)
-            z = z if place is None else roads.road_pose_at(place.road, place.s, place.t).z
-            found.append(z)
-        return np.array(found)
+        """Heights of the road at the points (M,) [m]; None if all roads are level."""
+        return path_heights(self.path, self._roads, self._z)
 
     def index_at(self, s: float) -> int:
         """Return the index of the last point up to a distance along the line."""

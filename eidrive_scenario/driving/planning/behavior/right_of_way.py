@@ -51,10 +51,13 @@ class JunctionRules:
         self._junction = [roads.road(key.road).junction_id for key in keys]
         self._keeps_right = all(road.rule == "RHT" for road in roads.roads.values())
 
-    def stops_along(self, points: Array) -> tuple[float, ...]:
-        """Return the distances along a way (M, 2) at which stop signs hold its traffic [m]."""
-        lines = self._lines_near(points)
-        return tuple(sorted(place for place, line in places_along(lines, points) if line.kind == "stop sign"))
+    def stops_along(self, points: Array, heights: Array | None = None) -> tuple[float, ...]:
+        """Return the distances along a way (M, 2) at which stop signs hold its traffic [m].
+
+        heights  as in `passages`
+        """
+        signs = places_along(self._lines_near(points), points, heights)
+        return tuple(sorted(place for place, line in signs if line.kind == "stop sign"))
 
     def passages(self, points: Array, heights: Array | None = None) -> tuple[Passage, ...]:
         """Return the passages of junctions by a way (M, 2), in their order; a way may pass a junction several times.
@@ -70,7 +73,7 @@ class JunctionRules:
             junction = self._junction[row]
             if junction is not None:
                 inside[owner].add(junction)
-        signs = list(places_along(self._lines_near(points), points))
+        signs = list(places_along(self._lines_near(points), points, heights))
         return tuple([self._passage(*run, along, heading, signs) for run in _runs(inside)])
 
     def _lines_near(self, points: Array) -> list[StopLine]:
