@@ -52,7 +52,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
 
 
 def result_of(seed: int, failed: set[int]) -> Any:
-    return SimpleNamespace(passed=seed not in failed, seed=seed)
+    return SimpleNamespace(passed=seed not in failed, seed=seed, exit_code=int(seed in failed))
 
 
 def test_decide_rate_runs_consecutive_seeds_until_decision() -> None:
@@ -111,6 +111,15 @@ def test_option_applies_to_scenario_files(project: pytest.Pytester) -> None:
     done = project.runpytest_subprocess("drives", "-v", "-p", "no:cacheprovider", "--eidrive-success-rate", "0.5")
     done.assert_outcomes(passed=1)
     done.stdout.fnmatch_lines(["*first?rate=0.5?*PASSED*"])
+
+
+def test_rate_of_runs_that_reach_their_time_limit_is_an_error(project: pytest.Pytester) -> None:
+    """As in `eidrive run --success-rate`, such a run has no verdict; a test in Python fails in place of an error."""
+    project.makepyfile(test_rates=TEXT)
+    options = ("--eidrive-success-rate", "0.5", "--eidrive-time-limit", "0.5", "-p", "no:cacheprovider")
+    done = project.runpytest_inprocess("drives", "test_rates.py", "-k", "first.xosc or test_default", *options)
+    done.assert_outcomes(errors=1, failed=1)
+    done.stdout.fnmatch_lines(["seed 1: ended by its time limit after 0.50 s", "reproduce: eidrive run*--seed 1*"])
 
 
 @pytest.mark.parametrize(
