@@ -74,26 +74,26 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
                 record=False if files is None else files.record,
                 wall_limit=wall_limit,
             )
+            return StoredRun(
+                key=job.key,
+                number=job.number,
+                scenario=result.scenario,
+                run=job.run,
+                seed=job.seed,
+                status=PASSED if result.passed else FAILED,
+                point=dict(job.point),
+                result={**result.to_dict(), **_folder(result.folder, files)},
+                error="",
+                command=result.command,
+                wall_s=round(time.perf_counter() - start, 4),
+                settings=result.settings.canonical,
+            )
         except ConstraintError as error:
             return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
         except InputError as error:
             return _without_result(job, INVALID, str(error), time.perf_counter() - start)
         except Exception as error:
             return _without_result(job, ABORTED, _message(error), time.perf_counter() - start)
-        return StoredRun(
-            key=job.key,
-            number=job.number,
-            scenario=result.scenario,
-            run=job.run,
-            seed=job.seed,
-            status=PASSED if result.passed else FAILED,
-            point=dict(job.point),
-            result={**result.to_dict(), **_folder(result.folder, files)},
-            error="",
-            command=result.command,
-            wall_s=round(time.perf_counter() - start, 4),
-            settings=result.settings.canonical,
-        )
 
 
 def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
