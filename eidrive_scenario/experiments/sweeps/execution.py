@@ -36,6 +36,11 @@ _one_run = threading.Lock()
 def prepare_process() -> None:
     """Prepare a worker process: equal images are processed once, and code that never returns ends the process."""
     image_memory.activate(image_memory.ImageMemory())
+    end_with_hung_runs()
+
+
+def end_with_hung_runs() -> None:
+    """End this process at a wall limit if the code of the run does not return."""
     set_last_resort(LastResort(_end_process))
 
 
