@@ -129,7 +129,7 @@ def plan_of(
     Raise InputError for an invalid scenario or setting, and ConstraintError if all runs are excluded.
     """
     probes = _with_space(points, space)
-    _check_names_of_runs(scenario, probes, is_distribution)
+    _check_names_of_runs(scenario, probes, settings, is_distribution)
     if is_distribution:
         numbers = range(len(load_distribution(scenario)))
         points, probes = (
@@ -161,16 +161,21 @@ def _with_space(points: Sequence[Point], space: Sequence[Axis]) -> Sequence[Poin
     return [{**point, **start, name: value} for point in points for name, value in ends]
 
 
-def _check_names_of_runs(scenario: Path, points: Sequence[Point], is_distribution: bool) -> None:
-    """Raise SettingError if an axis has the name of the runs of a distribution, or one of its parameters."""
+def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunSettings, is_distribution: bool) -> None:
+    """Raise SettingError if an axis has the name of the runs of a distribution.
+
+    So does an axis or a setting of all runs with the name of a parameter that the distribution varies.
+    """
     names = dict.fromkeys(name for point in points for name in point)
     if RUN in names:
         hint = f"give {PARAMETER}{RUN} for a parameter of this name; all runs of a distribution are executed"
         raise SettingError(Diagnostic(f"--vary: {RUN!r} is the number of a run of a distribution", hint))
+    given = dict.fromkeys(settings.parameters, "--param")
+    given |= {name.removeprefix(PARAMETER): "--vary" for name in names if not is_setting(name)}
     for name, place in load_distribution(scenario).varied.names.items() if is_distribution else ():
-        if name in (axis.removeprefix(PARAMETER) for axis in names if not is_setting(axis)):
-            text = f"--vary: the distribution varies parameter {name!r}"
-            raise SettingError(Diagnostic(text, "remove the axis", place.source, place.line))
+        if name in given:
+            text = f"{given[name]}: the distribution varies parameter {name!r}"
+            raise SettingError(Diagnostic(text, "remove the option", place.source, place.line))
 
 
 def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:

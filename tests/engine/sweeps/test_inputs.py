@@ -101,6 +101,11 @@ def test_axes_of_a_distribution_that_it_varies_itself_raise(
         plan_of(distribution, grid(*axes), RunSettings(), is_distribution=True)
 
 
+def test_parameter_of_all_runs_that_the_distribution_varies_raises(distribution: Path) -> None:
+    with pytest.raises(SettingError, match="--param: the distribution varies parameter 'Speed'"):
+        plan_of(distribution, [{}], RunSettings(parameters={"Speed": "8"}), is_distribution=True)
+
+
 def test_unknown_axis_of_a_search_raises_before_its_runs(scenario: Path) -> None:
     with pytest.raises(SettingError, match="did you mean 'Speed'"):
         plan_of(scenario, [{}], RunSettings(), space=(Axis("Sped", low=0.0, high=1.0),))
