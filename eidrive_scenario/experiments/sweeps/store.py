@@ -51,7 +51,8 @@ class StoredRun(msgspec.Struct, frozen=True):
     run       number in a distribution; None for a scenario
     status    one of STATUSES
     point     values of the axes
-    result    outcome, criteria and metrics as columns: `RunResult.to_dict`; empty if the run did not end
+    result    outcome, criteria and metrics as columns: `RunResult.to_dict`; if the run did not end, only the parameters
+              that its distribution varies
     error     message of a run that did not end
     command   command line that repeats the run
     wall_s    duration with loading [s]

@@ -182,7 +182,7 @@ def test_results_of_a_distribution_by_its_parameters(eidrive: Eidrive, distribut
     store = tmp_path / "s.db"
     assert eidrive("sweep", distribution, "--seeds", "1-2", "--store", store, "--workers", "1").exit_code == 0
     rows = [json.loads(line) for line in eidrive("results", store, "--by", "Speed", "--json").stdout.splitlines()]
-    points = [{"Speed": 10}, {"Speed": 30}, {}]
+    points = [{"Speed": 10}, {"Speed": 30}, {"Speed": 50}]
     assert [(row["point"], row["runs"]) for row in rows] == [
         (point, {status: 2}) for point, status in zip(points, ("passed", "failed", "excluded"), strict=True)
     ]

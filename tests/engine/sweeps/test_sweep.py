@@ -18,6 +18,7 @@ from eidrive_scenario.errors import ConstraintError, InputError, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes
 from eidrive_scenario.experiments.sweeps.designs import points_of
 from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of, versions
+from eidrive_scenario.experiments.sweeps.results import summaries
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import SweepProgress, run_sweep
 from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
@@ -149,6 +150,16 @@ def test_sweep_of_distribution_runs_all_its_values(distribution: Path, tmp_path:
     assert [(run.seed, run.run, run.status) for run in runs] == [
         (seed, run, status) for seed in (1, 2) for run, status in enumerate(("passed", "failed", "excluded"))
     ]
+
+
+def test_run_of_distribution_without_verdict_has_scenario_parameters_and_command(
+    distribution: Path, scenario: Path, tmp_path: Path
+) -> None:
+    """Constraints exclude the speed 50 of the last run."""
+    _, runs = swept(plan_of(distribution, [{}], RunSettings(), is_distribution=True), tmp_path / "s.db")
+    assert (runs[2].status, runs[2].scenario, runs[2].result) == ("excluded", runs[0].scenario, {"parameter.Speed": 50})
+    assert runs[2].command == f"eidrive run {scenario} --param Speed=50 --seed 1"
+    assert [row.point["Speed"] for row in summaries(runs)] == [10, 30, 50]
 
 
 def test_sweep_continues_without_repetition(scenario: Path, tmp_path: Path) -> None:
