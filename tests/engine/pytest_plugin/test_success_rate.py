@@ -147,6 +147,25 @@ def test_invalid_option_is_a_usage_error(project: pytest.Pytester) -> None:
     assert done.ret == pytest.ExitCode.USAGE_ERROR
 
 
+@pytest.mark.parametrize("place", ["command line", "ini file"])
+def test_seeds_beside_success_rate_are_a_usage_error(project: pytest.Pytester, place: str) -> None:
+    if place == "ini file":
+        project.makeini("[pytest]\neidrive_seeds = 3\neidrive_success_rate = 0.9\n")
+        done = project.runpytest_inprocess("drives")
+    else:
+        done = project.runpytest_inprocess("drives", "--eidrive-seeds", "3", "--eidrive-success-rate", "0.9")
+    assert done.ret == pytest.ExitCode.USAGE_ERROR
+    done.stderr.fnmatch_lines(["*eidrive*seeds and *eidrive*success?rate exclude each other*"])
+
+
+def test_seeds_on_command_line_replace_success_rate_of_marker(project: pytest.Pytester) -> None:
+    """The command line takes precedence over a marker, and a marker over the ini file."""
+    project.makeini("[pytest]\neidrive_success_rate = 0.9\n")
+    project.makepyfile(test_rates=TEXT)
+    done = project.runpytest_inprocess("test_rates.py", "-k", "default", "--eidrive-seeds", "2", "--collect-only", "-q")
+    assert done.outlines[:2] == [f"test_rates.py::test_default[drives/first-seed={seed}]" for seed in (1, 2)]
+
+
 def test_run_command_ends_at_decision(eidrive: Eidrive, passing_by: Path) -> None:
     done = eidrive("run", passing_by, "--no-record", "--success-rate", 0.5)
     assert done.exit_code == 0
