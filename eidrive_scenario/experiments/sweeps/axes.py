@@ -63,7 +63,7 @@ class Axis:
 def parse_axis(text: str) -> Axis:
     """Return the axis of a text: `NAME=A,B,C` (list), `NAME=LOW:HIGH:STEP` (range), or `NAME=LOW:HIGH` (interval).
 
-    A range contains both ends. Steps are exact decimals: three steps of 0.1 are 0.3.
+    A range contains its upper end if a step reaches it. Steps are exact decimals: three steps of 0.1 are 0.3.
     Raise SettingError for other texts.
     """
     name, separator, given = text.partition("=")

@@ -25,6 +25,8 @@ from eidrive_scenario.v2x.profile import load_profile
 
 MOST_RUNS = 10_000_000
 """Maximum number of runs of a sweep."""
+GREATEST_SEED = 2**63 - 1
+"""Greatest integer of a column of SQLite."""
 
 
 @dataclass(frozen=True)
@@ -196,6 +198,8 @@ def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[i
     if seeds is not None:
         if len(set(seeds)) < len(seeds):
             raise SettingError(Diagnostic("--seeds: a seed is given twice", "give each seed once"))
+        if any(abs(seed) > GREATEST_SEED for seed in seeds):
+            raise SettingError(Diagnostic("--seeds: a seed is beyond the integers of a store", "give at most 2^63 - 1"))
         if runs is not None and runs > points * len(seeds):
             hint = f"there are {points} combinations with {len(seeds)} seeds"
             raise SettingError(Diagnostic(f"--runs is {runs}", hint))
