@@ -15,6 +15,7 @@ import msgspec
 from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError, SimulationError
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.encodable import encodable
 
 T = TypeVar("T")
 FORMAT = 1
@@ -213,10 +214,10 @@ def _row(run: StoredRun) -> tuple[Any, ...]:
         run.status,
         json.dumps(run.point),
         json.dumps(run.result),
-        run.error,
-        run.command,
+        encodable(run.error),
+        encodable(run.command),
         run.wall_s,
-        zlib.compress(run.settings.encode()),
+        zlib.compress(encodable(run.settings).encode()),
     )
 
 
