@@ -62,11 +62,12 @@ def project_entry_points() -> dict[str, tuple[EntryPoint, ...]]:
     Raise SettingError if its pyproject.toml cannot be read or is invalid.
     """
     folder = os.environ.get(VARIABLE)
-    return _entry_points(Path(folder)) if folder else {}
+    return entry_points_of(Path(folder)) if folder else {}
 
 
 @cache
-def _entry_points(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
+def entry_points_of(folder: Path) -> dict[str, tuple[EntryPoint, ...]]:
+    """Return the entry points of the project in a folder as `project_entry_points`."""
     path = folder / _FILE
     content = _table(path) or {}
     folders = content.get("tool", {}).get("eidrive", {}).get("pythonpath", [])

@@ -8,10 +8,11 @@ import traceback
 from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, quoted, suggestion
-from eidrive_scenario.project import project_entry_points
+from eidrive_scenario.project import entry_points_of, project_entry_points
 
 GROUPS = (
     "actions",
@@ -173,6 +174,16 @@ def register(kind: str, name: str, value: str) -> None:
     if EntryPoint.pattern.match(value) is None or ":" not in value:
         raise RegistryError(f"extension {name!r}: {value!r} is not an object (expected package.module:Object)")
     registry(kind).add(name, value)
+
+
+def use_project(folder: str) -> None:
+    """Use the extensions of a project in a process that may have read its registries before.
+
+    Raise SettingError for an invalid project, and RegistryError if another extension has one of the names.
+    """
+    for kind, points in entry_points_of(Path(folder)).items():
+        for point in points if kind in GROUPS else ():
+            registry(kind).add(point.name, point.value)
 
 
 def distributions(used: Iterable[tuple[str, str]]) -> dict[str, str]:

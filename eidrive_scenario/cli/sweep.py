@@ -139,12 +139,20 @@ def sweep(
     axes = parse_axes(vary or [])
     search = None
     if falsify or find_boundary is not None:
-        search = Search.of(axes, find_boundary, bound, tolerance, falsify, objective, runs)
+        search = Search.of(axes, find_boundary, bound, tolerance, falsify, objective, runs, chosen)
         axes, runs, chosen = search.fixed, None, chosen or [1]
         if shard is not None or design != "grid":
             raise SettingError(Diagnostic("a search has neither shards nor a design", "remove --shard and --design"))
     points = points_of(axes, design, samples, seed=1)
-    plan = plan_of(path, points, settings, seeds=chosen, runs=runs, is_distribution=definition(path) == "distribution")
+    plan = plan_of(
+        path,
+        points,
+        settings,
+        seeds=chosen,
+        runs=runs,
+        space=() if search is None else search.axes,
+        is_distribution=definition(path) == "distribution",
+    )
     jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
     if dry_run:
         typer.echo(f"{len(jobs)} runs of {scenario}: {len(plan.points)} combinations, {len(plan.seeds)} seeds each")

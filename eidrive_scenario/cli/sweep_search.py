@@ -10,7 +10,7 @@ from typing import Self
 import typer
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis
+from eidrive_scenario.experiments.sweeps.axes import Axis, check_different, parse_axis
 from eidrive_scenario.experiments.sweeps.boundary import Boundary
 from eidrive_scenario.experiments.sweeps.execution import KeptFiles
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
@@ -50,16 +50,23 @@ class Search:
         falsified: bool,
         objective: str | None,
         runs: int | None,
+        seeds: Sequence[int] | None = None,
     ) -> Self:
         """Return the search of these options. Raise SettingError for options that do not fit together."""
         if boundary is not None and falsified:
             raise SettingError(Diagnostic("--find-boundary and --falsify are two searches", "give one of them"))
+        if seeds is not None and (boundary is not None or len(seeds) != 1):
+            hint = (
+                "remove it: each run has another seed" if boundary is not None else "give one seed, which all runs have"
+            )
+            raise SettingError(Diagnostic("--seeds does not fit to the search", hint))
         space = tuple(axis for axis in axes if axis.is_interval or len(axis.values) > 1)
         fixed = tuple(axis for axis in axes if axis not in space)
         most = runs or MOST_RUNS
         if boundary is None:
             return cls(None, bound, math.nan, space, fixed, objective, most)
         axis = parse_axis(boundary)
+        check_different([*axes, axis])
         if not axis.is_interval:
             raise SettingError(Diagnostic(f"--find-boundary: {axis.name} is not an interval", "expected NAME=LOW:HIGH"))
         if space:
@@ -72,6 +79,11 @@ class Search:
             raise SettingError(Diagnostic(f"--tolerance is {tolerance}", "give a positive number"))
         return cls(axis, bound, least, (), fixed, objective, most)
 
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """Axes whose values the search selects."""
+        return self.space if self.boundary is None else (self.boundary,)
+
     def run(
         self,
         plan: SweepPlan,
@@ -82,7 +94,10 @@ class Search:
         retry: bool,
         files: KeptFiles | None = None,
     ) -> None:
-        """Search, and print the result."""
+        """Search, and print the result. Raise SettingError for a distribution of several runs."""
+        if len(plan.points) > 1:
+            text = f"{plan.scenario}: a search needs one scenario (got a distribution of {len(plan.points)} runs)"
+            raise SettingError(Diagnostic(text, "give the scenario of the distribution, and --vary or --param"))
 
         def execute(jobs: Sequence[SweepJob]) -> list[StoredRun]:
             run_sweep(jobs, store, workers, wall_limit=wall_limit, retry=retry, files=files)

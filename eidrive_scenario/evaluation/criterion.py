@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError
+from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, quoted
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.settings import Settings
@@ -138,32 +138,53 @@ def actor_never_present(names: Iterable[str]) -> str:
 
 
 def checked_verdict(criterion: Criterion) -> Verdict:
-    """Return the verdict of a criterion. Raise InvalidResult if it is not a Verdict or its numbers are undefined."""
+    """Return the verdict of a criterion, with numbers and truth values of Python instead of those of numpy.
+
+    Raise InvalidResult if it is not a Verdict, or if its numbers are undefined or exceed the range of a float.
+    """
     verdict: object = criterion.verdict()
     if not isinstance(verdict, Verdict):
         what = "None" if verdict is None else f"an object of type {type(verdict).__name__}"
         raise InvalidResult(criterion, "verdict", f"returned {what} (expected Verdict)")
     if not isinstance(verdict.passed, bool | np.bool_):
         raise InvalidResult(criterion, "verdict", f"returned passed = {verdict.passed!r} (expected True or False)")
+    plain: dict[str, Any] = {"passed": bool(verdict.passed), "fatal": bool(verdict.fatal)}
     for name in ("value", "limit", "first_violation"):
         number = getattr(verdict, name)
-        if number is not None and (not isinstance(number, Real | np.bool_) or number != number):
-            raise InvalidResult(criterion, "verdict", f"returned {name} = {number!r} (expected a number or None)")
+        plain[name] = None if number is None else _plain_number(number)
+        if number is not None and (plain[name] is None or number != number):
+            text = f"returned {name} = {quoted(number)} (expected a number or None)"
+            raise InvalidResult(criterion, "verdict", text)
     for name in ("name", "unit", "reason"):
         if not isinstance(text := getattr(verdict, name), str):
             raise InvalidResult(criterion, "verdict", f"returned {name} = {text!r} (expected a text)")
-    return verdict
+    return replace(verdict, **plain)
 
 
 def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
-    """Return the metrics of a criterion. Raise InvalidResult if they are not numbers by name."""
+    """Return the metrics of a criterion as numbers of Python. Raise InvalidResult if they are not numbers by name."""
     metrics: object = criterion.metrics()
     if not isinstance(metrics, Mapping):
         raise InvalidResult(criterion, "metrics", f"returned {metrics!r} (expected numbers by name)")
+    plain: dict[str, float] = {}
     for name, number in metrics.items():
-        if not isinstance(name, str) or not isinstance(number, Real | np.bool_):
-            raise InvalidResult(criterion, "metrics", f"returned {name!r}: {number!r} (expected numbers by name)")
-    return metrics
+        found = _plain_number(number)
+        if not isinstance(name, str) or found is None:
+            text = f"returned {name!r}: {quoted(number)} (expected numbers by name)"
+            raise InvalidResult(criterion, "metrics", text)
+        plain[name] = found
+    return plain
+
+
+def _plain_number(number: object) -> float | None:
+    """Return a number as float, or as int if it is one; None for another object, and beyond the range of a float."""
+    if not isinstance(number, int | Real | np.bool_):
+        return None
+    try:
+        found = float(number)
+    except OverflowError:
+        return None
+    return number if isinstance(number, int) and not isinstance(number, bool) else found
 
 
 def evaluate_criteria(

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval
 from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest
 from eidrive_scenario.simulation import RunResult
@@ -44,16 +47,27 @@ def decision_text(test: RatioTest, decision: Decision, rate: Proportion) -> str:
 def decide_rate(run: Callable[[int], RunResult], test: RatioTest, *, first_seed: int = 1) -> RateVerdict:
     """Return the verdict on the success rate of a run, which is called with one seed after the other.
 
-    An exception of a run ends the test.
+    An exception of a run ends the test. Raise SimulationError for a run that ends at its time limit before a criterion
+    has failed, as it has no verdict.
     """
     failures: list[RunResult] = []
     trials = 0
     decision = None
     while decision is None:
         result = run(first_seed + trials)
+        if result.exit_code == ABORTED:
+            raise _without_verdict(result)
         trials += 1
         if not result.passed:
             failures.append(result)
         decision = test.decision(trials - len(failures), trials)
     rate = anytime_interval(trials - len(failures), trials, 1.0 - test.false_pass)
     return RateVerdict(test, decision, rate, tuple(failures))
+
+
+def _without_verdict(result: RunResult) -> SimulationError:
+    text = f"seed {result.seed}: ended by its {result.end_reason} after {result.simulated_s:.2f} s"
+    error = SimulationError(text)
+    for note in (*result.final_state, *reproduction_lines(result)):
+        error.add_note(note)
+    return error

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from eidrive_scenario.errors import EidriveError, ExtensionError, InputError
 from eidrive_scenario.exit_codes import ABORTED
+from eidrive_scenario.files.encodable import encodable
 
 if TYPE_CHECKING:
     from eidrive_scenario.evaluation import Verdict
@@ -90,5 +91,5 @@ def failure_text(error: BaseException) -> str | None:
     if isinstance(error, ExtensionError):
         from eidrive_scenario.simulation.attribution import traceback_from_extension
 
-        lines += ["", traceback_from_extension(error)]
+        lines += ["", encodable(traceback_from_extension(error))]
     return "\n".join(lines).rstrip()

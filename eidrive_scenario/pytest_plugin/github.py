@@ -19,7 +19,7 @@ _MAX_BYTES = 1_000_000
 """Maximum size of the summary of one step; GitHub rejects a file of more than 1 MiB."""
 _MAX_REASON = 300
 """Maximum number of characters of a reason in the summary."""
-_OUTCOMES = ("passed", "failed", "error", "skipped", "rerun")
+_OUTCOMES = ("passed", "failed", "error", "skipped", "xfailed", "xpassed", "rerun")
 
 
 def is_active() -> bool:

@@ -43,6 +43,9 @@ _SHOWN = (
 """Options that the header of a report lists."""
 _COMBINED = ("drive", "criterion")
 """Options whose values are added to those of the ini file."""
+_EXCLUSIVE = ("seeds", "success_rate")
+"""Options of which one place gives at most one."""
+_EXCLUDE = " exclude each other (expected one of them)"
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _INI = pytest.StashKey[dict[str, Any]]()
 """Parsed values of the ini options with a value, by name."""
@@ -176,6 +179,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_INI] = {option.name: value for option in OPTIONS if (value := _ini_value(config, option)) is not None}
     config.stash[_GIVEN] = _given(config)
     markers.declare(config)
+    _check_exclusive(config)
     if not hasattr(config, "workerinput"):  # its controller has checked them
         for option in OPTIONS:
             option_checks.check_values(option.name, option.flag, command_line_value(config, option.name), Path())
@@ -184,6 +188,14 @@ def pytest_configure(config: pytest.Config) -> None:
     junit.register(config)
     limit = option_value(config, "wall_limit")
     hung_runs.configure(config, hung_runs.USUAL_LIMIT if limit is None else limit)
+
+
+def _check_exclusive(config: pytest.Config) -> None:
+    """Raise UsageError if the command line or the ini file gives a number of seeds beside a success rate."""
+    if all(command_line_value(config, name) is not None for name in _EXCLUSIVE):
+        raise pytest.UsageError(" and ".join(f"--eidrive-{name.replace('_', '-')}" for name in _EXCLUSIVE) + _EXCLUDE)
+    if all(name in config.stash[_INI] for name in _EXCLUSIVE):
+        raise pytest.UsageError("ini options " + " and ".join(f"eidrive_{name}" for name in _EXCLUSIVE) + _EXCLUDE)
 
 
 def _ini_value(config: pytest.Config, option: Option) -> Any:

@@ -92,13 +92,15 @@ def run_variants(
         replaced.append(f"--eidrive-channel {','.join(map(str, names))} replaces the marker's channel=[{listed}]")
     if option and seeds is not None and option != seeds:
         replaced.append(f"--eidrive-seeds {option} replaces the marker's seeds={seeds}")
+    if option and rate is not None:
+        replaced.append(f"--eidrive-seeds {option} replaces the marker's success_rate")
     driven = [text.partition("=")[0].strip() for text in command_line_value(config, "drive") or ()]
     for name in driven:
         if name in added.driven:
             replaced.append(f"--eidrive-drive {name} replaces the driving stack of {name!r} in the marker")
     chosen = names or channels or split_channels(",".join(listed_value(config, "channel"))) or (None,)
     number = option or seeds or option_value(config, "seeds") or 1
-    tested = command_line_value(config, "success_rate") or rate
+    tested = command_line_value(config, "success_rate") or (None if option else rate)
     if tested is None and option is None and seeds is None:
         tested = option_value(config, "success_rate")
     named = {name: _short(value) for name in _NAMED if (value := option_value(config, name)) is not None}

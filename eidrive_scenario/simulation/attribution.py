@@ -17,6 +17,7 @@ from types import FrameType, TracebackType
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
+from eidrive_scenario.files.encodable import encodable
 from eidrive_scenario.registry import Registration, is_built_in, registration, third_party_files
 from eidrive_scenario.wall_limit import LimitReached, current_limit
 
@@ -65,11 +66,11 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
             limit.armed = False
         raise _wall_limit_error(calls, seconds, time, observers) from error
     if isinstance(error, InvalidResult):
-        raise ExtensionError(_place_of_method(error, calls, time), str(error)) from error.__cause__
+        raise ExtensionError(_place_of_method(error, calls, time), encodable(str(error))) from error.__cause__
     place = _extension_place(calls, time, observers)
     if place is None or type(error).__module__.partition(".")[0] in _CONTROL_FLOW:
         return
-    raise ExtensionError(place, _diagnostic(error, calls, place)) from error
+    raise ExtensionError(place, encodable(_diagnostic(error, calls, place))) from error
 
 
 Result = TypeVar("Result")

@@ -164,6 +164,7 @@ def test_keyboard_interrupt_of_extension_interrupts_the_run(
         ({"criterion": "faulty: {fault: none}"}, "verdict returned None (expected Verdict)"),
         ({"criterion": "faulty: {fault: nan}"}, "verdict returned passed = nan (expected True or False)"),
         ({"criterion": "faulty: {fault: value}"}, "verdict returned value = nan (expected a number or None)"),
+        ({"criterion": "faulty: {fault: surrogate}"}, r"OSError: no file 'a\udcff'"),
         ({"criterion": "faulty: {fault: metrics}"}, "metrics returned None (expected numbers by name)"),
         ({"action": "none"}, "update returned no Status (expected RUNNING, SUCCESS or FAILURE)"),
         ({"condition": "none"}, "the condition returned None (expected True or False)"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from typing import Any
@@ -28,6 +28,9 @@ SETTINGS = (CHANNEL, "detector", "planner", "weather", "cooperate", "dt", "time_
 _KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
 """Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
+_MOST_DIGITS = 16
+"""Maximum number of digits of an integer; longer ones are identifiers."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Axis:
 def parse_axis(text: str) -> Axis:
     """Return the axis of a text: `NAME=A,B,C` (list), `NAME=LOW:HIGH:STEP` (range), or `NAME=LOW:HIGH` (interval).
 
-    A range contains both ends. Steps are exact decimals: three steps of 0.1 are 0.3.
+    A range contains its upper end if a step reaches it. Steps are exact decimals: three steps of 0.1 are 0.3.
     Raise SettingError for other texts.
     """
     name, separator, given = text.partition("=")
@@ -82,10 +85,15 @@ def parse_axis(text: str) -> Axis:
 def parse_axes(texts: list[str]) -> tuple[Axis, ...]:
     """Return the axes of several texts. Raise SettingError for an invalid one, or a name that is given twice."""
     axes = tuple(parse_axis(text) for text in texts)
+    check_different(axes)
+    return axes
+
+
+def check_different(axes: Sequence[Axis]) -> None:
+    """Raise SettingError if two axes have one name."""
     for row, axis in enumerate(axes):
         if _identity(axis.name) in [_identity(other.name) for other in axes[:row]]:
             raise _error(axis.name, "the axis is given twice")
-    return axes
 
 
 def _identity(name: str) -> str:
@@ -121,9 +129,21 @@ def _range(text: str, low: Decimal, high: Decimal, step: Decimal) -> tuple[Scala
 
 
 def _typed(text: str) -> Scalar:
-    if re.fullmatch(r"[+-]?(0|[1-9]\d{0,15})", text, re.ASCII):
-        return int(text)
-    return float(text) if _NUMBER.fullmatch(text) and math.isfinite(float(text)) else text
+    if not is_number(text):
+        return text
+    return int(text) if _INTEGER.fullmatch(text) else float(text)
+
+
+def is_number(text: str) -> bool:
+    """Return whether a text is a number that it can be written as again.
+
+    Texts with leading zeros (`007`) and integers of more than 16 digits are identifiers.
+    """
+    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
+        return False
+    digits = text.lstrip("+-")
+    has_leading_zero = len(digits) > 1 and digits[0] == "0" and digits[1].isdecimal()
+    return not has_leading_zero and not (_INTEGER.fullmatch(text) and len(digits) > _MOST_DIGITS)
 
 
 def settings_at(point: Point, base: RunSettings, profile: Mapping[str, Any] | None) -> RunSettings:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import ExitStack
 from typing import Any, TypeVar
 
 from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.experiments.sweeps.execution import end_with_hung_runs
 from eidrive_scenario.optional_imports import optional_import
+from eidrive_scenario.project import VARIABLE
+from eidrive_scenario.registry import use_project
 
 R = TypeVar("R")
 SLURM, KUBERNETES = "slurm", "kubernetes"
@@ -64,7 +68,9 @@ class DaskWorkers:
         return AHEAD * max(1, int(sum(self._client.nthreads().values())))
 
     def submit(self, function: Callable[..., R], /, *arguments: Any) -> Future[R]:
-        future: Future[R] = self._executor.submit(function, *arguments)
+        project = os.environ.get(VARIABLE)
+        folder = None if project is None else os.path.abspath(project)
+        future: Future[R] = self._executor.submit(run_in_worker, folder, function, *arguments)
         return future
 
     def is_crash(self, error: BaseException) -> bool:
@@ -73,3 +79,18 @@ class DaskWorkers:
     def close(self) -> None:
         self._executor.shutdown(wait=False)
         self._resources.close()
+
+
+def run_in_worker(folder: str | None, function: Callable[..., R], /, *arguments: Any) -> R:
+    """Return the result of a call in a worker, which does not inherit the environment of the command.
+
+    folder  folder of the project whose extensions are used; None for none
+
+    A worker with a nanny, which replaces it, ends with code that does not return.
+    Raise SettingError for an invalid project, and RegistryError if another extension has one of the names.
+    """
+    if folder is not None:
+        use_project(folder)
+    if optional_import("distributed", "cluster").get_worker().nanny is not None:
+        end_with_hung_runs()
+    return function(*arguments)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +25,7 @@ class Comparison:
     p_value    McNemar's exact test of equal rates, two-sided
     p_worse    test that the second rate is lower by the margin or more
     margin, confidence   of the decision
-    metrics    differences of the metrics in pairs that have them
+    metrics    differences of the metrics in pairs that have finite values of them
     """
 
     verdicts: PairedVerdicts
@@ -92,12 +93,14 @@ def _by_identity(paths: Sequence[Path]) -> dict[Identity, StoredRun]:
 
 def _difference(name: str, pairs: Sequence[tuple[StoredRun, StoredRun]], confidence: float) -> PairedDifference:
     values: list[tuple[Any, Any]] = [(a.result.get(name), b.result.get(name)) for a, b in pairs]
-    known = [(float(a), float(b)) for a, b in values if _is_number(a) and _is_number(b)]
+    known = [(float(a), float(b)) for a, b in values if _is_finite(a) and _is_finite(b)]
     if not known:
-        numbers = sorted({key for run, _ in pairs for key, value in run.result.items() if _is_number(value)})
-        raise SettingError(Diagnostic(f"--metric: no pair of runs has {name!r}", f"known: {', '.join(numbers)}"))
+        numbers = sorted({key for run, _ in pairs for key, value in run.result.items() if _is_finite(value)})
+        raise SettingError(
+            Diagnostic(f"--metric: no pair of runs has finite numbers {name!r}", f"known: {', '.join(numbers)}")
+        )
     return paired_difference([a for a, _ in known], [b for _, b in known], confidence=confidence)
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -6,13 +6,14 @@ import os
 import threading
 import time
 import traceback
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
 from eidrive_scenario.errors import ConstraintError, InputError, WallLimitError
 from eidrive_scenario.exit_codes import ABORTED as ABORTED_CODE
-from eidrive_scenario.experiments.commands import command_of
+from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
 from eidrive_scenario.experiments.sweeps.store import (
@@ -26,7 +27,9 @@ from eidrive_scenario.experiments.sweeps.store import (
     StoredRun,
 )
 from eidrive_scenario.library import name_of
+from eidrive_scenario.openscenario import ConcreteRun
 from eidrive_scenario.perception.learned import image_memory
+from eidrive_scenario.simulation.result_views import typed
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 _one_run = threading.Lock()
@@ -36,6 +39,11 @@ _one_run = threading.Lock()
 def prepare_process() -> None:
     """Prepare a worker process: equal images are processed once, and code that never returns ends the process."""
     image_memory.activate(image_memory.ImageMemory())
+    end_with_hung_runs()
+
+
+def end_with_hung_runs() -> None:
+    """End this process at a wall limit if the code of the run does not return."""
     set_last_resort(LastResort(_end_process))
 
 
@@ -74,26 +82,26 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
                 record=False if files is None else files.record,
                 wall_limit=wall_limit,
             )
+            return StoredRun(
+                key=job.key,
+                number=job.number,
+                scenario=result.scenario,
+                run=job.run,
+                seed=job.seed,
+                status=PASSED if result.passed else FAILED,
+                point=dict(job.point),
+                result={**result.to_dict(), **_folder(result.folder, files)},
+                error="",
+                command=result.command,
+                wall_s=round(time.perf_counter() - start, 4),
+                settings=result.settings.canonical,
+            )
         except ConstraintError as error:
             return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
         except InputError as error:
             return _without_result(job, INVALID, str(error), time.perf_counter() - start)
         except Exception as error:
             return _without_result(job, ABORTED, _message(error), time.perf_counter() - start)
-        return StoredRun(
-            key=job.key,
-            number=job.number,
-            scenario=result.scenario,
-            run=job.run,
-            seed=job.seed,
-            status=PASSED if result.passed else FAILED,
-            point=dict(job.point),
-            result={**result.to_dict(), **_folder(result.folder, files)},
-            error="",
-            command=result.command,
-            wall_s=round(time.perf_counter() - start, 4),
-            settings=result.settings.canonical,
-        )
 
 
 def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
@@ -109,18 +117,22 @@ def crashed(job: SweepJob, message: str) -> StoredRun:
 
 
 def _without_result(job: SweepJob, status: str, message: str, wall_s: float) -> StoredRun:
-    command = "" if job.run is not None else command_of(job.scenario, job.seed, job.settings)
+    source: Path | ConcreteRun = job.scenario
+    with suppress(InputError):  # of a distribution that has changed since the plan
+        source = source_of(job)
+    is_known = job.run is None or isinstance(source, ConcreteRun)
+    varied = source.parameters if isinstance(source, ConcreteRun) else {}
     return StoredRun(
         key=job.key,
         number=job.number,
-        scenario=name_of(job.scenario),
+        scenario=name_of(source.scenario if isinstance(source, ConcreteRun) else source),
         run=job.run,
         seed=job.seed,
         status=status,
         point=dict(job.point),
-        result={},
+        result={f"parameter.{name}": typed(text) for name, text in varied.items()},
         error=message,
-        command=command,
+        command=command_of_source(source, job.seed, job.settings) if is_known else "",
         wall_s=round(wall_s, 4),
     )
 

@@ -2,45 +2,31 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import ConstraintError, Diagnostic, SettingError, suggestion
-from eidrive_scenario.experiments.sweeps.axes import (
-    CHANNEL,
-    PARAMETER,
-    SETTINGS,
-    Point,
-    Scalar,
-    is_setting,
-    settings_at,
+from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
+from eidrive_scenario.experiments.sweeps.axes import PARAMETER, SETTINGS, Axis, Point, is_setting, settings_at
+from eidrive_scenario.experiments.sweeps.inputs import (
+    RUN,
+    Contents,
+    contents_of,
+    digest_of,
+    first_resolved,
+    without_run,
 )
-from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.openscenario import ConcreteRun, load_distribution
-from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json, package_versions, sha256_of
-from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.resolved_settings import canonical_json, package_versions, sha256_of
+from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.v2x.profile import load_profile
 
 MOST_RUNS = 10_000_000
 """Maximum number of runs of a sweep."""
-RUN = "run"
-"""Name of the axis of the runs of a distribution file."""
-_INPUTS = (
-    "files",
-    "versions",
-    "extensions",
-    "channel_profile",
-    "later_channels",
-    "stations",
-    "weather_profile",
-    "criteria",
-)
-"""Resolved settings that determine results beside the settings of a run, which may only name their files."""
+GREATEST_SEED = 2**63 - 1
+"""Greatest integer of a column of SQLite."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +60,7 @@ class SweepPlan:
     settings  settings of all runs
     inputs    digest of all input files, of what they contain, and of versions
     profile   channel profile whose settings the axes `channel.KEY` replace
-    contents  the same digest with one setting, by its axis and value, as these values may name files
+    contents  the same digest with one text of an axis, or with the texts of a run of a distribution; these name files
     """
 
     scenario: Path
@@ -84,7 +70,7 @@ class SweepPlan:
     settings: RunSettings
     inputs: str
     profile: Mapping[str, Any] | None
-    contents: Mapping[tuple[str, Scalar], str]
+    contents: Contents
 
     def __len__(self) -> int:
         return self.runs
@@ -101,7 +87,7 @@ class SweepPlan:
 
     def job(self, number: int, point: Point, seed: int) -> SweepJob:
         """Return a run at a point, which need not be one of the plan."""
-        settings = settings_at(_without_run(point), self.settings, self.profile)
+        settings = settings_at(without_run(point), self.settings, self.profile)
         run = int(point[RUN]) if RUN in point else None
         contents = {name: found for name in point if (found := self.contents.get((name, point[name]))) is not None}
         inputs = {"inputs": self.inputs, "contents": contents}
@@ -131,6 +117,7 @@ def plan_of(
     *,
     seeds: Iterable[int] | None = None,
     runs: int | None = None,
+    space: Sequence[Axis] = (),
     is_distribution: bool = False,
 ) -> SweepPlan:
     """Return the plan of a sweep.
@@ -139,69 +126,67 @@ def plan_of(
 
     seeds  seeds of each combination; None: 1, or as many from 1 on as `runs` requires
     runs   number of runs; None: every combination with every seed
+    space  axes whose values a search selects
 
     Raise InputError for an invalid scenario or setting, and ConstraintError if all runs are excluded.
     """
+    probes = _with_space(points, space)
+    _check_names_of_runs(scenario, probes, settings, is_distribution)
     if is_distribution:
-        points = [{RUN: number, **point} for number in range(len(load_distribution(scenario))) for point in points]
+        numbers = range(len(load_distribution(scenario)))
+        points, probes = (
+            [{RUN: number, **point} for number in numbers for point in several] for several in (points, probes)
+        )
     chosen = _seeds(len(points), None if seeds is None else list(seeds), runs)
     total = len(points) * len(chosen)
     if not 0 < total <= MOST_RUNS:
         raise SettingError(Diagnostic(f"the sweep has {total} runs", f"expected 1 to {MOST_RUNS}"))
-    first = _first_resolved(scenario, points, settings)
+    first = first_resolved(scenario, probes, settings)
     profile = first.channel_profile
-    _check_names(points, first.parameters)
-    contents = _contents(scenario, points, settings)
+    _check_names(probes, first.parameters)
+    contents = contents_of(scenario, probes, settings)
     runs = min(total, runs or total)
-    plan = SweepPlan(scenario, tuple(points), chosen, runs, settings, _digest(scenario, first), profile, contents)
-    for point in points:  # a point that cannot be run is an error before the runs, not among them
-        at = settings_at(_without_run(point), settings, profile)
+    plan = SweepPlan(scenario, tuple(points), chosen, runs, settings, digest_of(scenario, first), profile, contents)
+    for point in probes:  # a point that cannot be run is an error before the runs, not among them
+        at = settings_at(without_run(point), settings, profile)
         if isinstance(at.channel, Mapping):
             load_profile(at.channel, origin="--vary: channel")
     return plan
 
 
+def _with_space(points: Sequence[Point], space: Sequence[Axis]) -> Sequence[Point]:
+    """Return the points of a search that have each value of a list, and both ends of an interval, once."""
+    if not space:
+        return points
+    start = {axis.name: axis.at(0.0) for axis in space}
+    ends = [(axis.name, value) for axis in space for value in axis.values or (axis.low, axis.high)]
+    return [{**point, **start, name: value} for point in points for name, value in ends]
+
+
+def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunSettings, is_distribution: bool) -> None:
+    """Raise SettingError if an axis has the name of the runs of a distribution.
+
+    So does an axis or a setting of all runs with the name of a parameter that the distribution varies.
+    """
+    names = dict.fromkeys(name for point in points for name in point)
+    if RUN in names:
+        hint = f"give {PARAMETER}{RUN} for a parameter of this name; all runs of a distribution are executed"
+        raise SettingError(Diagnostic(f"--vary: {RUN!r} is the number of a run of a distribution", hint))
+    given = dict.fromkeys(settings.parameters, "--param")
+    given |= {name.removeprefix(PARAMETER): "--vary" for name in names if not is_setting(name)}
+    for name, place in load_distribution(scenario).varied.names.items() if is_distribution else ():
+        if name in given:
+            text = f"{given[name]}: the distribution varies parameter {name!r}"
+            raise SettingError(Diagnostic(text, "remove the option", place.source, place.line))
+
+
 def _check_names(points: Sequence[Point], declared: Iterable[str]) -> None:
     """Raise SettingError if an axis is neither a setting nor a declared parameter."""
-    for name in dict.fromkeys(name for point in points for name in _without_run(point)):
+    for name in dict.fromkeys(name for point in points for name in without_run(point)):
         parameter = name.removeprefix(PARAMETER)
         if not is_setting(name) and parameter not in declared:
             text = f"--vary: unknown parameter or setting {parameter!r}"
             raise SettingError(Diagnostic(text, suggestion(parameter, [*declared, *sorted(SETTINGS)])))
-
-
-def _contents(scenario: Path, points: Sequence[Point], settings: RunSettings) -> dict[tuple[str, Scalar], str]:
-    """Return the digest of the inputs of a run with each text of a setting, by name and value.
-
-    Build these runs, and those with the least and the greatest of the numbers of a setting, to find invalid values.
-    Raise InputError for an invalid one.
-    """
-    found: dict[tuple[str, Scalar], str] = {}
-    for name in SETTINGS:
-        values = dict.fromkeys(point[name] for point in points if name in point)
-        numbers = [value for value in values if not isinstance(value, str)]
-        texts: list[Scalar] = [value for value in values if isinstance(value, str)]
-        for value in texts + ([min(numbers), max(numbers)] if numbers else []):
-            with suppress(ConstraintError):
-                resolved = _resolved(scenario, points[0].get(RUN), settings_at({name: value}, settings, None))
-                if isinstance(value, str):
-                    found[name, value] = _digest(scenario, resolved)
-    return found
-
-
-def _digest(scenario: Path, resolved: ResolvedSettings) -> str:
-    """Return the digest of the file of a scenario or distribution, and of the inputs among resolved settings."""
-    inputs = resolved.as_json()
-    content = {name: inputs[name] for name in _INPUTS}
-    content |= {"file": sha256_of(scenario.read_bytes()), "code": [_code(one) for one in resolved.extensions.values()]}
-    return sha256_of(canonical_json(content).encode())
-
-
-def _code(extension: str) -> str:
-    """Return the digest of the module of an extension, named by its package and entry point; empty if unknown."""
-    module = sys.modules.get(extension.rpartition("(")[2].partition(":")[0])
-    file = getattr(module, "__file__", None)
-    return sha256_of(Path(file).read_bytes()) if file is not None and is_regular_file(Path(file)) else ""
 
 
 def versions() -> Mapping[str, str]:
@@ -213,39 +198,13 @@ def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[i
     if seeds is not None:
         if len(set(seeds)) < len(seeds):
             raise SettingError(Diagnostic("--seeds: a seed is given twice", "give each seed once"))
+        if any(abs(seed) > GREATEST_SEED for seed in seeds):
+            raise SettingError(Diagnostic("--seeds: a seed is beyond the integers of a store", "give at most 2^63 - 1"))
         if runs is not None and runs > points * len(seeds):
             hint = f"there are {points} combinations with {len(seeds)} seeds"
             raise SettingError(Diagnostic(f"--runs is {runs}", hint))
         return seeds
     return range(1, 1 + (-(-runs // points) if runs is not None and points else 1))
-
-
-def _first_resolved(scenario: Path, points: Sequence[Point], settings: RunSettings) -> ResolvedSettings:
-    """Return the resolved settings without a point, or of the first point if constraints exclude this run.
-
-    Without a point, so that the digest of the inputs does not depend on the order of the points.
-    """
-    try:
-        return _resolved(scenario, points[0].get(RUN), settings)
-    except ConstraintError as error:
-        excluded = error
-    for point in points:
-        chosen = {name: value for name, value in _without_run(point).items() if not name.startswith(f"{CHANNEL}.")}
-        try:
-            return _resolved(scenario, point.get(RUN), settings_at(chosen, settings, None))
-        except ConstraintError as error:
-            excluded = error
-    raise excluded
-
-
-def _without_run(point: Point) -> Point:
-    return {name: value for name, value in point.items() if name != RUN}
-
-
-def _resolved(scenario: Path, run: Scalar | None, settings: RunSettings) -> ResolvedSettings:
-    source = scenario if run is None else load_distribution(scenario)[int(run)]
-    with Simulation(source, settings=settings) as simulation:
-        return simulation.resolved
 
 
 def source_of(job: SweepJob) -> Path | ConcreteRun:

@@ -109,8 +109,11 @@ def summaries(
 
 def _varied_parameters(run: StoredRun) -> dict[str, Any]:
     """Return the values of the parameters that the distribution of a run varies; empty for other runs."""
-    if run.run is None or not run.settings:
+    if run.run is None:
         return {}
+    if not run.settings:  # a run that did not start has these parameters only
+        prefix = "parameter."
+        return {name.removeprefix(prefix): value for name, value in run.result.items() if name.startswith(prefix)}
     names = msgspec.json.decode(run.settings, type=_VariedNames).varied
     return {name: run.result[column] for name in names if (column := f"parameter.{name}") in run.result}
 

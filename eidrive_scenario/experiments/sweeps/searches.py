@@ -73,7 +73,7 @@ def find_boundary(
 class Falsification:
     """Result of a search for failures.
 
-    runs      number of runs;  failed  failed ones
+    runs      number of different runs;  failed  failed ones
     failures  the most different failures, the first found first
     least     run with the least objective; None without one
     """
@@ -99,8 +99,9 @@ def falsify(
 
     objective  metric or column of the result whose small values are near a failure, such as `min_distance.A.B.box`;
                None: the least margin of all criteria with a value and a limit, relative to the limit
-    shown      function that gets the numbers of runs and of failures after each batch
+    shown      function that gets the numbers of different runs and of failures after each batch
 
+    The sampler may propose a combination of lists again; it counts once.
     Raise SettingError without Optuna, without axes, or if no run of a batch has a verdict or the objective.
     """
     if not axes:
@@ -111,6 +112,8 @@ def falsify(
         sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
     study = optuna.create_study(sampler=sampler)
     found: list[StoredRun] = []
+    different: dict[str, StoredRun] = {}
+    failed: list[StoredRun] = []
     while len(found) < runs:
         trials = [study.ask(_distributions(optuna, axes)) for _ in range(min(BATCH, runs - len(found)))]
         jobs = [
@@ -130,11 +133,12 @@ def falsify(
         if objective is not None and not any(objective in row.result for row in found):
             known = sorted({name for row in found for name, value in row.result.items() if _is_number(value)})
             raise SettingError(Diagnostic(f"--objective: no run has {objective!r}", f"known: {', '.join(known)}"))
-        shown(len(found), sum(row.status == FAILED for row in found))
-    failed = [row for row in found if row.status == FAILED]
+        different = {row.key: row for row in found}
+        failed = [row for row in different.values() if row.status == FAILED]
+        shown(len(different), len(failed))
     valued = [(value, row) for row in found if (value := _objective(row, objective)) is not None]
     least = min(valued, key=lambda pair: pair[0])[1] if valued else None
-    return Falsification(len(found), len(failed), tuple(most_different(failed, axes, shown_failures)), least)
+    return Falsification(len(different), len(failed), tuple(most_different(failed, axes, shown_failures)), least)
 
 
 def most_different(runs: Sequence[StoredRun], axes: Sequence[Axis], count: int) -> list[StoredRun]:

@@ -15,6 +15,7 @@ import msgspec
 from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError, SimulationError
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.encodable import encodable
 
 T = TypeVar("T")
 FORMAT = 1
@@ -51,7 +52,8 @@ class StoredRun(msgspec.Struct, frozen=True):
     run       number in a distribution; None for a scenario
     status    one of STATUSES
     point     values of the axes
-    result    outcome, criteria and metrics as columns: `RunResult.to_dict`; empty if the run did not end
+    result    outcome, criteria and metrics as columns: `RunResult.to_dict`; if the run did not end, only the parameters
+              that its distribution varies
     error     message of a run that did not end
     command   command line that repeats the run
     wall_s    duration with loading [s]
@@ -212,10 +214,10 @@ def _row(run: StoredRun) -> tuple[Any, ...]:
         run.status,
         json.dumps(run.point),
         json.dumps(run.result),
-        run.error,
-        run.command,
+        encodable(run.error),
+        encodable(run.command),
         run.wall_s,
-        zlib.compress(run.settings.encode()),
+        zlib.compress(encodable(run.settings).encode()),
     )
 
 

@@ -9,6 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.execution import KeptFiles, crashed, execute
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import EXCLUDED, FAILED, PASSED, REPEATABLE, ResultStore, StoredRun
@@ -103,7 +104,8 @@ def run_sweep(
     files       files of the runs that are kept; None for none
     shown       function that gets the progress at the start, at the end, and each run once it is stored
 
-    Raise SimulationError if the store cannot be written; the results of all earlier runs are stored.
+    Raise SimulationError if the store cannot be written, or if the scheduler of the workers ends; the results of all
+    earlier runs are stored.
     """
     held = store.statuses()
     progress = SweepProgress(len(jobs))
@@ -140,7 +142,7 @@ def run_sweep(
                 writer.collect()
             for future in [future for future in running if future in ended]:
                 job, tries = running.pop(future)
-                error = future.exception()
+                error = _error_of(future)
                 if error is None:
                     writer.add(future.result())
                 elif not workers.is_crash(error):
@@ -151,3 +153,13 @@ def run_sweep(
                     writer.add(crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}"))
     shown(progress, None)
     return progress
+
+
+def _error_of(future: Future[StoredRun]) -> BaseException | None:
+    """Return the exception of an ended call, or None. Raise SimulationError if its scheduler has cancelled it."""
+    if future.cancelled():
+        raise SimulationError(
+            "the scheduler of the workers has ended; the results of all earlier runs are stored, and the same command "
+            "continues"
+        )
+    return future.exception()

@@ -125,6 +125,15 @@ def test_annotation_escapes_workflow_command(tmp_path: Path, monkeypatch: pytest
     assert line == ("::error file=a%2Cb.xosc,line=1,title=a%2Cb.xosc%3A%3Ax[c%3Ad]::50%25 lost:%0D%0Anext, ::end::")
 
 
+def test_summary_counts_expected_failures(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    step = project.path / "step.md"
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(step))
+    project.makepyfile("import pytest\n\n@pytest.mark.xfail\ndef test_one():\n    assert False\n")
+    project.runpytest_inprocess("test_summary_counts_expected_failures.py", "-p", "no:cacheprovider")
+    assert step.read_text(encoding="utf-8") == "## Scenarios\n\n1 xfailed\n\n"
+
+
 def test_summary_escapes_markdown() -> None:
     text = summary(
         {"failed": 1}, [report("a|b_c::x[y]", "<b>*1*</b>\nsecond", command="eidrive run 'a|b' --param x=`y`")]

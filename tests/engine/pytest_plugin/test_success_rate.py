@@ -52,7 +52,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
 
 
 def result_of(seed: int, failed: set[int]) -> Any:
-    return SimpleNamespace(passed=seed not in failed, seed=seed)
+    return SimpleNamespace(passed=seed not in failed, seed=seed, exit_code=int(seed in failed))
 
 
 def test_decide_rate_runs_consecutive_seeds_until_decision() -> None:
@@ -113,6 +113,15 @@ def test_option_applies_to_scenario_files(project: pytest.Pytester) -> None:
     done.stdout.fnmatch_lines(["*first?rate=0.5?*PASSED*"])
 
 
+def test_rate_of_runs_that_reach_their_time_limit_is_an_error(project: pytest.Pytester) -> None:
+    """As in `eidrive run --success-rate`, such a run has no verdict; a test in Python fails in place of an error."""
+    project.makepyfile(test_rates=TEXT)
+    options = ("--eidrive-success-rate", "0.5", "--eidrive-time-limit", "0.5", "-p", "no:cacheprovider")
+    done = project.runpytest_inprocess("drives", "test_rates.py", "-k", "first.xosc or test_default", *options)
+    done.assert_outcomes(errors=1, failed=1)
+    done.stdout.fnmatch_lines(["seed 1: ended by its time limit after 0.50 s", "reproduce: eidrive run*--seed 1*"])
+
+
 @pytest.mark.parametrize(
     ("argument", "expected"),
     [
@@ -136,6 +145,25 @@ def test_invalid_marker_is_an_error(project: pytest.Pytester, argument: str, exp
 def test_invalid_option_is_a_usage_error(project: pytest.Pytester) -> None:
     done = project.runpytest_subprocess("drives", "--eidrive-success-rate", "1.5")
     assert done.ret == pytest.ExitCode.USAGE_ERROR
+
+
+@pytest.mark.parametrize("place", ["command line", "ini file"])
+def test_seeds_beside_success_rate_are_a_usage_error(project: pytest.Pytester, place: str) -> None:
+    if place == "ini file":
+        project.makeini("[pytest]\neidrive_seeds = 3\neidrive_success_rate = 0.9\n")
+        done = project.runpytest_inprocess("drives")
+    else:
+        done = project.runpytest_inprocess("drives", "--eidrive-seeds", "3", "--eidrive-success-rate", "0.9")
+    assert done.ret == pytest.ExitCode.USAGE_ERROR
+    done.stderr.fnmatch_lines(["*eidrive*seeds and *eidrive*success?rate exclude each other*"])
+
+
+def test_seeds_on_command_line_replace_success_rate_of_marker(project: pytest.Pytester) -> None:
+    """The command line takes precedence over a marker, and a marker over the ini file."""
+    project.makeini("[pytest]\neidrive_success_rate = 0.9\n")
+    project.makepyfile(test_rates=TEXT)
+    done = project.runpytest_inprocess("test_rates.py", "-k", "default", "--eidrive-seeds", "2", "--collect-only", "-q")
+    assert done.outlines[:2] == [f"test_rates.py::test_default[drives/first-seed={seed}]" for seed in (1, 2)]
 
 
 def test_run_command_ends_at_decision(eidrive: Eidrive, passing_by: Path) -> None:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,11 +18,14 @@ from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.axes import parse_axes
 from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
 from eidrive_scenario.experiments.sweeps.designs import points_of
-from eidrive_scenario.experiments.sweeps.execution import execute
-from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
-from eidrive_scenario.experiments.sweeps.store import ResultStore
+from eidrive_scenario.experiments.sweeps.execution import KeptFiles, execute
+from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepJob, plan_of, versions
+from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
+from eidrive_scenario.project import VARIABLE
+from eidrive_scenario.registry import registry, use_project
 from eidrive_scenario.simulation import RunSettings
+from eidrive_scenario.wall_limit import limit_wall_time
 
 distributed = pytest.importorskip("distributed")
 
@@ -52,6 +59,84 @@ def test_sweep_on_cluster_equals_local_one_with_killed_worker(cluster: object, s
     assert progress.is_complete
     expected = {job.key: execute(job, None) for job in plan}
     assert rows == {key: (run.status, run.result["trace_hash"]) for key, run in expected.items()}
+
+
+def test_workers_use_project_of_command(
+    cluster: object, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers of a cluster do not inherit the environment of the command."""
+    (tmp_path / "gap_of_cluster.py").write_text(
+        "from eidrive_criteria.max_speed import MaxSpeed\n\nclass Gap(MaxSpeed):\n    pass\n"
+    )
+    (tmp_path / "pyproject.toml").write_text(
+        '[tool.eidrive]\npythonpath = ["."]\n'
+        '[project.entry-points."eidrive_scenario.criteria"]\ngap_of_cluster = "gap_of_cluster:Gap"\n'
+    )
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setattr(registry("criteria"), "_points", dict(registry("criteria")._points))
+    use_project(str(tmp_path))
+    scenario.write_text(scenario.read_text().replace("{max_speed:", "{gap_of_cluster:"))
+    workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
+    try:
+        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+            run_sweep(Shard(plan_of(scenario, [{}], RunSettings(), seeds=[1, 2])), store, workers)
+            assert [(run.status, run.error) for run in store.runs()] == [("passed", ""), ("passed", "")]
+    finally:
+        workers.close()
+
+
+def test_run_that_does_not_return_ends_its_worker(
+    cluster: object, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A waiting system call in a thread of a worker cannot be interrupted; the other run has a result."""
+
+    def hung_at_30(job: SweepJob, wall_limit: float | None, files: KeptFiles | None) -> StoredRun:
+        if job.point["Speed"] == 30:
+            with limit_wall_time(wall_limit):
+                time.sleep(60.0)
+        return execute(job, None, files)
+
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)  # type: ignore[attr-defined]
+    plan = plan_of(scenario, points_of(parse_axes(["Speed=10,30"]), "grid", None, 1), RunSettings())
+    monkeypatch.setattr("eidrive_scenario.experiments.sweeps.sweep.execute", hung_at_30)
+    workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
+    try:
+        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+            run_sweep(Shard(plan), store, workers, wall_limit=0.2)
+            assert [run.status for run in store.runs()] == ["passed", "crashed"]
+    finally:
+        workers.close()
+
+
+def test_end_of_scheduler_keeps_earlier_runs(scenario: Path, tmp_path: Path) -> None:
+    """Dask cancels all calls if its scheduler ends."""
+
+    class EndingWorkers:
+        capacity = 2
+        calls = 0
+
+        def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            self.calls += 1
+            if self.calls == 1:
+                future.set_result(function(*arguments))
+            else:
+                future.cancel()
+                future.set_running_or_notify_cancel()
+            return future
+
+        def is_crash(self, error: BaseException) -> bool:
+            return False
+
+        def close(self) -> None:
+            """Do nothing."""
+
+    plan = plan_of(scenario, points_of(parse_axes(["Speed=10,12"]), "grid", None, 1), RunSettings())
+    with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        with pytest.raises(SimulationError, match="scheduler of the workers has ended"):
+            run_sweep(Shard(plan), store, EndingWorkers())
+        assert [run.status for run in store.runs()] == ["passed"]
 
 
 def test_connect_without_scheduler_raises(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive, eidrive
+from msgspec.structs import replace
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.sweeps.comparison import compare
@@ -67,6 +69,17 @@ def test_compare_without_common_runs_raises(tmp_path: Path) -> None:
     second = store(tmp_path / "b.db", "2", [None, None, True])
     with pytest.raises(SettingError, match="in common"):
         compare([first], [second])
+
+
+def test_compare_omits_pairs_with_infinite_values(tmp_path: Path) -> None:
+    """A gap of infinity is no measurement; the other pair differs by 0.5."""
+    first, second = store(tmp_path / "a.db", "1", [True, True]), store(tmp_path / "b.db", "2", [True, True], shift=0.5)
+    with ResultStore.open(first, {"eidrive-scenario": "1"}) as opened:
+        run = next(opened.runs())
+        opened.add(replace(run, result={**run.result, "gap": math.inf}))
+    found = compare([first], [second], metrics=["gap"]).metrics["gap"]
+    assert found.pairs == 1
+    assert found.mean == pytest.approx(0.5)
 
 
 def test_compare_with_unknown_metric_names_known_ones(tmp_path: Path) -> None:

@@ -135,6 +135,12 @@ def test_results_combine_stores(eidrive: Eidrive, store: Path, tmp_path: Path) -
         (("sweep", "{scenario}", "--store", "s.db", "--shard", "3/2"), "--shard"),
         (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1,2"), "not an interval"),
         (("sweep", "{scenario}", "--store", "s.db", "--falsify"), "without --vary"),
+        (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1:2", "--seeds", "5"), "--seeds"),
+        (
+            ("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1:2", "--vary", "Speed=1"),
+            "given twice",
+        ),
+        (("sweep", "{distribution}", "--store", "s.db", "--find-boundary", "time_limit=1:2"), "3 runs"),
         (("sweep", "{scenario}", "--store", "s.db", "--vary", "channel.delay.seconds=0,1"), "no channel"),
         (("sweep", "{scenario}", "--store", "s.db", "--vary", "Sped=1,2"), "did you mean 'Speed'"),
         (
@@ -146,10 +152,12 @@ def test_results_combine_stores(eidrive: Eidrive, store: Path, tmp_path: Path) -
     ],
 )
 def test_invalid_commands_are_clear_errors(
-    eidrive: Eidrive, scenario: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], expected: str
+    eidrive: Eidrive, distribution: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], expected: str
 ) -> None:
-    monkeypatch.chdir(scenario.parent)
-    given = [one.format(scenario=scenario, folder=scenario.parent) for one in arguments]
+    folder = distribution.parent
+    monkeypatch.chdir(folder)
+    names = {"scenario": folder / "car.xosc", "distribution": distribution, "folder": folder}
+    given = [one.format(**names) for one in arguments]
     done = eidrive(*given)
     assert done.exit_code == 2
     assert expected in done.stderr
@@ -174,7 +182,7 @@ def test_results_of_a_distribution_by_its_parameters(eidrive: Eidrive, distribut
     store = tmp_path / "s.db"
     assert eidrive("sweep", distribution, "--seeds", "1-2", "--store", store, "--workers", "1").exit_code == 0
     rows = [json.loads(line) for line in eidrive("results", store, "--by", "Speed", "--json").stdout.splitlines()]
-    points = [{"Speed": 10}, {"Speed": 30}, {}]
+    points = [{"Speed": 10}, {"Speed": 30}, {"Speed": 50}]
     assert [(row["point"], row["runs"]) for row in rows] == [
         (point, {status: 2}) for point, status in zip(points, ("passed", "failed", "excluded"), strict=True)
     ]

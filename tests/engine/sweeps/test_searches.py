@@ -116,6 +116,15 @@ def test_falsify_with_unknown_objective_names_known_ones(plan: SweepPlan) -> Non
         falsify(plan, SPACE, execute, runs=20, objective="distanz")
 
 
+@needs_optuna
+def test_falsify_counts_equal_runs_once(plan: SweepPlan) -> None:
+    """The space has four combinations, two of which fail."""
+    space = (Axis("Speed", (5, 30)), Axis("kind", ("a", "b")))
+    found = falsify(plan, space, executed(lambda job: {"passed": float(job.point["Speed"]) < 20.0}), runs=40)
+    assert (found.runs, found.failed) == (4, 2)
+    assert len({run.key for run in found.failures}) == len(found.failures) == 2
+
+
 def test_falsify_without_axes_raises(plan: SweepPlan) -> None:
     with pytest.raises(SettingError, match="without --vary"):
         falsify(plan, (), executed(lambda job: {"passed": True}), runs=20)

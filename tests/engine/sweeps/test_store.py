@@ -35,6 +35,18 @@ def test_add_with_same_key_replaces_row(tmp_path: Path) -> None:
         assert list(store.runs()) == [RUN]
 
 
+def test_add_escapes_bytes_that_are_not_utf_8(tmp_path: Path) -> None:
+    """Messages about files whose names are not UTF-8 have lone surrogates."""
+    with opened(tmp_path / "s.db") as store:
+        store.add(replace(RUN, error="no file 'a\udcff'", command="eidrive run 'a\udcff'", settings='{"a": "\udcff"}'))
+        (run,) = store.runs()
+    assert (run.error, run.command, run.settings) == (
+        r"no file 'a\udcff'",
+        r"eidrive run 'a\udcff'",
+        r'{"a": "\udcff"}',
+    )
+
+
 def test_open_of_store_of_other_versions_raises(tmp_path: Path) -> None:
     path = tmp_path / "s.db"
     with opened(path) as store:

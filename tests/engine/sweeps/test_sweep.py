@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import signal
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from eidrive_scenario.errors import ConstraintError, InputError, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes
 from eidrive_scenario.experiments.sweeps.designs import points_of
 from eidrive_scenario.experiments.sweeps.jobs import Shard, SweepPlan, plan_of, versions
+from eidrive_scenario.experiments.sweeps.results import summaries
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import SweepProgress, run_sweep
 from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
@@ -151,6 +153,16 @@ def test_sweep_of_distribution_runs_all_its_values(distribution: Path, tmp_path:
     ]
 
 
+def test_run_of_distribution_without_verdict_has_scenario_parameters_and_command(
+    distribution: Path, scenario: Path, tmp_path: Path
+) -> None:
+    """Constraints exclude the speed 50 of the last run."""
+    _, runs = swept(plan_of(distribution, [{}], RunSettings(), is_distribution=True), tmp_path / "s.db")
+    assert (runs[2].status, runs[2].scenario, runs[2].result) == ("excluded", runs[0].scenario, {"parameter.Speed": 50})
+    assert runs[2].command == f"eidrive run {scenario} --param Speed=50 --seed 1"
+    assert [row.point["Speed"] for row in summaries(runs)] == [10, 30, 50]
+
+
 def test_sweep_continues_without_repetition(scenario: Path, tmp_path: Path) -> None:
     store = tmp_path / "s.db"
     first = plan_of(scenario, SPEEDS[:2], RunSettings())
@@ -224,6 +236,7 @@ def test_invalid_setting_of_a_later_point_raises(scenario: Path, axis: str, expe
     [
         ({"runs": 9, "seeds": [1]}, "--runs is 9"),
         ({"seeds": [1, 1]}, "twice"),
+        ({"seeds": [1, 2**63]}, "at most 2^63 - 1"),
         ({"seeds": []}, "0 runs"),
         ({"settings": RunSettings(channel="no such")}, "no such"),
         ({"settings": RunSettings(parameters={"Sped": "1"})}, "Sped"),
@@ -231,7 +244,7 @@ def test_invalid_setting_of_a_later_point_raises(scenario: Path, axis: str, expe
 )
 def test_invalid_plans_raise(scenario: Path, options: dict[str, Any], expected: str) -> None:
     settings = options.pop("settings", RunSettings())
-    with pytest.raises(InputError, match=expected):
+    with pytest.raises(InputError, match=re.escape(expected)):
         plan_of(scenario, SPEEDS, settings, **options)
 
 

@@ -21,6 +21,8 @@ class FaultyCriterion(Criterion):
 
     def verdict(self):
         match self.fault:
+            case "surrogate":
+                raise OSError("no file 'a" + chr(0xDCFF) + "'")
             case "none":
                 return None
             case "nan":
