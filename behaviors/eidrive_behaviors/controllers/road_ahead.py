@@ -85,7 +85,8 @@ class RoadAhead:
         if roads is None or there is None or apart is None or not 0.0 < apart[0] <= self._reach:
             return None
         width = roads.lane_width(here.road, here.lane, here.s)
-        own = here.lane == there.lane if here.road == there.road else abs(apart[1]) < 0.5 * width
+        is_same_road = here.road == there.road
+        own = roads.lanes_between(here, there) == 0 if is_same_road else abs(apart[1]) < 0.5 * width
         walks = isinstance(other.entity, model.Pedestrian)
         if not walks and not own and abs(apart[1]) > 1.5 * width:
             return None
