@@ -37,11 +37,11 @@ from eidrive_scenario.storyboard.kinematics.transition_profile import Transition
 from eidrive_scenario.storyboard.positions.distances import (
     closing_speed,
     distance,
-    entity_box,
     resolve_coordinate_system,
     resolve_distance_type,
     same_way,
 )
+from eidrive_scenario.storyboard.positions.free_space import entity_box
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position, trajectory_of
 from eidrive_scenario.storyboard.positions.road_positions import count_lanes, facing
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand

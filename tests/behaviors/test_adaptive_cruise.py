@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from opendrive_xml import map_xml, road_xml
 from recorded_scene import RunScene
 from storyboard_xml import private_xml, speed_xml
 from street_scene import after
@@ -22,6 +23,16 @@ def test_cruise_behind_slower_car_settles_at_time_gap_plus_3_m(scene: RunScene) 
 def test_cruise_at_half_the_wanted_gap_brakes_by_the_law(scene: RunScene) -> None:
     """Wanted gap 3 + 1.5 · 10 = 18 m, actual gap 9 m: f = -0.5 and a = 2.5 · -0.5 - 0 - 0 = -1.25 m/s²."""
     played = scene(1, ("Ego", ON), cruise={}, ego=(-1, 100.0, 10.0), other=(-1, 114.0, 10.0))
+    assert played.at(0.1).speed == pytest.approx(10.0 - 1.25 * 0.1)
+
+
+def test_cruise_behind_car_around_a_bend_brakes_by_the_law(scene: RunScene) -> None:
+    """Gaps as in the test above, while the road turns by 180° between both cars."""
+    geometry = """<geometry s="0" x="0" y="0" hdg="0" length="101"><line/></geometry>
+      <geometry s="101" x="101" y="0" hdg="0" length="12.56"><arc curvature="0.25"/></geometry>
+      <geometry s="113.56" x="101" y="8" hdg="3.14" length="50"><line/></geometry>"""
+    bend = map_xml(road_xml(length=163.56, geometry=geometry))
+    played = scene(1, ("Ego", ON), cruise={}, ego=(-1, 100.0, 10.0), other=(-1, 114.0, 10.0), street=bend)
     assert played.at(0.1).speed == pytest.approx(10.0 - 1.25 * 0.1)
 
 

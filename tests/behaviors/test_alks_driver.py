@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
+from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_xml, successor_xml
 from recorded_scene import RunScene
 from storyboard_xml import private_xml, speed_xml
-from street_scene import after
+from street_scene import after, street
 
 from eidrive_scenario.errors import ScenarioError
 
@@ -49,6 +51,37 @@ def test_alks_brakes_for_cut_in_but_not_for_adjacent_car(scene: RunScene, model:
     assert scene(3.5, ("Ego", ON), **scenery).at(3.5).speed == pytest.approx(20.0)
     played = scene(3.5, ("Ego", ON), ("Other", CHANGE), **scenery)
     assert played.at(3.5).speed < 18.0
+
+
+@pytest.mark.parametrize("model", ["Regulation", "ReferenceDriver", "RSS", "FSM"])
+def test_alks_motion_is_independent_of_lane_ids(scene: RunScene, model: str) -> None:
+    """From 200 m on, lane -1 continues straight as lane -2 beside an opening lane -1, which the lane offset shifts."""
+    before = section_xml(right=lane_xml(-1, 4, link=lane_links_xml(after=-2)))
+    opened = section_xml(right=lane_xml(-1, 4) + lane_xml(-2, 4, link=lane_links_xml(before=-1)), s=200)
+    offsets = "".join(f'<laneOffset s="{s}" a="{a}" b="0" c="0" d="0"/>' for s, a in ((0, 0), (200, 4)))
+    scenery: dict[str, Any] = {"cruise": dict(model=model), "controller_model": "alks", "dt": 0.1}
+    played, plain = (
+        scene(8, ("Ego", ON), other=(lane, 240.0, 0.0), street=road, **scenery)
+        for lane, road in ((-2, street(offsets + before + opened)), (-1, street(section_xml(right=lane_xml(-1, 4)))))
+    )
+    assert [rows["Ego"].x for rows in played.rows] == pytest.approx([rows["Ego"].x for rows in plain.rows])
+
+
+@pytest.mark.parametrize("model", ["Regulation", "ReferenceDriver", "RSS", "FSM"])
+def test_alks_motion_is_independent_of_road_directions(scene: RunScene, model: str) -> None:
+    """Road 2 runs from x = 1000 back to 200, so that lane -1 of road 1 continues as its lane 1."""
+    one = section_xml(right=lane_xml(-1, 4, link=lane_links_xml(after=1)))
+    two = section_xml(left=lane_xml(1, 4, link=lane_links_xml(after=-1)))
+    meeting = map_xml(
+        road_xml(length=200.0, link=successor_xml("2", "end"), lanes=one),
+        road_xml("2", x=1000.0, hdg=math.pi, length=800.0, link=successor_xml("1", "end"), lanes=two),
+    )
+    scenery: dict[str, Any] = {"cruise": dict(model=model), "controller_model": "alks", "dt": 0.1, "ego": (-1, 150, 20)}
+    played, plain = (
+        scene(8, ("Ego", ON), other=(-1, 190.0, 10.0), street=road, **scenery)
+        for road in (meeting, street(section_xml(right=lane_xml(-1, 4))))
+    )
+    assert [rows["Ego"].x for rows in played.rows] == pytest.approx([rows["Ego"].x for rows in plain.rows])
 
 
 def test_alks_on_a_free_road_returns_to_set_speed_comfortably(scene: RunScene) -> None:

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import pytest
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_xml, successor_xml
-from storyboard_xml import by_entity_xml, init_xml, lane_position_xml, speed_xml, teleport_xml
+from storyboard_xml import by_entity_xml, init_xml, lane_position_xml, private_xml, speed_xml, teleport_xml
 from street_scene import NOTHING
 from whole_run import Run
 
@@ -112,3 +112,18 @@ def test_lane_offset_is_kept_on_a_road_with_opposite_direction(run: Run, continu
     y = [float(frame.view.position[0, 1]) for frame in played.frames]
     assert y[-1] == pytest.approx(-1.0, abs=1e-6)
     assert max(abs(two - one) for one, two in pairwise(y)) < 0.1
+
+
+@pytest.mark.element("LaneChangeAction")
+@pytest.mark.parametrize(("count", "lane"), [(0, 1), (0, 2), (1, 2), (-1, 1)])
+def test_lane_change_relative_to_entity_beyond_head_to_head_roads(run: Run, count: int, lane: int) -> None:
+    """Lanes 1 and 2 of road 2 continue lanes -1 and -2 at y = -2 and -6; left of Other is nearer to the center."""
+    init = put("Ego", 1, -2 if count > 0 or lane == 1 else -1, 10.0) + put("Other", 2, lane, 180.0)
+    init += set_speed("Ego", 10.0) + set_speed("Other", 0.0)
+    change = private_xml(f"""<LateralAction><LaneChangeAction>
+      <LaneChangeActionDynamics dynamicsShape="cubic" dynamicsDimension="time" value="2"/>
+      <LaneChangeTarget><RelativeTargetLane entityRef="Other" value="{count}"/></LaneChangeTarget>
+      </LaneChangeAction></LateralAction>""")
+    played = run(3, ("Ego", change), driven=False, others={"Other": (-1, 10.0, 0.0)}, street=head_to_head(), init=init)
+    row = played.frames[-1].view.rows["Ego"]
+    assert float(played.frames[-1].view.position[row, 1]) == pytest.approx(2.0 - 4.0 * lane + 4.0 * count)

@@ -169,6 +169,7 @@ def test_lateral_distance_is_reached_at_the_maximum_speed(scene: RunScene) -> No
     played = scene(5, ("Ego", action))
     assert played.at(1.1).y == pytest.approx(-1.0)
     assert played.at(4.0).y == pytest.approx(1.0, abs=0.02)
+    assert played.at(4.0).yaw == 0.0, "after the end, Ego drives along the lane"
 
 
 @pytest.mark.element("LateralDistanceAction")

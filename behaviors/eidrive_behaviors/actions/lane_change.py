@@ -165,6 +165,10 @@ class LaneChangeAction(ActionBehaviour):
         return limited.advance(wanted, self.context.dt)
 
     def _target_lane(self, here: LaneLocation) -> int:
+        """Return the id of the target lane on the road of the actor.
+
+        Lanes are followed along their links to the road of the reference entity, where ids and directions may differ.
+        """
         target = self.action.lane_change_target
         if target.absolute_target_lane is not None:
             return int(target.absolute_target_lane.value)
@@ -174,7 +178,11 @@ class LaneChangeAction(ActionBehaviour):
         if reference is None:
             raise self.error(f"the reference entity {name!r} is off the road")
         left = facing(self.context, name, reference) * self._roads.driving_direction(reference.road, reference.lane)
-        return count_lanes(reference.lane, target.relative_target_lane.value * left)
+        count, runs = target.relative_target_lane.value * left, self._roads.orientation(here, reference)
+        between = self._roads.lanes_between(here, reference)
+        if runs is None or between is None:
+            return count_lanes(reference.lane, count)
+        return count_lanes(here.lane, between + count * runs)
 
     def _set_driver_goal(self) -> Status:
         """Hand the path of the transition to the driver. It is complete when the vehicle drives in the new lane.

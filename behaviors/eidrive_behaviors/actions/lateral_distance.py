@@ -74,9 +74,10 @@ class LateralDistanceAction(ActionBehaviour):
                 sideways = math.copysign(most, sideways)
                 self._rate = sideways / dt
         offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways
-        motion.set_lateral_step(LateralStep(offset, None if abs(motion.speed) > STANDING else 0.0))
-        arrived = abs(error - sideways) < REACHED
-        return Status.SUCCESS if arrived and not self.action.continuous else Status.RUNNING
+        ends = abs(error - sideways) < REACHED and not self.action.continuous
+        heading = 0.0 if ends or abs(motion.speed) <= STANDING else None
+        motion.set_lateral_step(LateralStep(offset, heading))
+        return Status.SUCCESS if ends else Status.RUNNING
 
     def _lateral_displacement(self, error: float, dt: float) -> float:
         """Return the displacement to the left in this step [m], at the rate of its start (forward Euler)."""

@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.controllers.properties import number
-from eidrive_scenario.api.actions import Actor, ControllerContext, ControllerModel, distance, entity_box, model
+from eidrive_scenario.api.actions import (
+    Actor,
+    ControllerContext,
+    ControllerModel,
+    distance,
+    entity_box,
+    model,
+    same_way,
+)
 
 CLOSEST = 3.0
 """Gap to a standing vehicle [m]."""
@@ -121,6 +129,6 @@ class AdaptiveCruise(ControllerModel):
     def _overhang(self, name: str) -> float:
         """Return the distance between the reference points minus the gap between the boxes [m]."""
         mine, theirs = self.actor.entity.bounding_box, self.context.actors[name].entity.bounding_box
-        turn = math.cos(self.context.pose(self.actor.name).h - self.context.pose(name).h)
-        rear = 0.5 * theirs.dimensions.length - math.copysign(theirs.center.x, turn)
+        way = same_way(self.context, self.actor.name, name, "road")
+        rear = 0.5 * theirs.dimensions.length - way * theirs.center.x
         return 0.5 * mine.dimensions.length + mine.center.x + rear

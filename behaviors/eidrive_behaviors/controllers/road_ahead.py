@@ -85,7 +85,8 @@ class RoadAhead:
         if roads is None or there is None or apart is None or not 0.0 < apart[0] <= self._reach:
             return None
         width = roads.lane_width(here.road, here.lane, here.s)
-        own = here.lane == there.lane if here.road == there.road else abs(apart[1]) < 0.5 * width
+        is_same_road = here.road == there.road
+        own = roads.lanes_between(here, there) == 0 if is_same_road else abs(apart[1]) < 0.5 * width
         walks = isinstance(other.entity, model.Pedestrian)
         if not walks and not own and abs(apart[1]) > 1.5 * width:
             return None
@@ -106,7 +107,7 @@ class RoadAhead:
             change=self._change(other),
             sideways=abs(its_across),
             lanes=0 if own else int(side),
-            towards=-side * (there.offset * way + 0.5 * sum(theirs[1]) - apart[1]),
+            towards=-side * (there.offset * self._way_at(here, there) + 0.5 * sum(theirs[1]) - apart[1]),
             intrusion=border - side * self._front_wheel_offset(other, there, moved[1], side),
             covers=self._covers(mine[1], theirs[1]),
             across=moved[1],
@@ -120,8 +121,14 @@ class RoadAhead:
         lane = roads.lane_pose_at(*place[:4]).h
         here = self._context.location(self._actor.name)
         assert here is not None
-        flip = 0.0 if roads.driving_direction(here.road, here.lane) > 0 else math.pi
+        flip = 0.0 if self._way_at(here, place) > 0 else math.pi
         return self._context.pose(actor.name).h - lane - flip
+
+    def _way_at(self, here: LaneLocation, place: LaneLocation) -> int:
+        """Return +1 if the own driving direction is that of s on the road of a lane location, else -1."""
+        roads = self._context.roads
+        assert roads is not None
+        return roads.driving_direction(here.road, here.lane) * (roads.orientation(here, place) or 1)
 
     def _extents(self, actor: Actor, place: LaneLocation, along: float = 0.0, across: float = 0.0) -> tuple[Span, Span]:
         """Return the extents of an actor along and across the road, relative to the own reference point [m]."""

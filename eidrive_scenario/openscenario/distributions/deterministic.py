@@ -118,7 +118,7 @@ def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector
         *deterministic.deterministic_single_parameter_distribution,
     ]
     found: list[ValueSource] = []
-    for distribution in sorted(distributions, key=lambda one: one.line or 0):
+    for distribution in sorted(distributions, key=lambda one: one.sibling_index):
         if isinstance(distribution, DeterministicMultiParameterDistribution):
             found.append(_value_sets(distribution, collector))
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice, choice, sequence
 from eidrive_scenario.openscenario.model.declarations import ParameterAssignment
-from eidrive_scenario.openscenario.model.element import Element, child, element_type, text
+from eidrive_scenario.openscenario.model.element import Element, child, element_type, sibling_index, text
 from eidrive_scenario.openscenario.model.properties import File
 from eidrive_scenario.openscenario.model.scalars import UnsignedInt
 
@@ -55,6 +55,7 @@ class DeterministicSingleParameterDistribution(Element, content=CHOICE):
     distribution_set: DistributionSet | None = None
     distribution_range: DistributionRange | None = None
     user_defined_distribution: UserDefinedDistribution | None = None
+    sibling_index: int = sibling_index()
 
 
 @element_type
@@ -76,6 +77,7 @@ class DeterministicMultiParameterDistribution(Element):
     """Deterministic values of several parameters together."""
 
     value_set_distribution: ValueSetDistribution
+    sibling_index: int = sibling_index()
 
 
 @element_type

@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choic
 
 USAGE = "usage"
 
-ABOUT = frozenset({"line", "source", "scope"})
+ABOUT = frozenset({"line", "source", "scope", "sibling_index"})
 """Fields with the location of an element, not with its content."""
 
 
@@ -97,6 +97,11 @@ def visible_parameters() -> Any:
     It is None for a property without a reference, or with a single reference, which the reader resolves.
     """
     return field(default=None, compare=False, repr=False)
+
+
+def sibling_index() -> Any:
+    """Define a field for the place among the children of the parent, where elements of several classes are ordered."""
+    return field(default=0, compare=False, repr=False)
 
 
 T = TypeVar("T", bound=type)

@@ -24,7 +24,7 @@ from eidrive_scenario.openscenario.model import (
     ParameterDeclarations,
     Property,
 )
-from eidrive_scenario.openscenario.model.element import incomplete_element
+from eidrive_scenario.openscenario.model.element import field_defaults, incomplete_element
 from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
 from eidrive_scenario.openscenario.reading.structure import check_children
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError
@@ -122,6 +122,8 @@ class Reader:
     ) -> Element:
         known = rules(cls, self.version)
         values: dict[str, Any] = {"line": line_of(node), "source": self.source}
+        if "sibling_index" in field_defaults(cls):
+            values["sibling_index"] = cast(etree._Element, node.getparent()).index(node)
         children = list(node.iterchildren(etree.Element))
         if "ParameterDeclarations" in known.children:
             declarations = next((child for child in children if child.tag == "ParameterDeclarations"), None)

@@ -6,14 +6,12 @@ import math
 
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.roads import Chain, LaneLocation, Pose
 from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
+from eidrive_scenario.storyboard.positions.free_space import Box, entity_box, free_space
 from eidrive_scenario.tolerances import EPSILON
-
-Box = tuple[float, float, float, float, float, float, float]
-"""x, y, z of the center, length, width, height [m], yaw [rad]."""
 
 TIME_DELTA = 1e-3
 """Time step of the finite difference of a distance [s]."""
@@ -23,23 +21,6 @@ ROUTE_CRITERIA: dict[model.RoutingAlgorithm | None, Chain] = {
     model.RoutingAlgorithm.LEAST_INTERSECTIONS: "leastIntersections",
 }
 """Criterion of the route by algorithm; the default is the shortest route."""
-
-
-def entity_box(context: ConditionContext, name: str) -> Box:
-    """Return the bounding box of an actor at its current pose."""
-    pose = context.pose(name)
-    bounds = context.actors[name].entity.bounding_box
-    center, size = bounds.center, bounds.dimensions
-    cos, sin = math.cos(pose.h), math.sin(pose.h)
-    return (
-        pose.x + center.x * cos - center.y * sin,
-        pose.y + center.x * sin + center.y * cos,
-        pose.z + center.z,
-        size.length,
-        size.width,
-        size.height,
-        pose.h,
-    )
 
 
 def resolve_distance_type(kind: model.RelativeDistanceType | None) -> str:
@@ -78,7 +59,7 @@ def distance(
     value = along if kind == "longitudinal" else across
     if not freespace or math.isnan(value):
         return value
-    return _free_space(context, a, b, frame, kind, value)
+    return free_space(context, a, b if isinstance(b, str) else None, frame, kind, value)
 
 
 def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
@@ -205,74 +186,6 @@ def _along_trajectory(progress: TrajectoryProgress, station: float, here: Pose, 
     if trajectory.closed and trajectory.length > 0.0:
         along = math.remainder(along, trajectory.length)
     return along * progress.way, (other_t - t) * progress.way
-
-
-def _free_space(
-    context: ConditionContext, a: str, b: str | ResolvedPosition, frame: str, kind: str, value: float
-) -> float:
-    """Return the free space along one axis [m]: the distance `value` of the reference points without both extents."""
-    axis = _axis_heading(context, a, frame)
-    mine = _extent(context, a, axis, frame, kind)
-    if isinstance(b, str):
-        reference = axis if frame in ("entity", "world") else _axis_heading(context, b, frame, reference=axis)
-        theirs = _extent(context, b, reference, frame, kind)
-    else:
-        theirs = (0.0, 0.0)
-    if value + theirs[0] > mine[1]:
-        return value + theirs[0] - mine[1]
-    if value + theirs[1] < mine[0]:
-        return value + theirs[1] - mine[0]
-    return 0.0
-
-
-def _axis_heading(context: ConditionContext, name: str, frame: str, reference: float | None = None) -> float:
-    """Return the heading of the longitudinal axis at an actor [rad]; reversed if it points against `reference`."""
-    if frame == "world":
-        return 0.0
-    heading = context.pose(name).h
-    if frame in ("lane", "road") and context.roads is not None:
-        here = context.location(name)
-        if here is not None:
-            lane = context.roads.pose(here).h
-            heading = lane if math.cos(lane - heading) >= 0.0 else lane + math.pi
-    if reference is not None and math.cos(heading - reference) < 0.0:
-        heading += math.pi
-    return heading
-
-
-def _extent(context: ConditionContext, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
-    """Return minimum and maximum of the box of an actor along an axis or the road, from its reference point [m]."""
-    if frame in ("lane", "road") and context.roads is not None:
-        here = context.location(name)
-        if here is not None and context.roads.curvature(here.road, here.s) != 0.0:
-            return _extent_on_bend(context, context.roads, name, here, axis, kind)
-    bounds = context.actors[name].entity.bounding_box
-    turn = context.pose(name).h - axis
-    cos, sin = math.cos(turn), math.sin(turn)
-    x, y = bounds.center.x, bounds.center.y
-    length, width = 0.5 * bounds.dimensions.length, 0.5 * bounds.dimensions.width
-    if kind == "longitudinal":
-        center, half = x * cos - y * sin, abs(length * cos) + abs(width * sin)
-    else:
-        center, half = x * sin + y * cos, abs(length * sin) + abs(width * cos)
-    return center - half, center + half
-
-
-def _extent_on_bend(
-    context: ConditionContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
-) -> tuple[float, float]:
-    """Return the extent along a curved road, from the corners of the box in road coordinates [m]."""
-    x, y, _, length, width, _, yaw = entity_box(context, name)
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    sign = 1.0 if math.cos(roads.pose(here).h - axis) >= 0.0 else -1.0
-    extents = []
-    for along, across in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
-        dx, dy = along * length, across * width
-        corner = roads.locate_at(x + dx * cos - dy * sin, y + dx * sin + dy * cos, here)
-        found = None if corner is None else roads.distance(here, corner)
-        if found is not None:
-            extents.append(sign * found[0 if kind == "longitudinal" else 1])
-    return min(extents, default=0.0), max(extents, default=0.0)
 
 
 def _pose(context: ConditionContext, target: str | ResolvedPosition) -> Pose:

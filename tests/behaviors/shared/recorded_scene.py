@@ -75,8 +75,9 @@ class RunScene:
         performance: str = "",
         brakes: float = 10.0,
         executions: int = 1,
+        street: str = STREET,
     ) -> RecordedScene:
-        (self.folder / "street.xodr").write_text(STREET)
+        (self.folder / "street.xodr").write_text(street)
         controller = AGENT if driven else ""
         if cruise is not None:
             controller = controller_xml(cruise, name="cruise", attributes='controllerType="movement"')

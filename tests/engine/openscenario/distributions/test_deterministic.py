@@ -58,20 +58,27 @@ def test_combinations_have_the_order_of_the_file(distribution_file: Write, tmp_p
         runs[4]
 
 
+def test_combinations_in_a_file_of_one_line_have_its_order(distribution_file: Write) -> None:
+    """Tools write files without line breaks, so that all elements have the same line."""
+    path = distribution_file(deterministic_xml(values_xml("A", "1", "2"), sets({"B": "x"}, {"B": "y"})))
+    path.write_text(path.read_text().replace("\n", ""))
+    assert [str(run) for run in load_distribution(path)] == ["A=1,B=x", "A=1,B=y", "A=2,B=x", "A=2,B=y"]
+
+
 def test_values_have_lines(distribution_file: Write) -> None:
     path = distribution_file(deterministic_xml(values_xml("A", "1"), steps("B", "0", "1", "1"), sets({"C": "x"})))
     origins = {name: given.origin for name, given in load_distribution(path)[0].assignments.items()}
     assert origins == {"A": (str(path), 6), "B": (str(path), 7), "C": (str(path), 8)}
 
 
-def test_tree_without_lines_is_expanded(distribution_file: Write) -> None:
+def test_tree_without_lines_is_expanded_in_its_order(distribution_file: Write) -> None:
     """Elements that a program creates have no lines."""
     body = deterministic_xml(values_xml("A", "1", "2"), sets({"C": "x"}, {"C": "y"}))
     tree = etree.parse(distribution_file(body))
     for node in tree.iter("*"):
         node.sourceline = 0
-    found = {tuple(run.parameters.items()) for run in load_distribution(tree)}
-    assert found == {(("C", c), ("A", a)) for c in "xy" for a in "12"}
+    found = [tuple(run.parameters.items()) for run in load_distribution(tree)]
+    assert found == [(("A", a), ("C", c)) for a in "12" for c in "xy"]
 
 
 @pytest.mark.element("DistributionRange")
