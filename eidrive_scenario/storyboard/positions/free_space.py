@@ -61,10 +61,11 @@ def _axis_at(context: ConditionContext, a: str, b: str, frame: str, axis: float)
 
     Roads and trajectories may turn by any angle between both.
     """
-    roads, here, there = context.roads, context.location(a), context.location(b)
-    if frame in ("lane", "road") and roads is not None and here is not None and there is not None:
-        runs = roads.orientation(here, there)
-        if runs is not None:
+    roads = context.roads
+    if frame in ("lane", "road") and roads is not None:
+        here, there = context.location(a), context.location(b)
+        runs = None if here is None or there is None else roads.orientation(here, there)
+        if here is not None and there is not None and runs is not None:
             ways = [roads.driving_direction(place.road, place.lane) for place in (here, there)]
             is_along = math.cos(axis - roads.pose(here).h) >= 0.0
             return roads.pose(there).h + (0.0 if is_along == (ways[0] * ways[1] * runs > 0) else math.pi)
