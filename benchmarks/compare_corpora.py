@@ -32,7 +32,7 @@ STEP = 0.01
 
 @dataclass(frozen=True)
 class Times:
-    """Times of one file [s], in the processes that run all files, and in processes of their own; None: not measured."""
+    """Times of one file [s], in the processes that run all files, and in separate processes; None: not measured."""
 
     name: str
     base: float

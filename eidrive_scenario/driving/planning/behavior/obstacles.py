@@ -95,7 +95,7 @@ def motion_around(
     value = max(outer + _beside_obstacle(room, clearance) + half_width, 0.0)
     name = f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}"
     if obstacle.moves and current is not None and current.name == name and len(current.places) > 3:
-        # An object beyond the return is another one, for which the vehicle returns before it decides anew.
+        # An object beyond the return is another one, for which the vehicle returns before it decides again.
         is_beyond = obstacle.begin > current.places[-2]
         return None if is_beyond else _with_return(current, situation, settings, obstacle.end)
     profile = passing(
