@@ -43,7 +43,7 @@ def measured(count: int = 30) -> list[Array]:
 
 
 def test_independent_pose_errors_are_measurement_noise() -> None:
-    """Closed form: a pose error drawn anew in each scan adds J P Jᵀ to the measurement noise. The range is 30 m across
+    """Closed form: a pose error drawn again in each scan adds J P Jᵀ to the measurement noise. The range is 30 m across
     the x axis, so that the heading contributes to x: 0.09 + (30 m · 1°)² = 0.364 m². The range changes by 1 % between
     scans, and this variance by 2 %."""
     own = pose_part(CAR[:, :2], *STATION, POSE)
