@@ -214,15 +214,12 @@ class Decider:
         with_maneuvers: bool = False,
     ) -> Options:
         """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
-        hidden, expects_none = math.inf, False
-        more = []
-        if with_maneuvers:
-            more = passing_profiles(situation, scene, self._settings, self._body, self._current)
+        hidden = math.inf
+        more = passing_profiles(situation, scene, self._settings, self._body) if with_maneuvers else []
         if more:
             beside = situation.line.lanes_beside(situation.lanes_at(situation.s + VIEWED))
             center = (situation.s + self._center, situation.d)
-            hidden = self._oncoming.first_hidden(scene, beside, center)
-            expects_none = self._oncoming.expects_none(situation.now)
+            hidden = self._oncoming.first_hidden(scene, beside, center, situation.now)
             profiles = profiles + more
         proposals: list[Proposal] = []
         walls: list[list[Wall]] = []
@@ -241,7 +238,7 @@ class Decider:
                 kind = proposal.precedence
                 if kind not in reactions:
                     before = [*crossing_walls(found, self._times, here, kind, reasons), *stops]
-                    reactions[kind] = before, leading(scene, way, found, situation.s + self._center, proposal, profile)
+                    reactions[kind] = before, leading(scene, way, found, situation.s + self._center, proposal)
                 walls.append(reactions[kind][0])
                 leads.append(reactions[kind][1])
             proposals += made
@@ -266,7 +263,6 @@ class Decider:
             situation.wanted,
             self._kept_names(situation),
             hidden,
-            expects_none=expects_none,
         )
         return Options(profiles, proposals, walls, rolled, evaluation)
 

@@ -60,8 +60,6 @@ class LateralProfile(msgspec.Struct, frozen=True):
     side: int = 0
     uses_oncoming: bool = False
     """Whether the vehicle enters a lane of the opposite direction."""
-    passes_moving: bool = False
-    """Whether it passes a moving object, behind which it can stay."""
 
     def offset(self, s: Array) -> Array:
         """Return the offsets (…) at distances (…) along the line."""

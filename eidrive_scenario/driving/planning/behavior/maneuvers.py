@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from operator import attrgetter
+from typing import NamedTuple
 
-from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, change_length, towards
-from eidrive_scenario.driving.planning.behavior.obstacles import (
-    BEFORE_OBSTACLE,
-    SLOWER,
-    is_in_way,
-    motion_around,
-    obstacle_of,
-)
+import msgspec
+
+from eidrive_scenario.detections import VULNERABLE
+from eidrive_scenario.driving.planning.behavior.lateral import Body, LateralProfile, change_length, passing, towards
+from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE
+from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.situation import Situation
 from eidrive_scenario.driving.planning.behavior.surroundings import Present, Surroundings
 
+SLOWER = 2.0
+"""Difference to the wanted speed from which on a slower vehicle is passed [m/s]."""
 PATIENCE = 3.0
 """Time for which a vehicle has stood before it is passed [s]; as in Autoware's lane change."""
 LONG = 15.0
@@ -27,10 +28,22 @@ WRONG_WAY = 2.0
 """Speed against the direction of the lane from which on a vehicle in it is oncoming [m/s]; slower ones maneuver."""
 ASIDE = 0.8
 """Offset from the route from which on a standing vehicle is parked at the edge of the lane [m]."""
+SETTING_OFF = 5.0
+"""Time for which a vehicle may still accelerate after it starts [s]; it is not passed meanwhile."""
 SWUNG = 0.3
 """Offset from the route from which on the vehicle is beside it [m]."""
+SPARE = 0.2
+"""Clearance beside a passed obstacle in addition to the lateral margin [m], so that rounding does not block it."""
+LEAST_CLEARANCE = 0.25
+"""Minimum clearance in a narrow place [m]."""
+BEFORE_OBSTACLE = 2.0
+"""Distance between the rear of the vehicle and a passed obstacle at which it starts to return [m]."""
+SWUNG_OUT = 1.0
+"""Distance by which the front is beside an obstacle when the lateral motion ends [m]; it is 99 % complete before."""
 QUEUE_GAP, QUEUE_PATIENCE = 15.0, 20.0
 """Gap between standing vehicles that queue [m], and time for which a queue has stood before it is passed [s]."""
+TOGETHER = 25.0
+"""Gap below which two obstacles are passed in one maneuver [m]."""
 NEAR_STOP = 40.0
 """Distance of a place where traffic stops, ahead of a standing vehicle, within which it queues [m]."""
 REAR_REACTION, REAR_DECELERATION, REAR_GAP = 1.0, 1.5, 3.0
@@ -38,18 +51,24 @@ REAR_REACTION, REAR_DECELERATION, REAR_GAP = 1.0, 1.5, 3.0
 [m]."""
 
 
+class _Obstacle(NamedTuple):
+    """Objects that hold the vehicle up, the nearest first, and the places between which it is beside them [m].
+
+    beside  lanes at places between both
+    """
+
+    objects: list[Present]
+    begin: float
+    end: float
+    beside: list[LanesBeside]
+
+
 def passing_profiles(
-    situation: Situation,
-    scene: Surroundings,
-    settings: BehaviorSettings,
-    body: Body,
-    current: LateralProfile | None = None,
+    situation: Situation, scene: Surroundings, settings: BehaviorSettings, body: Body
 ) -> list[LateralProfile]:
     """Return maneuvers past what holds the vehicle up, or out of the way of an oncoming vehicle in its lane.
 
     The result is empty if the vehicle queues or nothing is free beside it.
-
-    current  present maneuver; passing a moving object keeps its begin, and its end follows the object
     """
     head_on = _head_on(situation, scene, body)
     if head_on is not None:
@@ -67,13 +86,10 @@ def passing_profiles(
         name = f"change lane to the {'left' if overtaking > 0 else 'right'}"
         start = (*situation.steered, situation.speed)
         found.append(towards(name, faster, *start, settings.lateral_acceleration, side=overtaking))
-    obstacle = obstacle_of(situation, scene, blocker, body, settings.acceleration)
+    obstacle = _obstacle(situation, scene, blocker, body)
     if obstacle is not None:
-        # The lane for overtaking, where traffic may come from behind, is entered by a lane change if the object moves.
-        changes = obstacle.moves and not math.isnan(faster)
-        sides = (-overtaking,) if changes else (overtaking, -overtaking)
-        around = [motion_around(situation, settings, obstacle, body, side, current) for side in sides]
-        found += [profile for profile in around if profile is not None]
+        sides = (_around(situation, settings, obstacle, body, side) for side in (overtaking, -overtaking))
+        found += [profile for profile in sides if profile is not None]
     return found
 
 
@@ -129,7 +145,7 @@ def _behind_neighbor(
         if one.front > rear
         and one.rear < front
         and side * one.d - one.half_width < side * d
-        and is_in_way(one, body.half_width)
+        and _is_in_way(one, body.half_width)
         and not one.crosses
         and abs(one.speed) < WAITING
     ]
@@ -145,6 +161,11 @@ def _behind_neighbor(
     )
 
 
+def _is_in_way(one: Present, half_width: float) -> bool:
+    """Return whether a hypothesis is closer to the route than a vehicle on it should pass."""
+    return abs(one.d) - one.half_width < half_width + one.margin
+
+
 def _blocker(situation: Situation, scene: Surroundings, center: float, half_width: float) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
     place, slower = situation.s + center, situation.wanted - SLOWER
@@ -154,7 +175,7 @@ def _blocker(situation: Situation, scene: Surroundings, center: float, half_widt
         if one.s > place
         and -0.5 < one.speed < slower
         and not one.crosses
-        and is_in_way(one, half_width)
+        and _is_in_way(one, half_width)
         and _is_passable(situation, one)
     ]
     return min(found, key=attrgetter("s"), default=None)
@@ -169,6 +190,13 @@ def _is_passable(situation: Situation, one: Present) -> bool:
         waits = situation.speed < WAITING or stands >= LONG
         return known.kind == "misc" or (stands >= PATIENCE and (is_aside or waits))
     return known.kind not in ("pedestrian",)
+
+
+def _is_steady(situation: Situation, one: Present) -> bool:
+    """Return whether an object has moved for some time, and neither sets off nor brakes."""
+    known = situation.objects[one.owner]
+    has_moved = known.moving_since is not None and situation.now - known.moving_since >= SETTING_OFF
+    return has_moved and known.acceleration > -NOTICEABLE
 
 
 def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool:
@@ -190,3 +218,77 @@ def _rear_is_free(situation: Situation, scene: Surroundings, offset: float, cent
             if gap < REAR_GAP + REAR_REACTION * closing + closing**2 / (2.0 * REAR_DECELERATION):
                 return False
     return True
+
+
+def _obstacle(situation: Situation, scene: Surroundings, blocker: Present, body: Body) -> _Obstacle | None:
+    """Return the blocker with what stands close behind it; None if it is too fast or not steady enough to pass it."""
+    objects = _together(scene, blocker, body.half_width)
+    wanted = max(situation.wanted, 1.0)
+    begin = min([one.rear for one in objects]) - (body.front - body.wheelbase) + SWUNG_OUT
+    ends = [one.front for one in objects]
+    speed = [max(one.speed, 0.0) for one in objects]
+    fastest, slowest = max(speed), min(speed)
+    if fastest > 0.5:
+        if wanted - fastest < SLOWER or not all(_is_steady(situation, one) for one in objects):
+            return None
+        durations = [(end - situation.s) / max(wanted - own, 0.5) for end, own in zip(ends, speed, strict=True)]
+        ends = [end + own * duration for end, own, duration in zip(ends, speed, durations, strict=True)]
+        begin += slowest * max(begin - situation.s, 0.0) / max(wanted - slowest, 0.5)
+    end = max(ends) + body.rear + body.wheelbase + BEFORE_OBSTACLE
+    step = (end - begin) / 3.0
+    places = (begin, begin + step, begin + 2.0 * step, end)
+    beside = [situation.line.lanes_beside(situation.lanes_at(place)) for place in places]
+    return _Obstacle(objects, begin, end, beside)
+
+
+def _around(
+    situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle, body: Body, side: int
+) -> LateralProfile | None:
+    """Return the motion past an obstacle on one side; None if that is too narrow."""
+    half_width = body.half_width
+    vulnerable = any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
+    clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
+    outer = max([side * one.d + one.half_width for one in obstacle.objects])
+    own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in obstacle.beside), strict=True))
+    room = every - outer - 2.0 * half_width
+    if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
+        return None
+    value = max(outer + _beside_obstacle(room, clearance) + half_width, 0.0)
+    profile = passing(
+        f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
+        side * value,
+        (obstacle.begin, obstacle.end),
+        *situation.steered,
+        max(situation.speed, 2.0),
+        settings.lateral_acceleration,
+        side,
+    )
+    if profile is not None and value + half_width > own:
+        return msgspec.structs.replace(profile, uses_oncoming=True)
+    return profile
+
+
+def _beside_obstacle(room: float, clearance: float) -> float:
+    """Return the distance from an obstacle [m] if the road leaves `room` [m] in addition to the vehicle."""
+    if room >= clearance + SPARE:
+        return clearance + SPARE
+    return (clearance + room) / 2.0 if room > clearance else LEAST_CLEARANCE
+
+
+def _together(scene: Surroundings, blocker: Present, half_width: float) -> list[Present]:
+    """Return the blocker and the objects of similar speed in the way that follow it closely."""
+    alike = [
+        one
+        for one in scene.present
+        if one.s >= blocker.s
+        and not one.crosses
+        and abs(one.speed - blocker.speed) < 1.0
+        and _is_in_way(one, half_width)
+    ]
+    found = [blocker]
+    for one in sorted(alike, key=attrgetter("s")):
+        if one.rear - found[-1].s - found[-1].half_length > TOGETHER:
+            break
+        if one.row != blocker.row:
+            found.append(one)
+    return found

@@ -50,17 +50,15 @@ class OncomingTraffic:
         elif now - self._held_up_until > FREE_TIME:
             self._held_up_since = None
 
-    def expects_none(self, now: float) -> bool:
-        """Return whether the vehicle has waited and no oncoming traffic appeared for a time of PAUSE."""
-        since = max(self._last, now if self._held_up_since is None else self._held_up_since)
-        return now - since >= PAUSE
+    def first_hidden(self, scene: Surroundings, beside: LanesBeside, ego: tuple[float, float], now: float) -> float:
+        """Return the place nearest to the vehicle from which traffic may come unseen [m]; inf if none is expected.
 
-    def first_hidden(self, scene: Surroundings, beside: LanesBeside, ego: tuple[float, float]) -> float:
-        """Return the place nearest to the vehicle from which traffic may come unseen [m]; inf without an oncoming lane.
+        None is expected if the vehicle has waited and no oncoming traffic appeared for a time of PAUSE.
 
         ego  distance of the center of the vehicle along the line, and its offset [m]
         """
-        if math.isnan(beside.oncoming):
+        since = max(self._last, now if self._held_up_since is None else self._held_up_since)
+        if now - since >= PAUSE or math.isnan(beside.oncoming):
             return math.inf
         s, d = ego
         places = s + self._ahead

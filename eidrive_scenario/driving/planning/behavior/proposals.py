@@ -137,20 +137,16 @@ def speed_limits(curvature: Array, path_limits: Array, spacing: float, settings:
     return np.array(values)
 
 
-def leading(
-    scene: Surroundings, way: Bools, found: list[Conflict], center: float, proposal: Proposal, profile: LateralProfile
-) -> Bools:
+def leading(scene: Surroundings, way: Bools, found: list[Conflict], center: float, proposal: Proposal) -> Bools:
     """Return where hypotheses lead the vehicle (N, K): in its way and not crossing.
 
-    An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way. An
-    object that is passed does not: it is in the way where the vehicle returns, unless the vehicle is there before.
+    An object that enters the way in the direction of the vehicle leads it from now on, if the vehicle gives way.
     """
     leads = way & scene.may_lead
     if proposal.precedence == "all":
         for conflict in found:
             row = conflict.hypothesis
             is_oncoming = float(scene.speed[row, conflict.first]) < -ONCOMING_SPEED
-            is_passed = len(profile.places) > 2 and float(scene.s[row, conflict.first]) >= profile.places[-2]
-            if not (conflict.crosses or is_oncoming or is_passed) and float(scene.s[row, 0]) > center:
+            if not conflict.crosses and not is_oncoming and float(scene.s[row, 0]) > center:
                 leads[row, : conflict.first] = True
     return np.asarray(leads)

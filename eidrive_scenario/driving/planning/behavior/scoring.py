@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left, bisect_right
 
 import msgspec
@@ -64,15 +63,12 @@ def evaluate(
     wanted: float,
     kept: frozenset[str],
     hidden: float,
-    *,
-    expects_none: bool = False,
 ) -> Evaluation:
     """Return the evaluation of all proposals.
 
     ways     where the hypotheses are in the way (N, K) of a vehicle that follows each profile
     kept     names of the maneuvers that are no change: the current one, and the route after a complete one
     hidden   place from which oncoming traffic may come unseen [m], inf without one
-    expects_none  whether none is expected there by a vehicle that waits behind a standing obstacle
     """
     count, horizon = len(proposals), float(times[-1])
     offsets = _offsets(proposals, profiles, rolled, ego)
@@ -107,8 +103,7 @@ def evaluate(
         values[row] -= SLOWER * (1.0 - proposal.share) + GENTLE * proposal.is_gentle
         if profile.uses_oncoming and switches:
             first = oncoming[proposal.profile]
-            place = math.inf if expects_none and not profile.passes_moving else hidden
-            values[row] -= RISK * meets_oncoming(profile, rolled.s[row], times, first, (place, wanted))
+            values[row] -= RISK * meets_oncoming(profile, rolled.s[row], times, first, (hidden, wanted))
         values[row] -= ASIDE * (profile.side != 0) + ONCOMING * profile.uses_oncoming + SWITCH * switches
     return Evaluation(np.array(values), collision, risk, impact, cause)
 

@@ -46,34 +46,35 @@ def scene(*objects: tuple[float, float, float]) -> Surroundings:
 
 def test_free_view_ends_at_its_range() -> None:
     traffic = OncomingTraffic(100.0)
-    assert traffic.first_hidden(scene(), BESIDE, (0.0, 0.0)) == pytest.approx(100.0, abs=4.0)
+    assert traffic.first_hidden(scene(), BESIDE, (0.0, 0.0), 0.0) == pytest.approx(100.0, abs=4.0)
 
 
 @pytest.mark.parametrize("gap", [10.0, 20.0])
 def test_truck_ahead_hides_the_lane_beyond_the_line_of_sight(gap: float) -> None:
     # The line of sight over the rear left corner, at (gap, 1.0), reaches the center of the next lane at 3.5 gap.
     traffic = OncomingTraffic(100.0)
-    found = traffic.first_hidden(scene((gap + 2.5, 0.0, 0.0)), BESIDE, (0.0, 0.0))
+    found = traffic.first_hidden(scene((gap + 2.5, 0.0, 0.0)), BESIDE, (0.0, 0.0), 0.0)
     assert found == pytest.approx(3.5 * gap, abs=2.0)
 
 
 def test_waiting_without_traffic_makes_the_hidden_lane_free() -> None:
     traffic = OncomingTraffic(50.0)
-    traffic.observe(scene(), 0.0, 0.0, held_up=True)
-    assert not traffic.expects_none(PAUSE - 0.1)
-    assert traffic.expects_none(PAUSE)
+    empty = scene()
+    traffic.observe(empty, 0.0, 0.0, held_up=True)
+    assert math.isfinite(traffic.first_hidden(empty, BESIDE, (0.0, 0.0), PAUSE - 0.1))
+    assert traffic.first_hidden(empty, BESIDE, (0.0, 0.0), PAUSE) == math.inf
 
 
 def test_oncoming_vehicle_restarts_the_time_of_waiting() -> None:
     traffic = OncomingTraffic(50.0)
     traffic.observe(scene(), 0.0, 0.0, held_up=True)
     traffic.observe(scene((30.0, 3.5, -8.0)), 0.0, 4.0, held_up=True)
-    assert not traffic.expects_none(PAUSE + 1.0)
-    assert traffic.expects_none(PAUSE + 4.0)
+    assert math.isfinite(traffic.first_hidden(scene(), BESIDE, (0.0, 0.0), PAUSE + 1.0))
+    assert traffic.first_hidden(scene(), BESIDE, (0.0, 0.0), PAUSE + 4.0) == math.inf
 
 
 def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
-    assert OncomingTraffic(50.0).first_hidden(scene(), LanesBeside(), (0.0, 0.0)) == math.inf
+    assert OncomingTraffic(50.0).first_hidden(scene(), LanesBeside(), (0.0, 0.0), 0.0) == math.inf
 
 
 @pytest.mark.parametrize(("start", "meets"), [(200.0, False), (100.0, True)])
