@@ -119,7 +119,7 @@ class PolynomialTable:
         self._pieces = pieces
         """Start and coefficients a, b, c, d of each piece."""
         self._a = np.ascontiguousarray(pieces[:, 1])
-        self.constant_value = bool(np.all(pieces[:, 2:] == 0.0))
+        self._constant = bool(np.all(pieces[:, 2:] == 0.0))
         self._single = len(pieces) == len(functions)
 
     def _piece(self, function: Integers, s: Array) -> Integers:
@@ -131,7 +131,7 @@ class PolynomialTable:
     def value(self, function: Integers, s: Array) -> Array:
         """Return the values of functions `function` (N,) at s (N,)."""
         piece = self._piece(function, s)
-        if self.constant_value:
+        if self._constant:
             return self._a.take(piece)
         start, a, b, c, d = self._pieces.take(piece, axis=0).T
         ds = s - start
@@ -140,7 +140,7 @@ class PolynomialTable:
     def value_and_slope(self, function: Integers, s: Array) -> tuple[Array, Array]:
         """Return the values and derivatives of functions at s."""
         piece = self._piece(function, s)
-        if self.constant_value:
+        if self._constant:
             return self._a.take(piece), np.zeros(piece.shape)
         start, a, b, c, d = self._pieces.take(piece, axis=0).T
         ds = s - start
@@ -157,7 +157,7 @@ class PolynomialTable:
     @property
     def is_zero(self) -> bool:
         """True if all functions are 0 everywhere."""
-        return self.constant_value and not self._a.any()
+        return self._constant and not self._a.any()
 
 
 def _begins_function_or_value(pieces: Array, owner: Integers) -> Bools:
