@@ -1,0 +1,31 @@
+"""Steps within a lane section, compared with those through sections, links and junctions."""
+
+from __future__ import annotations
+
+import random
+
+from eidrive_scenario.library import library_path
+from eidrive_scenario.roads import RoadNetwork
+
+DISTANCES = (1e-9, 0.01, 0.3, 2.0, 7.0, 60.0, 500.0)
+"""Lengths of the steps [m]."""
+
+
+def test_step_in_section_equals_advance_and_lane_pose_bit_by_bit() -> None:
+    draw, compared = random.Random(4), 0
+    for file in sorted(library_path().rglob("*.xodr")):
+        network = RoadNetwork.load(file)
+        for _ in range(60):
+            road = draw.choice(list(network.roads.values()))
+            section = draw.choice(road.sections)
+            s = draw.choice([section.s, draw.uniform(section.s, section.end)])
+            lanes = network.lane_ids(road.id, s)
+            here = network.location(road.id, draw.choice(lanes), s, draw.uniform(-1.0, 1.0))
+            distance = draw.choice([1.0, -1.0]) * draw.choice(DISTANCES)
+            within = network.movement.step_in_section(here, distance)
+            if within is not None:
+                reached = network.advance(here, distance)
+                assert reached == within[0]
+                assert network.lane_pose_at(reached.road, reached.lane, reached.s, reached.offset) == within[1]
+                compared += 1
+    assert compared > 100
