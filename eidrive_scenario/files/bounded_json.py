@@ -15,9 +15,7 @@ def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | Non
     Raise ValueError if the document is not valid JSON, has more than `max_values` values, or is nested deeper than
     `max_depth` or than Python can read.
     """
-    values = data.count(b",") + data.count(b"[") + data.count(b"{")
-    if values > max_values:
-        raise ValueError(f"the document has more than {max_values} values")
+    check_values(data, max_values)
     try:
         document = json.loads(data.decode())
     except UnicodeDecodeError as error:
@@ -27,6 +25,12 @@ def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | Non
     if max_depth is not None and _is_deeper(document, max_depth):
         raise ValueError(f"the document is nested deeper than {max_depth} levels")
     return document
+
+
+def check_values(data: bytes, max_values: int) -> None:
+    """Raise ValueError if a JSON document may have more than `max_values` values."""
+    if data.count(b",") + data.count(b"[") + data.count(b"{") > max_values:
+        raise ValueError(f"the document has more than {max_values} values")
 
 
 def _is_deeper(document: Any, levels: int) -> bool:

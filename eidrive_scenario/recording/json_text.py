@@ -1,7 +1,7 @@
-"""JSON text of records in the encoding of `codec`, written by msgspec where it agrees with that encoding.
+"""JSON text of records in the encoding of `codec`, written and read by msgspec where it agrees with that encoding.
 
-msgspec writes non-finite numbers as null. Such numbers in arrays are spelled by a hook. A record with a non-finite
-number outside of arrays is encoded by the codec.
+msgspec writes non-finite numbers as null, and does not read spelled ones. Such numbers in arrays are spelled and read
+by hooks. A record with a non-finite number outside of arrays is encoded and decoded by the codec.
 """
 
 from __future__ import annotations
@@ -27,13 +27,28 @@ Check = Callable[[Any], bool]
 
 
 class JsonText:
-    """Encoder of records of one type as JSON text in UTF-8. Raise TypeError for a type without an encoding."""
+    """Encoder and decoder of records of one type as JSON text in UTF-8.
+
+    Raise TypeError for a type without an encoding.
+    """
 
     def __init__(self, kind: type) -> None:
         self._codec = codec(kind)
         self._is_finite = _check(kind)
         self._arrays = _ArrayTexts()
         self._encoder = msgspec.json.Encoder(enc_hook=self._arrays.plain)
+        self._decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(kind, dec_hook=_decode_array)
+
+    def decode(self, data: bytes) -> Any:
+        """Return the record of a text. Sequences are lists or tuples, and unknown fields are ignored where possible.
+
+        Raise ValueError, TypeError or LookupError for a text that is not of this type, and RecursionError for one that
+        is nested too deeply.
+        """
+        try:
+            return self._decoder.decode(data)
+        except msgspec.ValidationError:
+            return self._codec.decode(msgspec.json.decode(data))
 
     def encode(self, record: Any) -> bytes:
         """Return the text, which `codec(kind).decode` reads after parsing."""
@@ -75,6 +90,11 @@ class _ArrayTexts:
         if text is None:
             text = self._by_content[key] = msgspec.Raw(self._encode(encode_array(value)))
         return text
+
+
+def _decode_array(kind: Any, data: Any) -> Any:
+    """Return an array of the given type. Other types that msgspec does not support have no encoding."""
+    return codec(kind).decode(data)
 
 
 def _plain(value: Any) -> Any:

@@ -8,13 +8,15 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.files.bounded_json import load_json
+from eidrive_scenario.files.bounded_json import check_values
 from eidrive_scenario.recording import mcap_records as mcap
-from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.frame_check import check_frame
+from eidrive_scenario.recording.json_text import JsonText
 from eidrive_scenario.recording.recorder import FORMAT, FRAMES, READABLE, RUN, TRACE_METADATA
 from eidrive_scenario.recording.run_files import recording_in
 from eidrive_scenario.recording.seal import NAME as SEAL
@@ -70,7 +72,7 @@ class Recording:
         Unreadable frames of a damaged recording are skipped, and `skipped` is called with the reason for each.
         Raise InputError if this version cannot read a frame of an undamaged recording.
         """
-        decode = codec(Frame).decode
+        decode = JsonText(Frame).decode
         last = -1
         with mcap.McapFile(self.path, DamageReport()) as file:
             for offset in self._blocks:
@@ -255,10 +257,12 @@ def _messages(record: mcap.Record, damage: DamageReport | None = None) -> list[m
     return kept
 
 
-def _decode_frame(data: bytes, decode: Callable[[object], Frame]) -> Frame:
+def _decode_frame(data: bytes, decode: Callable[[bytes], Frame]) -> Frame:
     """Decode a frame. Raise ValueError for every kind of invalid content."""
     try:
-        frame = decode(load_json(data, _MAX_VALUES))
+        check_values(data, _MAX_VALUES)
+        frame = decode(data)
+        frame = replace(frame, links=tuple(frame.links))  # msgspec reads sequences as lists
         check_frame(frame)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
         raise ValueError(f"{type(error).__name__}: {error}"[:200]) from None

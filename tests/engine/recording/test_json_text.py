@@ -25,9 +25,12 @@ TEXT = JsonText(Frame)
 
 
 def check(frame: Frame) -> Any:
-    """Compare the text with the codec, number by number, and return the parsed text."""
-    parsed = json.loads(TEXT.encode(frame))
+    """Compare text and decoded frame with the codec, number by number, and return the parsed text."""
+    text = TEXT.encode(frame)
+    parsed = json.loads(text)
     assert repr(parsed) == repr(codec(Frame).encode(frame))
+    frames = [TEXT.decode(text), codec(Frame).decode(parsed)]
+    assert repr(codec(Frame).encode(frames[0])) == repr(codec(Frame).encode(frames[1]))
     return parsed
 
 
