@@ -45,8 +45,6 @@ def _rows(*names: str) -> tuple[Row, ...]:
     return tuple(Row(name) for name in names)
 
 
-OF_1_2 = "defined in 1.2, but not reachable in its schema"
-
 SECTIONS: dict[str, tuple[Row, ...]] = {
     "Private actions": (
         *_rows("SpeedAction", "SpeedProfileAction", "LongitudinalDistanceAction", "LaneChangeAction"),
@@ -57,8 +55,8 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         Row("TeleportAction"),
         Row("AssignRouteAction"),
         *_rows("FollowTrajectoryAction", "AcquirePositionAction", "RandomRouteAction"),
-        Row("LightStateAction", note=f"{OF_1_2}; a UserDefinedLight is only recorded, as its position is undefined"),
-        Row("AnimationAction", note=f"{OF_1_2}; motions of pedestrians are drawn, all others are only recorded"),
+        Row("LightStateAction", note="a UserDefinedLight is only recorded, as its position is undefined"),
+        Row("AnimationAction", note="motions of pedestrians are drawn, all others are only recorded"),
         *_rows("ConnectTrailerAction", "DisconnectTrailerAction"),
     ),
     "Global and user-defined actions": (

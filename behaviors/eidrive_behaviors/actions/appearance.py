@@ -80,7 +80,7 @@ class LightStateAction(ActionBehaviour):
         default = LightState(self._light, self._mode)
         light = replace(
             default,
-            intensity=state.luminous_intensity if state.luminous_intensity is not None else state.intensity,
+            intensity=state.luminous_intensity,
             color=rgb(state.color) if state.color is not None else None,
             since=max(context.time, 0.0),
             fade=self.action.transition_time or 0.0,
@@ -105,8 +105,7 @@ class LightStateAction(ActionBehaviour):
 
     @property
     def _mode(self) -> str:
-        mode = self.action.light_state.mode or self.action.light_state.state
-        return str(mode.value) if mode is not None else "on"
+        return str(self.action.light_state.mode.value)
 
     def describe(self) -> str:
         """Describe the light and its mode."""
@@ -181,7 +180,4 @@ def rgb(color: model.Color) -> tuple[float, float, float] | None:
     if color.color_cmyk is not None:
         mixed, rest = color.color_cmyk, 1.0 - color.color_cmyk.key
         return (1.0 - mixed.cyan) * rest, (1.0 - mixed.magenta) * rest, (1.0 - mixed.yellow) * rest
-    if color.red is not None and color.green is not None and color.blue is not None:
-        return color.red, color.green, color.blue
-    name = color.color_type.value if color.color_type is not None else (color.name or "").lower()
-    return COLORS.get(name)
+    return COLORS.get(color.color_type.value)

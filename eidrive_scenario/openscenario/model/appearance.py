@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_scenario.openscenario.model.content import CHOICE, SEQUENCE, Changed
-from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.element import Element, element_type
 from eidrive_scenario.openscenario.model.entity_enumerations import (
     ColorType,
     LightMode,
@@ -36,15 +36,11 @@ class ColorCmyk(Element):
 
 @element_type
 class Color(Element, content=CHOICE):
-    """Color by name, optionally by components in [0, 1]."""
+    """Color by name and by components in [0, 1]."""
 
-    name: str | None = attribute(until="1.2", required=True)
-    red: float | None = attribute(until="1.2")
-    green: float | None = attribute(until="1.2")
-    blue: float | None = attribute(until="1.2")
-    color_type: ColorType | None = attribute(since="1.3", required=True)
-    color_rgb: ColorRgb | None = child(since="1.3")
-    color_cmyk: ColorCmyk | None = child(since="1.3")
+    color_type: ColorType
+    color_rgb: ColorRgb | None = None
+    color_cmyk: ColorCmyk | None = None
 
 
 @element_type
@@ -65,20 +61,18 @@ class UserDefinedLight(Element):
 class LightType(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Choice of a light."""
 
-    vehicle_light: VehicleLight | None = child(required_until="1.2")
-    user_defined_light: UserDefinedLight | None = child(required_until="1.2")
+    vehicle_light: VehicleLight | None = None
+    user_defined_light: UserDefinedLight | None = None
 
 
 @element_type
 class LightState(Element):
-    """State of a light; intensity [cd], durations [s]."""
+    """State of a light; luminous intensity [cd], durations [s]."""
 
-    state: LightMode | None = attribute(until="1.2", required=True)
-    intensity: float | None = attribute(until="1.2")
+    mode: LightMode
+    luminous_intensity: float | None = None
     flashing_on_duration: float | None = None
     flashing_off_duration: float | None = None
-    mode: LightMode | None = attribute(since="1.3", required=True)
-    luminous_intensity: float | None = attribute(since="1.3")
     color: Color | None = None
 
 
@@ -86,7 +80,6 @@ class LightState(Element):
 class LightStateAction(Element):
     """Action that switches a light; transition time [s]."""
 
-    name: str | None = attribute(until="1.2", required=True)
     transition_time: float | None = None
     light_type: LightType
     light_state: LightState
@@ -110,8 +103,8 @@ class UserDefinedComponent(Element):
 class ComponentAnimation(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Choice of a moving part."""
 
-    vehicle_component: VehicleComponent | None = child(required_until="1.2")
-    user_defined_component: UserDefinedComponent | None = child(required_until="1.2")
+    vehicle_component: VehicleComponent | None = None
+    user_defined_component: UserDefinedComponent | None = None
 
 
 @element_type
@@ -166,7 +159,6 @@ class AnimationState(Element):
 class AnimationAction(Element):
     """Action that plays an animation; duration [s]."""
 
-    name: str | None = attribute(until="1.2", required=True)
     loop: bool | None = None
     animation_duration: float | None = None
     animation_type: AnimationType
@@ -177,6 +169,5 @@ class AnimationAction(Element):
 class AppearanceAction(Element, content=Changed(SEQUENCE, "1.3", CHOICE)):
     """Action that changes the appearance of an entity."""
 
-    light_state_action: LightStateAction | None = child(required_until="1.2")
-    animation_state_action: AnimationAction | None = child(until="1.2", required=True)
-    animation_action: AnimationAction | None = child(since="1.3")
+    light_state_action: LightStateAction | None = None
+    animation_action: AnimationAction | None = None

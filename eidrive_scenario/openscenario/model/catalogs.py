@@ -103,7 +103,7 @@ class CatalogLocations(Element, content=ALL):
     maneuver_catalog: ManeuverCatalogLocation | None = None
     trajectory_catalog: TrajectoryCatalogLocation | None = None
     route_catalog: RouteCatalogLocation | None = None
-    sensor_catalog: SensorCatalogLocation | None = child(since="1.2", until="1.2")
+    sensor_catalog: SensorCatalogLocation | None = child(since="1.2", until="1.2", deprecated="1.2")
 
 
 @element_type

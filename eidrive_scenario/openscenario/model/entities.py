@@ -77,7 +77,7 @@ class Pedestrian(Element, content=ALL):
     pedestrian_category: PedestrianCategory
     model: str | None = attribute(deprecated="1.1", required_until="1.0")
     model3d: str | None = attribute(since="1.1")
-    role: Role | None = attribute(since="1.3")
+    role: Role | None = attribute(since="1.2")
     parameter_declarations: ParameterDeclarations | None = None
     bounding_box: BoundingBox
     properties: Properties | None = child(required_until="1.2")
@@ -120,7 +120,7 @@ class ScenarioObject(
     pedestrian: Pedestrian | None = None
     misc_object: MiscObject | None = None
     external_object_reference: ExternalObjectReference | None = child(since="1.1")
-    sensor: Sensor | None = child(since="1.2", until="1.2")
+    sensor: Sensor | None = child(since="1.2", until="1.2", deprecated="1.2")
     object_controller: tuple[ObjectController, ...] = children(single_until="1.1")
 
 

@@ -32,8 +32,8 @@ class Sun(Element):
 
     azimuth: float
     elevation: float
-    intensity: float | None = attribute(deprecated="1.3", required_until="1.2")
-    illuminance: float | None = attribute(since="1.3")
+    intensity: float | None = attribute(deprecated="1.2", required_until="1.1")
+    illuminance: float | None = attribute(since="1.2")
 
 
 @element_type

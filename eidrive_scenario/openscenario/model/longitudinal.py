@@ -83,9 +83,9 @@ class SpeedProfileAction(Element):
     """Action with a series of speeds."""
 
     following_mode: FollowingMode
-    entity_ref: EntityName | None = attribute(since="1.3")
+    entity_ref: EntityName | None = attribute(since="1.2")
     dynamic_constraints: DynamicConstraints | None = None
-    entity_ref_element: EntityRef | None = child(until="1.2", name="EntityRef")
+    entity_ref_element: EntityRef | None = child(until="1.2", deprecated="1.2", name="EntityRef")
     speed_profile_entry: tuple[SpeedProfileEntry, ...]
 
 

@@ -117,5 +117,5 @@ class PrivateAction(Element, content=Choice(empty_until="1.2")):
     controller_action: ControllerAction | None = None
     teleport_action: TeleportAction | None = None
     routing_action: RoutingAction | None = None
-    appearance_action: AppearanceAction | None = child(since="1.3")
+    appearance_action: AppearanceAction | None = child(since="1.2")
     trailer_action: TrailerAction | None = child(since="1.3")

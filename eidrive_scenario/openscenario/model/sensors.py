@@ -1,4 +1,4 @@
-"""Sensors as entities: in 1.2 only."""
+"""Sensors as entities: in an early schema of 1.2 only, not in its final one."""
 
 from __future__ import annotations
 

@@ -148,10 +148,10 @@ class TrafficSwarmAction(Element, content=ALL):
     velocity: float | None = attribute(deprecated="1.2")
     central_object: CentralSwarmObject
     traffic_definition: TrafficDefinition | None = child(deprecated="1.3", required_until="1.2")
-    speed_range: Range | None = child(since="1.2", until="1.2")
-    area_distribution: AreaDistribution | None = child(since="1.2", until="1.2")
+    speed_range: Range | None = child(since="1.2", until="1.2", deprecated="1.2")
+    area_distribution: AreaDistribution | None = child(since="1.2", until="1.2", deprecated="1.2")
     traffic_distribution: TrafficDistribution | None = child(since="1.3")
-    initial_speed_range: Range | None = child(since="1.3")
+    initial_speed_range: Range | None = child(since="1.2")
     direction_of_travel_distribution: DirectionOfTravelDistribution | None = child(since="1.2")
 
 

@@ -79,14 +79,14 @@ class Vehicle(Element, content=ALL):
     vehicle_category: VehicleCategory
     mass: float | None = attribute(since="1.1")
     model3d: str | None = attribute(since="1.1")
-    vehicle_role: Role | None = attribute(since="1.2", until="1.2")
-    role: Role | None = attribute(since="1.3")
+    role: Role | None = attribute(since="1.2")
+    vehicle_role: Role | None = attribute(since="1.2", until="1.2", deprecated="1.2")
     parameter_declarations: ParameterDeclarations | None = None
     bounding_box: BoundingBox
     performance: Performance
     axles: Axles
     properties: Properties | None = child(required_until="1.2")
-    sensor_attachments: SensorAttachments | None = child(since="1.2", until="1.2")
+    sensor_attachments: SensorAttachments | None = child(since="1.2", until="1.2", deprecated="1.2")
     trailer_hitch: TrailerHitch | None = child(since="1.3")
     trailer_coupler: TrailerCoupler | None = child(since="1.3")
     trailer: Trailer | None = child(since="1.3")

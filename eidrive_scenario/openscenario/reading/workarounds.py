@@ -151,10 +151,10 @@ WORKAROUNDS = (
     ),
     Workaround(
         "Sun",
-        "Sun has the illuminance of OpenSCENARIO 1.3 instead of intensity",
-        "write intensity, or increase revMinor to 3; other tools may reject it",
+        "Sun has the illuminance of OpenSCENARIO 1.2 instead of intensity",
+        "write intensity, or increase revMinor to 2; other tools may reject it",
         _illuminance_alone,
         _intensity,
-        before=(1, 3),
+        before=(1, 2),
     ),
 )

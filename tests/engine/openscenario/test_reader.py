@@ -106,8 +106,8 @@ def test_missing_second_vertex_is_an_error() -> None:
 def test_attribute_of_newer_version_error_has_version() -> None:
     entity = '<ScenarioObject name="Ego"><Pedestrian name="p" mass="80" pedestrianCategory="pedestrian" role="police">'
     box = '<BoundingBox><Center x="0" y="0" z="1"/><Dimensions length="1" width="1" height="2"/></BoundingBox>'
-    xml = scenario_xml(minor=2, entities=f"{entity}{box}<Properties/></Pedestrian></ScenarioObject>")
-    with pytest.raises(ScenarioError, match=r"no attribute 'role'; part of OpenSCENARIO since 1\.3"):
+    xml = scenario_xml(minor=1, entities=f"{entity}{box}<Properties/></Pedestrian></ScenarioObject>")
+    with pytest.raises(ScenarioError, match=r"no attribute 'role'; part of OpenSCENARIO since 1\.2"):
         load_scenario(xml)
 
 

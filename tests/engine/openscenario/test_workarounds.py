@@ -7,6 +7,7 @@ from typing import TypeVar
 import pytest
 from lxml import etree
 from openscenario_xml import catalog_xml, scenario_xml
+from storyboard_xml import story_xml
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import Scenario, load_scenario
@@ -74,17 +75,17 @@ def test_misspelled_signal_group_state_is_a_warning() -> None:
     assert load_scenario(scenario_xml(minor=2, road=CONTROLLER)).warnings == ()
 
 
-def test_illuminance_before_1_3_is_a_warning() -> None:
-    scenario = load_scenario(scenario_xml(minor=2, init=SUNNY.format(word="illuminance")))
+def test_illuminance_before_1_2_is_a_warning() -> None:
+    scenario = load_scenario(scenario_xml(minor=1, init=SUNNY.format(word="illuminance"), story=story_xml()))
     assert only(scenario, Sun).intensity == 1000.0
-    assert "increase revMinor to 3" in str(scenario.warnings[0])
+    assert "increase revMinor to 2" in str(scenario.warnings[0])
     both = SUNNY.format(word='intensity="1" illuminance')
     with pytest.raises(ScenarioError, match="Sun has no attribute 'illuminance'; part of OpenSCENARIO"):
-        load_scenario(scenario_xml(minor=2, init=both))
+        load_scenario(scenario_xml(minor=1, init=both, story=story_xml()))
 
 
 def test_workarounds_apply_to_catalogs(tmp_path: Path) -> None:
-    (tmp_path / "skies.xosc").write_bytes(catalog_xml("skies", ENVIRONMENT.format(word="illuminance"), minor=2))
+    (tmp_path / "skies.xosc").write_bytes(catalog_xml("skies", ENVIRONMENT.format(word="illuminance"), minor=1))
     place = f'<EnvironmentCatalog><Directory path="{tmp_path}"/></EnvironmentCatalog>'
     reference = '<CatalogReference catalogName="skies" entryName="e"/>'
     action = f"<GlobalAction><EnvironmentAction>{reference}</EnvironmentAction></GlobalAction>"
