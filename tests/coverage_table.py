@@ -55,6 +55,7 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         Row("TeleportAction"),
         Row("AssignRouteAction"),
         *_rows("FollowTrajectoryAction", "AcquirePositionAction", "RandomRouteAction"),
+        Row("PreferredLaneLayerAction", note="permanent lanes; the temporary layer is an error here and in positions"),
         Row("LightStateAction", note="a UserDefinedLight is only recorded, as its position is undefined"),
         Row("AnimationAction", note="motions of pedestrians are drawn, all others are only recorded"),
         *_rows("ConnectTrailerAction", "DisconnectTrailerAction"),
@@ -156,16 +157,24 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
 }
 
 LIGHTS = "no controller model controls lights or animations"
+MOTION = "the times of a trajectory determine the speed; without times, the longitudinal action does, with a warning"
 WITHOUT_EFFECT = {
     "ActivateControllerAction.lighting": LIGHTS,
     "AnimationFile.timeOffset": "animation files are recorded, not executed",
     "AssignControllerAction.activateAnimation": LIGHTS,
     "AssignControllerAction.activateLighting": LIGHTS,
     "Axle.positionZ": "wheels stand on the road",
+    "Clothoid.MotionEnd": MOTION,
+    "Clothoid.MotionStart": MOTION,
+    "ClothoidSpline.MotionEnd": MOTION,
+    "ClothoidSplineSegment.MotionStart": MOTION,
     "Controller.controllerType": "the property `module` determines the tool",
     "DomeImage.azimuthOffset": "the sky is computed from sun, clouds and fog",
+    "Motion.acceleration_longitudinal": MOTION,
+    "Motion.speed_longitudinal": MOTION,
     "OverrideSteeringWheelAction.maxTorque": "the steering wheel angle is set without a torque",
     "Pedestrian.pedestrianCategory": "wheelchairs and animals move and are detected as pedestrians",
+    "Phase.semantics": "the states of the signals determine what road users do",
     "Properties.CustomContent": "the meaning is undefined",
     "RoadNetwork.SceneGraphFile": "images are rendered from the road file",
     "RoadNetwork.UsedArea": "the complete map is loaded",

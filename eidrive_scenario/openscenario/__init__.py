@@ -1,4 +1,4 @@
-"""Reader of OpenSCENARIO XML 1.0 to 1.3: files to a frozen, validated Scenario, distributions to concrete runs."""
+"""Reader of OpenSCENARIO XML 1.0 to 1.4: files to a frozen, validated Scenario, distributions to concrete runs."""
 
 from typing import TYPE_CHECKING
 

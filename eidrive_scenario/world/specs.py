@@ -29,16 +29,27 @@ _WORDS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("rsu", ("rsu", "roadside_unit")),
 )
 _VEHICLES = {
+    "aircraft": "bus",
     "bicycle": "bicycle",
     "bus": "bus",
     "car": "car",
+    "heavyTruck": "truck",
+    "landVehicle": "car",
+    "micromobilityDevice": "bicycle",
     "motorbike": "motorbike",
+    "motorcycle": "motorbike",
+    "other": "car",
+    "semitractor": "truck",
     "semitrailer": "truck",
+    "standupScooter": "bicycle",
     "trailer": "truck",
     "train": "bus",
     "tram": "bus",
     "truck": "truck",
     "van": "van",
+    "watercraft": "bus",
+    "wheelchair": "bicycle",
+    "workMachine": "truck",
 }
 _CATEGORIES = {"firetruck": "truck", "ambulance": "van", "rsu": "misc", "box": "misc"}
 _USUAL_MASS = {

@@ -37,6 +37,7 @@ SCHEMAS = {
     ("1", "1"): "OpenSCENARIOv1.1.1.xsd",
     ("1", "2"): "OpenSCENARIOv1.2.xsd",
     ("1", "3"): "OpenSCENARIOv1.3.1.xsd",
+    ("1", "4"): "OpenSCENARIOv1.4.xsd",
 }
 VALUES = ["", "abc", "-1", "0", "1.5", "70000", "5000000000", "INF", "NaN", "+INF", "true", " 2 ", "0x1", ".5", "5."]
 VALUES += ["1e5", "--1", "nan", "1_0", "lessThan", "${1+1}", "${a<b}", "$", "$Nobody", "2020-01-01T24:00:00Z"]
@@ -119,7 +120,8 @@ class Validator:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._schemas = {version: etree.XMLSchema(etree.parse(folder / name)) for version, name in SCHEMAS.items()}
+        present = {version: folder / name for version, name in SCHEMAS.items() if (folder / name).exists()}
+        self._schemas = {version: etree.XMLSchema(etree.parse(path)) for version, path in present.items()}
 
     def version_of(self, root: etree._Element) -> tuple[str, str] | None:
         """Return the version in the header of a file, None if it is unknown."""

@@ -1,4 +1,4 @@
-"""AssignRouteAction, AcquirePositionAction and RandomRouteAction: routes of actors."""
+"""AssignRouteAction, AcquirePositionAction, RandomRouteAction and PreferredLaneLayerAction: routes of actors."""
 
 from __future__ import annotations
 
@@ -139,6 +139,21 @@ class RandomRouteAction(ActionBehaviour):
     def describe(self) -> str:
         """Describe the action."""
         return "drive about at random"
+
+
+class PreferredLaneLayerAction(ActionBehaviour):
+    """Preference for the permanent lanes, the only ones of a road network; it completes at once."""
+
+    immediate = True
+    action: model.PreferredLaneLayerAction
+
+    def update(self) -> Status:
+        """Complete."""
+        return Status.SUCCESS
+
+    def describe(self) -> str:
+        """Describe the lane layer."""
+        return f"prefer {self.action.layer.value} lanes"
 
 
 def assign_route(behaviour: ActionBehaviour, route: Route) -> None:

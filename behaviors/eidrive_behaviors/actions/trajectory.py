@@ -70,6 +70,10 @@ class FollowTrajectoryAction(ActionBehaviour):
             what = "the actor keeps its own speed: the trajectory has no times for Timing to scale"
             hint = f"specify {TIME_ATTRIBUTES[type(shape)]}, or <None/> as the TimeReference"
             context.warn(*self.error(what, hint).diagnostics)
+        if self._timing is None and any(isinstance(part, model.Motion) for part in shape.walk()):
+            what = "the actor keeps its own speed: Motion has no effect on a trajectory without times"
+            hint = f"specify {TIME_ATTRIBUTES[type(shape)]} with Timing, or the speed by another action"
+            context.warn(*self.error(what, hint).diagnostics)
 
     @property
     def controls(self) -> Domain:

@@ -1,4 +1,4 @@
-"""Types of OpenSCENARIO XML 1.0 to 1.3 as frozen dataclasses with the names of the standard.
+"""Types of OpenSCENARIO XML 1.0 to 1.4 as frozen dataclasses with the names of the standard.
 
 Attributes and children of an element are fields in snake_case; `element` describes the field definitions.
 """

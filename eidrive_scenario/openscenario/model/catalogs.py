@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario.model.routing import Route, Trajectory
     from eidrive_scenario.openscenario.model.sensors import Sensor
     from eidrive_scenario.openscenario.model.storyboard import Maneuver
+    from eidrive_scenario.openscenario.model.traffic import TrafficDistributionEntry
     from eidrive_scenario.openscenario.model.vehicles import Vehicle
 
 
@@ -92,6 +93,13 @@ class SensorCatalogLocation(Element, content=ALL):
 
 
 @element_type
+class TrafficDistributionEntryCatalogLocation(Element):
+    """Location of catalogs of kinds of traffic."""
+
+    directory: Directory
+
+
+@element_type
 class CatalogLocations(Element, content=ALL):
     """Locations of the catalogs of a scenario, by kind."""
 
@@ -104,6 +112,7 @@ class CatalogLocations(Element, content=ALL):
     trajectory_catalog: TrajectoryCatalogLocation | None = None
     route_catalog: RouteCatalogLocation | None = None
     sensor_catalog: SensorCatalogLocation | None = child(since="1.2", until="1.2", deprecated="1.2")
+    traffic_distribution_entry_catalog: TrafficDistributionEntryCatalogLocation | None = child(since="1.4")
 
 
 @element_type
@@ -120,3 +129,4 @@ class Catalog(Element):
     trajectory: tuple[Trajectory, ...] = ()
     route: tuple[Route, ...] = ()
     sensor: tuple[Sensor, ...] = children(since="1.2", until="1.2")
+    traffic_distribution_entry: tuple[TrafficDistributionEntry, ...] = children(since="1.4")

@@ -103,7 +103,7 @@ class PedestrianCategory(Enumeration):
 
     ANIMAL = "animal"
     PEDESTRIAN = "pedestrian"
-    WHEELCHAIR = "wheelchair"
+    WHEELCHAIR = "wheelchair", deprecated("1.4")
 
 
 class PedestrianGestureType(Enumeration):
@@ -153,13 +153,23 @@ class Role(Enumeration):
     """Role of a vehicle or a pedestrian."""
 
     NONE = "none"
+    AGRICULTURE = "agriculture", since("1.4")
     AMBULANCE = "ambulance"
     CIVIL = "civil"
-    FIRE = "fire"
+    CONSTRUCTION = "construction", since("1.4")
+    DANGEROUS_GOODS_TRANSPORT = "dangerousGoodsTransport", since("1.4")
+    FIRE = "fire", deprecated("1.4")
+    FIRE_BRIGADE = "fireBrigade", since("1.4")
+    FREIGHT_TRANSPORT = "freightTransport", since("1.4")
+    GARBAGE_COLLECTION = "garbageCollection", since("1.4")
     MILITARY = "military"
+    OTHER = "other", since("1.4")
     POLICE = "police"
     PUBLIC_TRANSPORT = "publicTransport"
-    ROAD_ASSISTANCE = "roadAssistance"
+    ROAD_ASSISTANCE = "roadAssistance", deprecated("1.4")
+    ROADSIDE_ASSISTANCE = "roadsideAssistance", since("1.4")
+    SPECIAL_TRANSPORT = "specialTransport", since("1.4")
+    TRAFFIC_CONTROL = "trafficControl", since("1.4")
 
 
 class SensorCategory(Enumeration):
@@ -174,16 +184,27 @@ class SensorCategory(Enumeration):
 class VehicleCategory(Enumeration):
     """Category of a vehicle."""
 
+    AIRCRAFT = "aircraft", since("1.4")
     BICYCLE = "bicycle"
     BUS = "bus"
     CAR = "car"
-    MOTORBIKE = "motorbike"
+    HEAVY_TRUCK = "heavyTruck", since("1.4")
+    LAND_VEHICLE = "landVehicle", since("1.4")
+    MICROMOBILITY_DEVICE = "micromobilityDevice", since("1.4")
+    MOTORBIKE = "motorbike", deprecated("1.4")
+    MOTORCYCLE = "motorcycle", since("1.4")
+    OTHER = "other", since("1.4")
+    SEMITRACTOR = "semitractor", since("1.4")
     SEMITRAILER = "semitrailer"
+    STANDUP_SCOOTER = "standupScooter", since("1.4")
     TRAILER = "trailer"
     TRAIN = "train"
     TRAM = "tram"
-    TRUCK = "truck"
+    TRUCK = "truck", deprecated("1.4")
     VAN = "van"
+    WATERCRAFT = "watercraft", since("1.4")
+    WHEELCHAIR = "wheelchair", since("1.4")
+    WORK_MACHINE = "workMachine", since("1.4")
 
 
 class VehicleComponentType(Enumeration):
@@ -220,6 +241,7 @@ class VehicleLightType(Enumeration):
     REVERSING_LIGHTS = "reversingLights"
     LICENSE_PLATE_ILLUMINATION = "licensePlateIllumination"
     SPECIAL_PURPOSE_LIGHTS = "specialPurposeLights"
+    TAIL_LIGHTS = "tailLights", since("1.4")
 
 
 class Wetness(Enumeration):

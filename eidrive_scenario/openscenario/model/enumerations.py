@@ -73,6 +73,13 @@ class FollowingMode(Enumeration):
     POSITION = "position"
 
 
+class LaneLayerType(Enumeration):
+    """Layer of the lanes of a map, such as the temporary lanes of a work zone."""
+
+    PERMANENT = "permanent"
+    TEMPORARY = "temporary"
+
+
 class LateralDisplacement(Enumeration):
     """Lateral displacement relative to the reference entity."""
 
@@ -185,6 +192,17 @@ class StoryboardElementType(Enumeration):
     MANEUVER = "maneuver"
     MANEUVER_GROUP = "maneuverGroup"
     STORY = "story"
+
+
+class TrafficSignalSemantics(Enumeration):
+    """Meaning of a phase of a signal controller."""
+
+    ATTENTION_GO = "attention_go"
+    ATTENTION_STOP = "attention_stop"
+    CAUTION = "caution"
+    FALLBACK = "fallback"
+    GO = "go"
+    STOP = "stop"
 
 
 class TriggeringEntitiesRule(Enumeration):

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from eidrive_scenario.openscenario.model.content import ALL, Choice
 from eidrive_scenario.openscenario.model.element import Element, attribute, element_type
-from eidrive_scenario.openscenario.model.enumerations import CoordinateSystem, DynamicsShape, LateralDisplacement
+from eidrive_scenario.openscenario.model.enumerations import (
+    CoordinateSystem,
+    DynamicsShape,
+    LaneLayerType,
+    LateralDisplacement,
+)
 from eidrive_scenario.openscenario.model.longitudinal import DynamicConstraints, TransitionDynamics
 from eidrive_scenario.openscenario.model.scalars import EntityName
 
@@ -14,6 +19,7 @@ class AbsoluteTargetLane(Element):
     """Target lane by its id."""
 
     value: str
+    layer: LaneLayerType | None = attribute(since="1.4")
 
 
 @element_type
@@ -22,6 +28,7 @@ class RelativeTargetLane(Element):
 
     entity_ref: EntityName
     value: int
+    layer: LaneLayerType | None = attribute(since="1.4")
 
 
 @element_type

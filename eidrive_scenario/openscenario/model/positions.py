@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
 from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
-from eidrive_scenario.openscenario.model.enumerations import ReferenceContext
+from eidrive_scenario.openscenario.model.enumerations import LaneLayerType, ReferenceContext
 from eidrive_scenario.openscenario.model.scalars import EntityName
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ class LanePosition(Element, content=ALL):
     road_id: str
     s: float
     offset: float | None = None
+    layer: LaneLayerType | None = attribute(since="1.4")
     orientation: Orientation | None = None
 
 

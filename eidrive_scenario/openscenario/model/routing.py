@@ -6,7 +6,12 @@ from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import ALL, Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
-from eidrive_scenario.openscenario.model.enumerations import FollowingMode, ReferenceContext, RouteStrategy
+from eidrive_scenario.openscenario.model.enumerations import (
+    FollowingMode,
+    LaneLayerType,
+    ReferenceContext,
+    RouteStrategy,
+)
 from eidrive_scenario.openscenario.model.positions import Position, TrajectoryRef
 from eidrive_scenario.openscenario.model.scalars import UnsignedInt
 
@@ -30,11 +35,25 @@ class Route(Element):
 
 
 @element_type
+class Motion(Element):
+    """Motion at a point of a trajectory: speed [m/s] and acceleration [m/s²] along it."""
+
+    speed_longitudinal: float | None = attribute(name="speed_longitudinal")
+    acceleration_longitudinal: float | None = attribute(name="acceleration_longitudinal")
+
+
+@element_type
 class Vertex(Element):
     """Vertex of a polyline; time [s]."""
 
     time: float | None = attribute(required_until="1.0")
     position: Position
+    motion: Motion | None = child(since="1.4")
+
+
+@element_type
+class Interpolation(Element):
+    """Interpolation between the vertices of a polyline by the tool."""
 
 
 @element_type
@@ -42,6 +61,7 @@ class Polyline(Element):
     """Polyline between vertices."""
 
     vertex: tuple[Vertex, ...] = children(minimum=2)
+    interpolation: Interpolation | None = child(since="1.4")
 
 
 @element_type
@@ -55,6 +75,8 @@ class Clothoid(Element):
     stop_time: float | None = None
     curvature_prime: float | None = attribute(since="1.1")
     position: Position
+    motion_start: Motion | None = child(since="1.4")
+    motion_end: Motion | None = child(since="1.4")
 
 
 @element_type
@@ -67,6 +89,7 @@ class ClothoidSplineSegment(Element):
     h_offset: float | None = None
     time_start: float | None = None
     position_start: Position | None = None
+    motion_start: Motion | None = child(since="1.4")
 
 
 @element_type
@@ -75,6 +98,7 @@ class ClothoidSpline(Element):
 
     time_end: float | None = None
     clothoid_spline_segment: tuple[ClothoidSplineSegment, ...]
+    motion_end: Motion | None = child(since="1.4")
 
 
 @element_type
@@ -184,6 +208,13 @@ class RandomRouteAction(Element):
 
 
 @element_type
+class PreferredLaneLayerAction(Element):
+    """Action that sets the lane layer that an entity prefers."""
+
+    layer: LaneLayerType
+
+
+@element_type
 class RoutingAction(Element, content=Choice(empty_until="1.2")):
     """Routing action of an entity."""
 
@@ -191,3 +222,4 @@ class RoutingAction(Element, content=Choice(empty_until="1.2")):
     follow_trajectory_action: FollowTrajectoryAction | None = None
     acquire_position_action: AcquirePositionAction | None = None
     random_route_action: RandomRouteAction | None = child(since="1.3")
+    preferred_lane_layer_action: PreferredLaneLayerAction | None = child(since="1.4")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, child, element_type
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, element_type
+from eidrive_scenario.openscenario.model.enumerations import TrafficSignalSemantics
 from eidrive_scenario.openscenario.model.scalars import SignalControllerName
 
 
@@ -28,6 +29,7 @@ class Phase(Element):
 
     duration: float
     name: str
+    semantics: TrafficSignalSemantics | None = attribute(since="1.4")
     traffic_signal_state: tuple[TrafficSignalState, ...] = ()
     traffice_signal_group_state: TrafficSignalGroupState | None = child(since="1.2", until="1.2")
     traffic_signal_group_state: TrafficSignalGroupState | None = child(since="1.3")

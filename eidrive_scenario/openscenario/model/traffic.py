@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
+from eidrive_scenario.openscenario.model.catalogs import CatalogReference
+from eidrive_scenario.openscenario.model.content import ALL, CHOICE, SEQUENCE, Changed, Choice, choice, sequence
 from eidrive_scenario.openscenario.model.controllers import ControllerDistribution
+from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, attribute, child, children, element_type
 from eidrive_scenario.openscenario.model.entities import ScenarioObjectTemplate
 from eidrive_scenario.openscenario.model.entity_enumerations import Role, VehicleCategory
@@ -84,15 +86,30 @@ class TrafficDistributionEntry(Element):
     """Kind of traffic and its share."""
 
     weight: float
+    name: str | None = attribute(since="1.4")
     entity_distribution: EntityDistribution
     properties: Properties | None = None
+    parameter_declarations: ParameterDeclarations | None = child(since="1.4")
 
 
 @element_type
-class TrafficDistribution(Element):
+class TrafficDistribution(
+    Element,
+    content=Changed(
+        SEQUENCE,
+        "1.4",
+        Choice(
+            (
+                sequence(choice("traffic_distribution_entry"), "catalog_references"),
+                sequence(choice("catalog_references"), "traffic_distribution_entry"),
+            )
+        ),
+    ),
+):
     """Composition of traffic, by shares."""
 
-    traffic_distribution_entry: tuple[TrafficDistributionEntry, ...]
+    traffic_distribution_entry: tuple[TrafficDistributionEntry, ...] = children(required_until="1.3")
+    catalog_references: tuple[CatalogReference, ...] = children(since="1.4")
 
 
 @element_type

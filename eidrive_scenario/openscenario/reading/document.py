@@ -17,7 +17,7 @@ from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter
 from eidrive_scenario.openscenario.values.scalars import Version
 
-VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
+VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3), (1, 4))
 ROOTS = ("OpenSCENARIO", "OpenScenario")
 """Names of the root element; the schema declares both spellings."""
 
@@ -95,7 +95,7 @@ def _revision(
         text = header.get(name)
         if text is None or not (text.strip().isascii() and text.strip().isdigit()):
             problem = f"lacks the attribute {name!r}" if text is None else f"has the {name} {text!r}"
-            hint = "version 1.3 is revMajor 1 and revMinor 3"
+            hint = "version 1.4 is revMajor 1 and revMinor 4"
             collector.error(f"FileHeader {problem}", hint, source=document.name, line=line_of(header))
             return None
         numbers.append(int(text.strip()[:9]))

@@ -144,8 +144,9 @@ class Reader:
             check_children(node, children, known, self.version, self._error)
         if known.choice and not any(one.tag in known.choice or one.tag not in known.children for one in children):
             self._report_empty(node, cls, known)
-        if "catalog_reference" in values:
-            self._note_references(known, values["catalog_reference"])
+        for name in ("catalog_reference", "catalog_references"):
+            if name in values:
+                self._note_references(known, values[name])
         return incomplete_element(cls, values)
 
     def _attributes(self, node: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]) -> None:

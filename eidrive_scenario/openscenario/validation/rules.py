@@ -11,18 +11,23 @@ from typing import Any
 
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
+    AbsoluteTargetLane,
     CatalogReference,
     Clothoid,
     ClothoidSpline,
     Condition,
     DynamicsDimension,
     Element,
+    LaneLayerType,
+    LanePosition,
     LongitudinalDistanceAction,
     Nurbs,
     OpenScenario,
     Orientation,
     Polyline,
+    PreferredLaneLayerAction,
     RelativeLanePosition,
+    RelativeTargetLane,
     Timing,
     TransitionDynamics,
 )
@@ -66,6 +71,12 @@ def _distance(action: LongitudinalDistanceAction) -> str:
 def _lane_position(position: RelativeLanePosition) -> str:
     both = position.ds is not None and position.ds_lane is not None
     return "RelativeLanePosition must have either ds or dsLane" if both else ""
+
+
+def _layer(element: AbsoluteTargetLane | LanePosition | PreferredLaneLayerAction | RelativeTargetLane) -> str:
+    if element.layer is not LaneLayerType.TEMPORARY:
+        return ""
+    return f"{type(element).__name__} refers to the temporary lane layer, which road networks do not have here"
 
 
 def _nurbs(curve: Nurbs) -> str:
@@ -126,13 +137,17 @@ def _timing(timing: Timing) -> str:
 
 
 _CHECKS: Mapping[type[Element], Callable[[Any], str]] = {
+    AbsoluteTargetLane: _layer,
     Clothoid: _clothoid,
     ClothoidSpline: _clothoid_spline,
     Condition: _delay,
+    LanePosition: _layer,
     LongitudinalDistanceAction: _distance,
     Nurbs: _nurbs,
     Polyline: _polyline,
+    PreferredLaneLayerAction: _layer,
     RelativeLanePosition: _lane_position,
+    RelativeTargetLane: _layer,
     Timing: _timing,
     TransitionDynamics: _transition,
 }

@@ -26,12 +26,26 @@ MODULE = "eidrive.traffic"
 """Value of `module` of a controller with driver parameters of background traffic."""
 
 CATEGORY_FALLBACKS = {
+    VehicleCategory.AIRCRAFT: VehicleCategory.BUS,
+    VehicleCategory.HEAVY_TRUCK: VehicleCategory.TRUCK,
+    VehicleCategory.LAND_VEHICLE: VehicleCategory.CAR,
+    VehicleCategory.MICROMOBILITY_DEVICE: VehicleCategory.BICYCLE,
+    VehicleCategory.MOTORCYCLE: VehicleCategory.MOTORBIKE,
+    VehicleCategory.OTHER: VehicleCategory.CAR,
+    VehicleCategory.SEMITRACTOR: VehicleCategory.TRUCK,
     VehicleCategory.SEMITRAILER: VehicleCategory.TRUCK,
+    VehicleCategory.STANDUP_SCOOTER: VehicleCategory.BICYCLE,
     VehicleCategory.TRAILER: VehicleCategory.TRUCK,
     VehicleCategory.TRAIN: VehicleCategory.BUS,
     VehicleCategory.TRAM: VehicleCategory.BUS,
+    VehicleCategory.WATERCRAFT: VehicleCategory.BUS,
+    VehicleCategory.WHEELCHAIR: VehicleCategory.BICYCLE,
+    VehicleCategory.WORK_MACHINE: VehicleCategory.TRUCK,
 }
-"""Replacements of vehicle categories that cannot drive alone."""
+"""Replacements of vehicle categories that cannot drive alone, or of which the library has no vehicle."""
+
+_OLD_ROLES = {Role.FIRE_BRIGADE: Role.FIRE, Role.ROADSIDE_ASSISTANCE: Role.ROAD_ASSISTANCE}
+"""Names of roles before OpenSCENARIO 1.4, which the vehicles of the library have."""
 
 ON_FOOT = IntelligentDriver(time_gap=0.5, standstill_gap=0.5, acceleration=0.6, deceleration=1.0)
 """Parameters of the model for pedestrians that walk in a row."""
@@ -106,14 +120,14 @@ class TrafficMix:
         self._roles: WeightedChoice[Role] = WeightedChoice([Role.NONE], [1.0])
         self._drivers: WeightedChoice[DriverSettings] = WeightedChoice([DriverSettings()], [1.0])
         if distribution is not None:
-            entries = distribution.traffic_distribution_entry
+            entries = self._entries(distribution)
             self._groups = self._weighted([self._group(entry) for entry in entries], entries)
         elif definition is not None:
             categories = definition.vehicle_category_distribution.vehicle_category_distribution_entry
             self._categories = self._weighted([entry.category for entry in categories], categories)
             if definition.vehicle_role_distribution is not None:
                 roles = definition.vehicle_role_distribution.vehicle_role_distribution_entry
-                self._roles = self._weighted([entry.role for entry in roles], roles)
+                self._roles = self._weighted([_OLD_ROLES.get(entry.role, entry.role) for entry in roles], roles)
             controllers = definition.controller_distribution.controller_distribution_entry
             self._drivers = self._weighted([self._settings(entry) for entry in controllers], controllers)
 
@@ -137,6 +151,12 @@ class TrafficMix:
             categories = [CATEGORY_FALLBACKS.get(category, category) for category, weight in pairs if weight > 0.0]
             return frozenset(body.category for category in categories for body, _ in library_bodies(category))
         return frozenset(member.spec.category for group in self._groups.things for member in group.things)
+
+    def _entries(self, distribution: model.TrafficDistribution) -> list[model.TrafficDistributionEntry]:
+        """Return the entries in the file and those of catalogs, whose kind the reader has checked."""
+        found = map(self._scenario.resolved, distribution.catalog_references)
+        listed = [entry for entry in found if isinstance(entry, model.TrafficDistributionEntry)]
+        return [*distribution.traffic_distribution_entry, *listed]
 
     def _group(self, entry: model.TrafficDistributionEntry) -> WeightedChoice[Participant]:
         members = entry.entity_distribution.entity_distribution_entry
