@@ -12,6 +12,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation.recorded_outcome import RecordedOutcome, recorded_outcome
 
 Part = TypeVar("Part")
 
@@ -41,6 +42,16 @@ class RecordedRun:
         if not count:
             hint = "; ".join(self.warnings) or "record the run again"
             raise SettingError(Diagnostic("the recording contains no readable frame", hint, str(self.recording.path)))
+
+    def outcome(self) -> RecordedOutcome | None:
+        """Return the outcome of the run, None if it did not end. One that cannot be read is damage, or InputError."""
+        try:
+            return recorded_outcome(self.recording)
+        except InputError as error:
+            if not self.recording.damage:
+                raise
+            self._skip(f"the outcome of the run is omitted: {error.diagnostics[0]}")
+            return None
 
     def converted(self, frame: Frame, convert: Callable[[Frame], Iterable[Part]]) -> list[Part]:
         """Return the parts of a file for a frame.

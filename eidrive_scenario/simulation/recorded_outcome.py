@@ -20,6 +20,7 @@ from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.resolved_settings import canonical_json
 from eidrive_scenario.simulation.commands import CriteriaContext, criteria_context
 from eidrive_scenario.simulation.run import RunResult
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 OUTCOME = "outcome.json"
@@ -51,6 +52,7 @@ class RecordedOutcome:
     warnings: tuple[str, ...]
     trace_hash: str
     simulated_s: float
+    final_links: tuple[LinkEvent, ...] = ()
 
 
 class RunRecorder(Recorder):
@@ -105,6 +107,7 @@ class RunRecorder(Recorder):
             result.warnings,
             result.trace_hash,
             result.simulated_s,
+            result.final_links,
         )
         text = json.dumps(codec(RecordedOutcome).encode(outcome), ensure_ascii=False, allow_nan=False)
         self.attach(OUTCOME, text.encode())

@@ -19,6 +19,7 @@ from eidrive_scenario.storyboard.state.external_inputs import user_value_warning
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.v2x.messages.message import LinkEvent
 
 TIME_LIMIT = "time limit"
 """Reason for the end of a run that reaches the limit of simulated time."""
@@ -28,11 +29,12 @@ FATAL_CRITERION = "criterion: "
 
 
 class RunEnd(msgspec.Struct, frozen=True):
-    """End of a run: the last frame, the reason, and the wall time until then [s]."""
+    """End of a run: the last frame, the reason, the wall time until then [s], and `RunResult.final_links`."""
 
     frame: Frame
     reason: str
     wall_s: float
+    final_links: Sequence[LinkEvent] = ()
 
 
 def build_result(
@@ -49,6 +51,7 @@ def build_result(
     frame, scenario, stack = end.frame, state.scenario, state.stack
     links = dict(stack.link_statistics(frame.view.time))
     for criterion in state.criteria:
+        criterion.observe_final_links(end.final_links)
         criterion.observe_links(links)
     verdicts = final_verdicts(state.criteria, state.exit)
     exit_code = exit_code_of(verdicts, end.reason)
@@ -72,6 +75,7 @@ def build_result(
         parameters=dict(scenario.parameters),
         run=settings.run,
         links=links,
+        final_links=tuple(end.final_links),
         settings=settings,
         final_state=final_state,
     )

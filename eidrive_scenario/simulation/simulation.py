@@ -252,7 +252,7 @@ class Simulation:
             execute(commands, self._state)
             self.world.step(commands.placements, self.stack.controls(steps, commands.overrides))
         else:
-            self._ended = RunEnd(frame, end, time.perf_counter() - self._started)
+            self._ended = RunEnd(frame, end, time.perf_counter() - self._started, self.stack.final_links())
         return frame, end
 
     def _observe(self, frame: Frame, driven: Collection[str]) -> None:
