@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -12,7 +12,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.recorded_outcome import RecordedOutcome, recorded_outcome
+from eidrive_scenario.simulation.recorded_outcome import RecordedOutcome, recorded_outcome, recorded_trailers
 
 Part = TypeVar("Part")
 
@@ -32,6 +32,11 @@ class RecordedRun:
     def title(self) -> str:
         """Scenario and seed in one line."""
         return f"{self.recording.scenario or self.recording.path.stem}, seed {self.recording.seed}"
+
+    @property
+    def towed(self) -> Mapping[str, str]:
+        """Vehicle categories of the trailers and semitrailers of the scenario, by name."""
+        return recorded_trailers(self.recording)
 
     def frames(self) -> Iterator[Frame]:
         """Yield the readable frames. Raise SettingError if there is none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import msgspec
 
@@ -26,6 +26,7 @@ from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment_weather import weather_from_environment
 from eidrive_scenario.world.specs import actor_spec
+from eidrive_scenario.world.view import WorldView
 
 
 class RunState(msgspec.Struct):
@@ -38,6 +39,7 @@ class RunState(msgspec.Struct):
     warnings       of the run; commands without effect add to them
     exit           verdict of the command that ends the run; None before it
     executed       custom commands since the last frame
+    trailers       trailer of each towing vehicle since the last step of the world, by name
     """
 
     scenario: Scenario
@@ -51,6 +53,7 @@ class RunState(msgspec.Struct):
     inputs: StackInputs = msgspec.field(default_factory=StackInputs)
     exit: Verdict | None = None
     executed: list[ExecutedCommand] = msgspec.field(default_factory=list)
+    trailers: Mapping[str, str] = msgspec.field(default_factory=dict)
 
     @classmethod
     def of(cls, setup: RunSetup) -> RunState:
@@ -73,6 +76,12 @@ class RunState(msgspec.Struct):
         executed, self.executed = tuple(self.executed), []
         return executed
 
+    def trailers_in(self, view: WorldView) -> Mapping[str, str]:
+        """Return the trailer of each towing vehicle of which both are present."""
+        if not self.trailers:
+            return {}
+        return {front: back for front, back in self.trailers.items() if front in view and back in view}
+
     def record(self, kind: str, content: str) -> None:
         """Add an executed command."""
         self.executed.append(ExecutedCommand(kind, content, self.world.time))
@@ -93,7 +102,8 @@ def remove_actors(commands: Commands, run: RunState) -> None:
 
 def set_trailers(commands: Commands, run: RunState) -> None:
     """Set which actors are connected, before a trailer enters the world."""
-    run.world.set_trailers(commands.trailers)
+    run.trailers = commands.trailers
+    run.world.set_trailers([frozenset(pair) for pair in commands.trailers.items()])
 
 
 def spawn_actors(commands: Commands, run: RunState) -> None:

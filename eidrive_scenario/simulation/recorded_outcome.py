@@ -12,6 +12,8 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.model import Vehicle
+from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
@@ -27,6 +29,9 @@ OUTCOME = "outcome.json"
 """Name of the attachment with the outcome."""
 CONTEXT = "criteria_context"
 """Entry of the metadata with the names of the scenario to which criteria refer."""
+
+TRAILERS = "trailers"
+"""Entry of the metadata with the vehicle categories of trailers and semitrailers, by name."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +136,26 @@ def plain_verdict(verdict: Verdict) -> Verdict:
 def criteria_context_text(scenario: Scenario) -> str:
     """Return the entry `CONTEXT` of the metadata of a run."""
     return canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))
+
+
+def trailer_metadata(scenario: Scenario) -> dict[str, str]:
+    """Return the entry `TRAILERS` of the metadata of a run; empty without trailers."""
+    towed = (VehicleCategory.TRAILER, VehicleCategory.SEMITRAILER)
+    found = {
+        name: entity.vehicle_category.value
+        for name, entity in scenario.entities.items()
+        if isinstance(entity, Vehicle) and entity.vehicle_category in towed
+    }
+    return {TRAILERS: canonical_json(found)} if found else {}
+
+
+def recorded_trailers(recording: Recording) -> Mapping[str, str]:
+    """Return the vehicle categories of trailers by name. Those of an older or damaged recording are unknown."""
+    try:
+        found: Mapping[str, str] = codec(Mapping[str, str]).decode(load_json(recording.metadata[TRAILERS].encode()))
+    except (AttributeError, LookupError, TypeError, ValueError):
+        return {}
+    return found
 
 
 def recorded_context(recording: Recording) -> CriteriaContext:

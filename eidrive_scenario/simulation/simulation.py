@@ -244,6 +244,7 @@ class Simulation:
             commands.monitors,
             commands.routes,
             self._state.take_executed(),
+            self._state.trailers_in(view),
         )
         self._observe(frame, commands.driven)
         end = end_reason(self._state, self.storyboard, view.time, self.settings.time_limit)

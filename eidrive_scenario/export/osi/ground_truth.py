@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from eidrive_scenario.export.osi.environment import set_environment
@@ -21,16 +23,25 @@ _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
 class GroundTruthBuilder:
     """Builder of the messages of one run. The first message contains the lanes and boundaries of the map.
 
-    host  name of the host vehicle, or None
+    host   name of the host vehicle, or None
+    towed  vehicle categories of trailers and semitrailers, by name
     """
 
-    def __init__(self, osi: Osi, roads: RoadNetwork | None, ids: Identifiers, host: str | None) -> None:
+    def __init__(
+        self,
+        osi: Osi,
+        roads: RoadNetwork | None,
+        ids: Identifiers,
+        host: str | None,
+        towed: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self._osi = osi
         self._roads = roads
         self._ids = ids
         self._lanes = LaneMap(osi, roads, ids)
         self._lights = TrafficLights(osi, roads, ids)
         self._host = host
+        self._towed = towed
         self._has_map = False
 
     def build(self, frame: Frame) -> Any:
@@ -44,7 +55,8 @@ class GroundTruthBuilder:
         if not self._has_map:
             self._lanes.add(message)
             self._has_map = True
-        add_moving_objects(self._osi, message, frame, self._ids, self._lanes.assigned(frame.view))
+        lanes = self._lanes.assigned(frame.view)
+        add_moving_objects(self._osi, message, frame, self._ids, lanes, self._towed)
         self._lights.add(message, frame.signals)
         if frame.environment is not None:
             set_environment(self._osi, message.environmental_conditions, frame.environment, frame.view.time)
@@ -64,15 +76,17 @@ def host_vehicle(run: RecordedRun) -> str | None:
     """Return the host vehicle of a run, which may enter the world later.
 
     It is the first station that drives, else an actor named as an ego, else the first vehicle. The frames are read
-    until a station drives.
+    until a station drives. A trailer is no host.
     """
     ego = vehicle = None
+    towed = run.towed
     for frame in run.frames():
         view = frame.view
         driven = next((name for name, step in frame.steps.items() if step.control is not None and name in view), None)
         if driven is not None:
             return driven
         ego = ego or next((name for name in view.names if name.lower() in _EGOS), None)
-        vehicles = (name for name, category in zip(view.names, view.categories, strict=True) if category in VEHICLES)
+        bodies = zip(view.names, view.categories, strict=True)
+        vehicles = (name for name, category in bodies if category in VEHICLES and name not in towed)
         vehicle = vehicle or next(vehicles, None)
     return ego or vehicle

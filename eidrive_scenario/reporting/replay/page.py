@@ -26,7 +26,7 @@ from eidrive_scenario.reporting.replay.page_values import TEMPLATE, decisive_ins
 from eidrive_scenario.reporting.run_report.reported_run import parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
-from eidrive_scenario.simulation.recorded_outcome import CONTEXT, recorded_outcome
+from eidrive_scenario.simulation.recorded_outcome import CONTEXT, TRAILERS, recorded_outcome
 from eidrive_scenario.v2x.messages.message import LinkEvent
 
 
@@ -147,6 +147,6 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
     """Return the facts about the run that the page lists."""
     if settings:
         return run_facts(settings)
-    hidden = ("format", "parameters", "settings", "command", CONTEXT)
+    hidden = ("format", "parameters", "settings", "command", CONTEXT, TRAILERS)
     facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})

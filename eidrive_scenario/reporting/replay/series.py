@@ -56,9 +56,10 @@ class SeriesBuilder:
             ages = {sender: _rounded(now - generated, 3) for sender, generated in newest.items()}
             self._pending[name] = {"age": ages}
             if name in driven:
-                gap, other = nearest_body(view, name)
+                attached = frame.attached(name)
+                gap, other = nearest_body(view, name, attached)
                 self._note_gap(gap, now, f"{name} and {other}")
-                ttc = min_time_to_collision(view, name, TTC_LIMIT) if is_finite else math.inf
+                ttc = min_time_to_collision(view, name, TTC_LIMIT, attached) if is_finite else math.inf
                 self._pending[name] |= {
                     "speed": _rounded(float(view.speed[view.row(name)]), 2),
                     "gap": _rounded(gap, 2) if gap <= FAR else None,
@@ -110,12 +111,12 @@ class SeriesBuilder:
             if not self._driven or contact.first in driven or contact.second in driven:
                 self._contact = frame.view.time, f"contact of {contact.first} and {contact.second}"
                 return
-        if not self._driven and (pair := nearest_pair(frame.view, self._least[0])) is not None:
+        if not self._driven and (pair := nearest_pair(frame.view, self._least[0], frame.trailers)) is not None:
             gap, name, other = pair
             self._note_gap(gap, frame.view.time, f"{name} and {other}")
 
     def _note_gap(self, gap: float, time: float, pair: str) -> None:
-        # Bodies that touch without a contact are a vehicle and its trailer.
+        # In recordings of former versions a vehicle and its trailer touch without a contact.
         if 0.0 < gap < self._least[0]:
             self._least = gap, time, pair
 

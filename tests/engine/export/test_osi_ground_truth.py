@@ -274,3 +274,21 @@ def test_single_channel_trace_contains_the_same_messages(scenario_3: tuple[Path,
     assert [one.SerializeToString() for one in messages(tmp_path / "trace.osi")] == [
         one.SerializeToString() for one in messages(scenario_3[1])
     ]
+
+
+def test_trailers_have_their_types_and_identifiers(tmp_path: Path) -> None:
+    """Per OSI, trailer_id is that of the towed object. A trailer is no host, even as the first vehicle."""
+    bodies: dict[str, Body] = {name: {"category": "truck"} for name in ("Trailer", "Truck", "Dolly")}
+    frames = [Frame(view(bodies), trailers={"Truck": "Dolly", "Dolly": "Trailer"}), Frame(view(bodies, 1))]
+    metadata = {"trailers": '{"Dolly": "trailer", "Trailer": "semitrailer"}'}
+    run = write_run(tmp_path, frames, metadata=metadata)
+    assert [dict(frame.trailers) for frame in run.frames()] == [dict(frame.trailers) for frame in frames]
+    write_osi(run, tmp_path / "trace.mcap")
+    coupled, apart = messages(tmp_path / "trace.mcap")
+    trailer, truck, dolly = (found.id.value for found in coupled.moving_object)
+    kinds = type(coupled.moving_object[0].vehicle_classification)
+    assert coupled.host_vehicle_id.value == truck
+    data = [found.vehicle_classification for found in coupled.moving_object]
+    assert [one.type for one in data] == [kinds.TYPE_SEMITRAILER, kinds.TYPE_HEAVY_TRUCK, kinds.TYPE_TRAILER]
+    assert [(one.has_trailer, one.trailer_id.value) for one in data] == [(False, 0), (True, dolly), (True, trailer)]
+    assert not any(found.vehicle_classification.has_trailer for found in apart.moving_object)
