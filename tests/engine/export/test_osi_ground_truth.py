@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 from osi3trace.osi_trace import OSITrace
 from scipy.spatial.transform import Rotation
 from written_recording import Body, detected, step, view, write_run
@@ -20,7 +19,6 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.world.appearance import Appearance, LightState
-from eidrive_scenario.world.environment import Environment
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
 MILLIMETER = 1e-3
@@ -246,27 +244,6 @@ def test_actor_is_assigned_to_its_lane(tmp_path: Path) -> None:
     found = next(one for one in truth.lane if one.id.value == assigned.value)
     assert found.source_reference[0].identifier[:2] == ["road_id:1", f"lane_id:{lane.id}"]
     assert not off_road.assigned_lane_id
-
-
-def test_environment_is_in_classes_of_standard(tmp_path: Path) -> None:
-    """By the definitions in osi_environment.proto: 2 mm/h moderate, 150 m thick fog, 15000 lx level 9."""
-    environment = Environment(
-        date_time="2026-06-01T10:30:15",
-        precipitation="rain",
-        precipitation_intensity=2.0,
-        fog_range=150.0,
-        illuminance=15_000.0,
-        temperature=280.0,
-        pressure=100_000.0,
-    )
-    (truth,) = exported(tmp_path, replace(Frame(view({"A": {}})), environment=environment))
-    found = truth.environmental_conditions
-    kinds = type(found)
-    assert kinds.Precipitation.Name(found.precipitation) == "PRECIPITATION_MODERATE"
-    assert kinds.Fog.Name(found.fog) == "FOG_THICK"
-    assert kinds.AmbientIllumination.Name(found.ambient_illumination) == "AMBIENT_ILLUMINATION_LEVEL9"
-    assert (found.temperature, found.atmospheric_pressure) == (280.0, 100_000.0)
-    assert found.time_of_day.seconds_since_midnight == 10 * 3600 + 30 * 60 + 15
 
 
 def test_single_channel_trace_contains_the_same_messages(scenario_3: tuple[Path, Path], tmp_path: Path) -> None:
