@@ -168,7 +168,10 @@ def test_switched_lights_are_states(tmp_path: Path) -> None:
 
 
 def test_traffic_lights_have_one_entity_per_lamp(scenario_3: tuple[Path, Path]) -> None:
-    """Modes follow from the recorded states, which are lists of lamps from top to bottom or names of colors."""
+    """Modes follow from the recorded states, which are lists of lamps from top to bottom or names of colors.
+
+    osi_trafficlight.proto excludes MODE_UNKNOWN from ground truth; lights without a state are dark.
+    """
     frames = list(read_recording(scenario_3[0]).frames())
     truths = messages(scenario_3[1])
     shown = set()
@@ -183,8 +186,10 @@ def test_traffic_lights_have_one_entity_per_lamp(scenario_3: tuple[Path, Path]) 
             assert len(lamps) == 3
             kinds = type(lamps[0].classification)
             lit = [lamp for lamp in lamps if kinds.Mode.Name(lamp.classification.mode) == "MODE_CONSTANT"]
+            modes_found = {kinds.Mode.Name(lamp.classification.mode) for lamp in lamps}
             state = frame.signals.get(signal)
             assert (state is None) == (not lit)
+            assert modes_found == ({"MODE_OFF"} if state is None else {"MODE_OFF", "MODE_CONSTANT"})
             if state is not None:
                 colors = {kinds.Color.Name(lamp.classification.color).removeprefix("COLOR_").lower() for lamp in lit}
                 modes = dict(zip(("red", "yellow", "green"), state.split(";"), strict=True))
