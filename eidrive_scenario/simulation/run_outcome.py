@@ -36,6 +36,14 @@ class RunEnd(msgspec.Struct, frozen=True):
     wall_s: float
     final_links: Sequence[LinkEvent] = ()
 
+    @classmethod
+    def of(cls, state: RunState, frame: Frame, reason: str, wall_s: float) -> RunEnd:
+        """Return the end of a run after its last frame, and pass the outcomes of the last tick to the criteria."""
+        links = state.stack.final_links()
+        for criterion in state.criteria:
+            criterion.observe_final_links(links)
+        return cls(frame, reason, wall_s, links)
+
 
 def build_result(
     state: RunState,
@@ -51,7 +59,6 @@ def build_result(
     frame, scenario, stack = end.frame, state.scenario, state.stack
     links = dict(stack.link_statistics(frame.view.time))
     for criterion in state.criteria:
-        criterion.observe_final_links(end.final_links)
         criterion.observe_links(links)
     verdicts = final_verdicts(state.criteria, state.exit)
     exit_code = exit_code_of(verdicts, end.reason)

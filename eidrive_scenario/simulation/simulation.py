@@ -253,7 +253,7 @@ class Simulation:
             execute(commands, self._state)
             self.world.step(commands.placements, self.stack.controls(steps, commands.overrides))
         else:
-            self._ended = RunEnd(frame, end, time.perf_counter() - self._started, self.stack.final_links())
+            self._ended = RunEnd.of(self._state, frame, end, time.perf_counter() - self._started)
         return frame, end
 
     def _observe(self, frame: Frame, driven: Collection[str]) -> None:

@@ -13,7 +13,7 @@ from eidrive_scenario.export.recorded_run import open_run
 from eidrive_scenario.export.table_files import write_csv
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.reporting.replay.frame_data import replay_data
-from eidrive_scenario.simulation import RunSettings
+from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.simulation.recorded_outcome import recorded_outcome
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
@@ -46,3 +46,13 @@ def test_outcomes_of_all_ticks_are_those_that_the_statistics_count(tmp_path: Pat
     assert len(data["messages"]) == known
     lines = [line for line in log.read_text().splitlines() if "RSU to Ego" in line]
     assert len(lines) == (known if channel == "80211p_urban" else 0)
+
+
+def test_repeated_results_count_final_links_once() -> None:
+    settings = RunSettings(
+        channel="80211p_urban", criteria={"packet_reception_ratio": {"receiver": "Ego"}}, time_limit=0.5
+    )
+    with Simulation("coop/scenario_1", settings=settings) as simulation:
+        first = simulation.run()
+        assert first.final_links
+        assert simulation.result().criteria == first.criteria
