@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import TypeVar
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.recorded_outcome import RecordedOutcome, recorded_outcome, recorded_trailers
+from eidrive_scenario.world.weather import Weather
 
 Part = TypeVar("Part")
 
@@ -37,6 +39,15 @@ class RecordedRun:
     def towed(self) -> Mapping[str, str]:
         """Vehicle categories of the trailers and semitrailers of the scenario, by name."""
         return recorded_trailers(self.recording)
+
+    @property
+    def weather(self) -> Weather | None:
+        """Weather of an option that replaces that of the scenario; None without one, and if it cannot be read."""
+        try:
+            settings = load_json(self.recording.metadata["settings"].encode(), max_depth=30)
+            return Weather.model_validate(settings["weather_profile"])
+        except (LookupError, TypeError, ValueError):
+            return None
 
     def frames(self) -> Iterator[Frame]:
         """Yield the readable frames. Raise SettingError if there is none."""

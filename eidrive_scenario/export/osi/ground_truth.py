@@ -16,6 +16,7 @@ from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world.weather import Weather
 
 _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
 
@@ -25,6 +26,7 @@ class GroundTruthBuilder:
 
     host   name of the host vehicle, or None
     towed  vehicle categories of trailers and semitrailers, by name
+    weather  that an option of the run sets instead of the scenario
     """
 
     def __init__(
@@ -34,6 +36,7 @@ class GroundTruthBuilder:
         ids: Identifiers,
         host: str | None,
         towed: Mapping[str, str] = MappingProxyType({}),
+        weather: Weather | None = None,
     ) -> None:
         self._osi = osi
         self._roads = roads
@@ -42,6 +45,7 @@ class GroundTruthBuilder:
         self._lights = TrafficLights(osi, roads, ids)
         self._host = host
         self._towed = towed
+        self._weather = weather
         self._has_map = False
 
     def build(self, frame: Frame) -> Any:
@@ -58,8 +62,9 @@ class GroundTruthBuilder:
         lanes = self._lanes.assigned(frame.view)
         add_moving_objects(self._osi, message, frame, self._ids, lanes, self._towed)
         self._lights.add(message, frame.signals)
-        if frame.environment is not None:
-            set_environment(self._osi, message.environmental_conditions, frame.environment, frame.view.time)
+        if frame.environment is not None or self._weather is not None:
+            conditions = message.environmental_conditions
+            set_environment(self._osi, conditions, frame.environment, frame.view.time, self._weather)
         return message
 
     def _set_projection(self, message: Any) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
-from written_recording import view
+from written_recording import view, write_run
 
 from eidrive_scenario.export.osi.ground_truth import GroundTruthBuilder
 from eidrive_scenario.export.osi.identifiers import Identifiers
@@ -64,3 +66,20 @@ def test_precipitation_without_unit_is_a_share_of_heavy_rain() -> None:
     environment = Environment(precipitation="rain", precipitation_share=0.5)
     found = conditions(environment)
     assert type(found).Precipitation.Name(found.precipitation) == "PRECIPITATION_HEAVY"
+
+
+def test_weather_option_replaces_that_of_the_scenario(tmp_path: Path) -> None:
+    """A night with 5 lx of street lamps (level 4), rain of 10 mm/h (heavy), 100 m visual range (thick fog)."""
+    profile = {"sun_elevation": -40, "street_lighting": 5, "precipitation": "rain", "precipitation_intensity": 10}
+    metadata = {"settings": json.dumps({"weather_profile": profile | {"visual_range": 100}})}
+    day = Environment(date_time="2026-06-21T12:00:00", fog_range=20_000.0, precipitation="dry", temperature=280.0)
+    run = write_run(tmp_path, [Frame(view({"A": {}}), environment=day), Frame(view({"A": {}}, 1))], metadata=metadata)
+    builder = GroundTruthBuilder(Osi(), None, Identifiers(), None, weather=run.weather)
+    for frame in run.frames():
+        found = builder.build(frame).environmental_conditions
+        kinds = type(found)
+        assert kinds.AmbientIllumination.Name(found.ambient_illumination) == "AMBIENT_ILLUMINATION_LEVEL4"
+        assert kinds.Precipitation.Name(found.precipitation) == "PRECIPITATION_HEAVY"
+        assert kinds.Fog.Name(found.fog) == "FOG_THICK"
+        assert found.HasField("temperature") == (frame.environment is not None)
+    assert write_run(tmp_path, [Frame(view({"A": {}}))]).weather is None
