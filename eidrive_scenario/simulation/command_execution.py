@@ -24,9 +24,13 @@ from eidrive_scenario.simulation.commands import CHANNEL, PREFIX, DeclaredCriter
 from eidrive_scenario.simulation.run_setup import RunSetup
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.world import World
+from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.environment_weather import weather_from_environment
 from eidrive_scenario.world.specs import actor_spec
 from eidrive_scenario.world.view import WorldView
+
+SUN_PERIOD = 60.0
+"""Time between two positions of the sun under a running clock [s], in which it moves by half its diameter."""
 
 
 class RunState(msgspec.Struct):
@@ -40,6 +44,7 @@ class RunState(msgspec.Struct):
     exit           verdict of the command that ends the run; None before it
     executed       custom commands since the last frame
     trailers       trailer of each towing vehicle since the last step of the world, by name
+    environment    of the last EnvironmentAction; weather_since  time at which the weather was set [s]
     """
 
     scenario: Scenario
@@ -54,6 +59,8 @@ class RunState(msgspec.Struct):
     exit: Verdict | None = None
     executed: list[ExecutedCommand] = msgspec.field(default_factory=list)
     trailers: Mapping[str, str] = msgspec.field(default_factory=dict)
+    environment: Environment | None = None
+    weather_since: float = 0.0
 
     @classmethod
     def of(cls, setup: RunSetup) -> RunState:
@@ -131,9 +138,15 @@ def set_display_state(commands: Commands, run: RunState) -> None:
 
 
 def set_weather(commands: Commands, run: RunState) -> None:
-    """Set the weather of an EnvironmentAction, unless an option overrides it."""
-    if commands.environment is not None and not run.weather_fixed:
-        run.world.set_weather(weather_from_environment(commands.environment, run.world.time))
+    """Set the weather of an EnvironmentAction, unless an option overrides it. The sun follows a running clock."""
+    if run.weather_fixed:
+        return
+    if commands.environment is not None:
+        run.environment = commands.environment
+    elif run.environment is None or not run.environment.moves_sun or run.world.time < run.weather_since + SUN_PERIOD:
+        return
+    run.weather_since = run.world.time
+    run.world.set_weather(weather_from_environment(run.environment, run.world.time))
 
 
 def execute_custom(commands: Commands, run: RunState) -> None:
