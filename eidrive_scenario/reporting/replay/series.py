@@ -25,7 +25,7 @@ class SeriesBuilder:
     columns   by station and frame: speed [m/s], gap to the nearest body [m], smallest time to collision [s], and the
               age of information by sender [s]: the time since the newest received message was generated. None:
               absent, farther than FAR, above TTC_LIMIT, nothing received yet
-    contact   the first contact of a driven vehicle: time [s] and description; None without a contact
+    contact   the first contact of a driven vehicle or of its trailers: time [s] and description; None without a contact
     decisive  that contact, else the smallest gap of a driven vehicle. Without driven vehicles all actors are
               considered; None if no two actors were present at the same time
     """
@@ -108,7 +108,8 @@ class SeriesBuilder:
     def _note_contact(self, frame: Frame, driven: list[str]) -> None:
         self._driven |= bool(driven)
         for contact in frame.view.contacts if self._contact is None else ():
-            if not self._driven or contact.first in driven or contact.second in driven:
+            trains = {*driven}.union(*map(frame.attached, driven))
+            if not self._driven or contact.first in trains or contact.second in trains:
                 self._contact = frame.view.time, f"contact of {contact.first} and {contact.second}"
                 return
         if not self._driven and (pair := nearest_pair(frame.view, self._least[0], frame.trailers)) is not None:

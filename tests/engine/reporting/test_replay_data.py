@@ -262,3 +262,13 @@ def test_gap_of_road_train_excludes_its_own_bodies(street: Play) -> None:
     pair = nearest_pair(view, math.inf, {"Ego": other})
     assert pair is not None
     assert {pair[1], pair[2]} != {"Ego", other}
+
+
+def test_contact_of_own_trailer_is_decisive(street: Play) -> None:
+    frames = street(1)
+    touch = Contact("Truck", "RSU", (0.0, 0.0, 0.0), 5.0)
+    hit = replace(frames[50], view=replace(frames[50].view, contacts=(touch,)))
+    assert observe([*frames[:50], hit]).contact is None
+    contact = observe([*frames[:50], replace(hit, trailers={"Ego": "Truck"})]).contact
+    assert contact is not None
+    assert contact["text"] == "contact of Truck and RSU"
