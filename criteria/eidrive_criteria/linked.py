@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Self
 
 from pydantic import model_validator
@@ -55,15 +56,21 @@ class LinkCriterion(Criterion):
         if self.missing:
             self.missing.difference_update(frame.view.names)
         self.time = frame.view.time
-        for event in frame.links:
-            if self.concerns(event.sender, event.receiver):
-                self.add_outcome(event)
+        self._add_outcomes(frame.links)
         for receiver, step in frame.steps.items():
             if self.receiver not in (None, receiver):
                 continue
             for received in step.inbox:
                 if self.concerns(received.message.sender, receiver):
                     self.add_reception((received.message.sender, receiver), received)
+
+    def observe_final_links(self, events: Sequence[LinkEvent]) -> None:
+        self._add_outcomes(events)
+
+    def _add_outcomes(self, events: Sequence[LinkEvent]) -> None:
+        for event in events:
+            if self.concerns(event.sender, event.receiver):
+                self.add_outcome(event)
 
     def add_outcome(self, event: LinkEvent) -> None:
         """Process the outcome of a message, which is known before its arrival."""

@@ -45,7 +45,7 @@ class RecalledSettings(MatchedSettings, BoundedSettings):
 
 
 class RecalledCriterion(PerceivedCriterion):
-    """Criterion on the true objects around a station. Each object counts once in each frame."""
+    """Criterion on the true objects around a station, without its trailers. Each counts once in each frame."""
 
     def __init__(self, settings: RecalledSettings) -> None:
         super().__init__(settings)
@@ -84,13 +84,14 @@ class RecalledCriterion(PerceivedCriterion):
 
     def _groups(self, frame: Frame) -> dict[Group, set[str]]:
         """Return the names of the true objects in range, by group."""
-        view, reach = frame.view, self._recalled.range
+        view, reach, attached = frame.view, self._recalled.range, frame.attached(self.of)
         own = view.rows[self.of]
         x, y, *_ = view.plain_boxes[own]
         near = {
             row
             for row, box in enumerate(view.plain_boxes)
             if row != own
+            and view.names[row] not in attached
             and view.categories[row] in self._classes
             and (box[0] - x) ** 2 + (box[1] - y) ** 2 <= reach * reach
         }

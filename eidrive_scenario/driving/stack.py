@@ -126,6 +126,10 @@ class DrivingStack(ABC):
         """
         return ()
 
+    def final_links(self) -> Sequence[LinkEvent]:
+        """Return the events of messages whose outcome became known in the last tick of a run, after the last `send`."""
+        return ()
+
     def request_channel(
         self, profile: str, *, source: str, line: int, scope: Scope | None = None
     ) -> Iterable[Diagnostic]:

@@ -255,9 +255,16 @@ class Stations(DrivingStack):
                 ]
                 outbox += [(message, receivers) for message in step.outbox]
         events = self._channel.transmit(outbox, now)
+        self._statistics = None
+        return self._checked_events(events)
+
+    def final_links(self) -> Sequence[LinkEvent]:
+        channel = self._channel or self._retired_channel
+        return () if channel is None else self._checked_events(channel.drain_events())
+
+    def _checked_events(self, events: Sequence[LinkEvent]) -> Sequence[LinkEvent]:
         if self._checked_channel is not None:
             check_events(self._checked_channel, events)
-        self._statistics = None
         return events if isinstance(events, LinkEvents) else tuple(events)
 
     def metrics(self, now: float) -> dict[str, float]:

@@ -15,6 +15,7 @@ from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, quo
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 
@@ -86,6 +87,12 @@ class Criterion(ABC):
     @abstractmethod
     def observe(self, frame: Frame) -> None:
         """Process one frame."""
+
+    def observe_final_links(self, events: Sequence[LinkEvent]) -> None:  # noqa: B027 - optional
+        """Process the message outcomes that became known in the last tick, once after the last frame of a run.
+
+        Those before are in `Frame.links`.
+        """
 
     def observe_links(self, links: Mapping[tuple[str, str], LinkStatistics]) -> None:  # noqa: B027 - optional
         """Process the statistics of all links by (sender, receiver), once after the last frame of a run.
@@ -192,17 +199,21 @@ def evaluate_criteria(
     criteria: Sequence[Criterion],
     roads: RoadNetwork | None = None,
     links: Mapping[tuple[str, str], LinkStatistics] | None = None,
+    final_links: Sequence[LinkEvent] = (),
 ) -> tuple[Verdict, ...]:
     """Return the verdicts of `criteria` over `frames`, for example of a recording.
 
     roads  of the scenario. Raise SettingError if they are missing and a criterion requires them.
     links  statistics of the links of the run, as `RunResult.links`
+    final_links  message outcomes that became known in the last tick, as `RunResult.final_links`
     """
     for criterion in criteria:
         bind_roads(criterion, roads)
     for frame in frames:
         for criterion in criteria:
             criterion.observe(frame)
+    for criterion in criteria:
+        criterion.observe_final_links(final_links)
     for criterion in criteria if links is not None else ():
         criterion.observe_links(links or {})
     return tuple(checked_verdict(criterion) for criterion in criteria)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,8 +17,10 @@ STANDING = 0.1
 """Maximum speed of a standing actor [m/s]."""
 
 
-def nearest_body(view: WorldView, name: str) -> tuple[float, str]:
+def nearest_body(view: WorldView, name: str, attached: Collection[str] = ()) -> tuple[float, str]:
     """Return the distance between the boxes of an actor and of the nearest other one [m], and its name.
+
+    attached  actors that are ignored: the other bodies of the road train
 
     Infinite and an empty name if the actor is alone. Boxes that are not finite are ignored.
     """
@@ -29,11 +32,13 @@ def nearest_body(view: WorldView, name: str) -> tuple[float, str]:
     centers = np.hypot(boxes[:, 0] - boxes[own, 0], boxes[:, 1] - boxes[own, 1])
     least = centers - np.hypot(boxes[:, 3], boxes[:, 4]) / 2.0
     least[~finite] = least[own] = math.inf
+    for other in attached:
+        least[view.row(other)] = math.inf
     box, best, nearest = boxes[own], math.inf, ""
     # The circles around boxes give a lower bound of their distance.
     reach = _radius(box)
     for row in np.argsort(least, kind="stable").tolist():
-        if least[row] - reach >= best:
+        if least[row] - reach >= best or least[row] == math.inf:
             break
         gap = box_distance(box, boxes[row])
         if gap < best:
@@ -41,11 +46,14 @@ def nearest_body(view: WorldView, name: str) -> tuple[float, str]:
     return best, nearest
 
 
-def nearest_pair(view: WorldView, below: float) -> tuple[float, str, str] | None:
+def nearest_pair(
+    view: WorldView, below: float, trailers: Mapping[str, str] = MappingProxyType({})
+) -> tuple[float, str, str] | None:
     """Return the smallest distance between the boxes of a moving actor and another one [m], and their names.
 
-    None if no two boxes are nearer than `below` [m]. Boxes that touch, such as those of a vehicle and its trailer, and
-    boxes that are not finite are ignored.
+    trailers  trailer of each towing vehicle, by name; these pairs are ignored
+
+    None if no two boxes are nearer than `below` [m]. Boxes that touch, and boxes that are not finite are ignored.
     """
     boxes = view.boxes
     finite: Bools = np.logical_and.reduce(np.isfinite(boxes), axis=1)
@@ -60,9 +68,12 @@ def nearest_pair(view: WorldView, below: float) -> tuple[float, str, str] | None
     for index in near[np.argsort(least[near], kind="stable")].tolist():
         if least[index] >= below:
             break
+        one, other = view.names[first[index]], view.names[second[index]]
+        if trailers.get(one) == other or trailers.get(other) == one:
+            continue
         gap = box_distance(boxes[first[index]], boxes[second[index]])
         if 0.0 < gap < below:
-            below, found = gap, (gap, view.names[first[index]], view.names[second[index]])
+            below, found = gap, (gap, one, other)
     return found
 
 

@@ -164,6 +164,7 @@ class _Judge:
         outcome = self._outcome
         links = {} if outcome is None else {(link.sender, link.receiver): link.statistics for link in outcome.links}
         for criterion in self._criteria:
+            criterion.observe_final_links(() if outcome is None else outcome.final_links)
             criterion.observe_links(links)
         verdicts = [plain_verdict(checked_verdict(criterion)) for criterion in self._criteria]
         verdicts += [] if self._exit is None else [self._exit]

@@ -145,7 +145,12 @@ def _record(
 ) -> None:
     """Add a recorder and a writer of camera images to the observers."""
     from eidrive_scenario.recording import CameraImageWriter
-    from eidrive_scenario.simulation.recorded_outcome import CONTEXT, RunRecorder, criteria_context_text
+    from eidrive_scenario.simulation.recorded_outcome import (
+        CONTEXT,
+        RunRecorder,
+        criteria_context_text,
+        trailer_metadata,
+    )
 
     images = CameraImageWriter(folder.images)
     images.watch(simulation.stack)
@@ -157,6 +162,7 @@ def _record(
         "settings": resolved.canonical,
         "command": command,
         CONTEXT: criteria_context_text(scenario),
+        **trailer_metadata(scenario),
     }
     text = scenario.text if scenario.text is not None else _text(source)
     attachments = _attachments(text, scenario)

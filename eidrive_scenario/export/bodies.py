@@ -20,6 +20,12 @@ def rotations(yaw: Array, pitch: Array, roll: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
+def angles(turn: Array) -> tuple[float, float, float]:
+    """Return yaw, pitch and roll of a rotation matrix (3, 3), the inverse of `rotations` [rad]."""
+    (xx, _, _), (yx, _, _), (zx, zy, zz) = turn.tolist()
+    return math.atan2(yx, xx), math.asin(min(max(-zx, -1.0), 1.0)), math.atan2(zy, zz)
+
+
 def quaternion(yaw: float, pitch: float = 0.0, roll: float = 0.0) -> tuple[float, float, float, float]:
     """Return x, y, z, w of a z-y'-x'' rotation [rad]."""
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation.recorded_outcome import RecordedOutcome, recorded_outcome, recorded_trailers
+from eidrive_scenario.world.weather import Weather
 
 Part = TypeVar("Part")
 
@@ -32,6 +35,20 @@ class RecordedRun:
         """Scenario and seed in one line."""
         return f"{self.recording.scenario or self.recording.path.stem}, seed {self.recording.seed}"
 
+    @property
+    def towed(self) -> Mapping[str, str]:
+        """Vehicle categories of the trailers and semitrailers of the scenario, by name."""
+        return recorded_trailers(self.recording)
+
+    @property
+    def weather(self) -> Weather | None:
+        """Weather of an option that replaces that of the scenario; None without one, and if it cannot be read."""
+        try:
+            settings = load_json(self.recording.metadata["settings"].encode(), max_depth=30)
+            return Weather.model_validate(settings["weather_profile"])
+        except (LookupError, TypeError, ValueError):
+            return None
+
     def frames(self) -> Iterator[Frame]:
         """Yield the readable frames. Raise SettingError if there is none."""
         count = 0
@@ -41,6 +58,16 @@ class RecordedRun:
         if not count:
             hint = "; ".join(self.warnings) or "record the run again"
             raise SettingError(Diagnostic("the recording contains no readable frame", hint, str(self.recording.path)))
+
+    def outcome(self) -> RecordedOutcome | None:
+        """Return the outcome of the run, None if it did not end. One that cannot be read is damage, or InputError."""
+        try:
+            return recorded_outcome(self.recording)
+        except InputError as error:
+            if not self.recording.damage:
+                raise
+            self._skip(f"the outcome of the run is omitted: {error.diagnostics[0]}")
+            return None
 
     def converted(self, frame: Frame, convert: Callable[[Frame], Iterable[Part]]) -> list[Part]:
         """Return the parts of a file for a frame.

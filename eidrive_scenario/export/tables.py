@@ -8,7 +8,7 @@ from typing import Any
 
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.simulation.recorded_outcome import recorded_outcome
+from eidrive_scenario.v2x.messages.message import LinkEvent
 
 Row = tuple[Any, ...]
 Columns = Mapping[str, type]
@@ -61,8 +61,15 @@ def _plans(frame: Frame) -> Iterator[Row]:
             yield (frame.view.time, station, plan.reason, speed, plan.acceleration, plan.braking, *held)
 
 
-def _messages(frame: Frame) -> Iterator[Row]:
-    for event in frame.links:
+def _messages(run: RecordedRun) -> Iterator[Row]:
+    for frame in run.frames():
+        yield from run.converted(frame, lambda one: _outcomes(one.links))
+    outcome = run.outcome()
+    yield from () if outcome is None else _outcomes(outcome.final_links)
+
+
+def _outcomes(events: Iterable[LinkEvent]) -> Iterator[Row]:
+    for event in events:
         radio = (event.path_loss_db, event.snr_db, event.los, ", ".join(event.blockers))
         outcome = (event.outcome, event.arrives, event.reason, event.size)
         yield (event.sent, event.sender, event.receiver, event.number, *outcome, *radio)
@@ -75,7 +82,7 @@ def _transitions(frame: Frame) -> Iterator[Row]:
 
 
 def _verdicts(run: RecordedRun) -> Iterator[Row]:
-    outcome = recorded_outcome(run.recording)
+    outcome = run.outcome()
     if outcome is None:
         run.warnings.append("the recording contains no verdicts: the run did not end, or an older version recorded it")
         return
@@ -127,7 +134,7 @@ TABLES: Mapping[str, Table] = {
             **_floats("path_loss_db", "snr_db"),
             **dict.fromkeys(("los", "blockers"), str),
         },
-        _of_frames(_messages),
+        _messages,
     ),
     "transitions": Table(
         {**_TIME, **dict.fromkeys(("kind", "path", "transition", "state", "reason"), str)}, _of_frames(_transitions)

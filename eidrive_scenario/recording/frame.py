@@ -39,6 +39,7 @@ class Frame(msgspec.Struct, frozen=True):
     routes       points (M, 3) of the routes that the scenario requested in this tick, by actor [m]
     commands     custom commands that were executed after the former frame; in the first frame those of Init, the
                  criteria of the StopTrigger, and the criteria that options of the run add
+    trailers     trailer of each towing vehicle, by name; both are present
     """
 
     view: WorldView
@@ -51,3 +52,14 @@ class Frame(msgspec.Struct, frozen=True):
     monitors: Mapping[str, bool] = msgspec.field(default_factory=dict)
     routes: Mapping[str, Array] = msgspec.field(default_factory=dict)
     commands: tuple[ExecutedCommand, ...] = ()
+    trailers: Mapping[str, str] = msgspec.field(default_factory=dict)
+
+    def attached(self, name: str) -> frozenset[str]:
+        """Return the other bodies of the road train of an actor: its trailers, and the vehicles that tow it."""
+        if not self.trailers:
+            return frozenset()
+        found, added = {name}, {name}
+        while added:
+            added = {other for pair in self.trailers.items() if added & {*pair} for other in pair} - found
+            found |= added
+        return frozenset(found - {name})

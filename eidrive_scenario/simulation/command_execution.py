@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import msgspec
 
@@ -24,8 +24,13 @@ from eidrive_scenario.simulation.commands import CHANNEL, PREFIX, DeclaredCriter
 from eidrive_scenario.simulation.run_setup import RunSetup
 from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.world import World
+from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.environment_weather import weather_from_environment
 from eidrive_scenario.world.specs import actor_spec
+from eidrive_scenario.world.view import WorldView
+
+SUN_PERIOD = 60.0
+"""Time between two positions of the sun under a running clock [s], in which it moves by half its diameter."""
 
 
 class RunState(msgspec.Struct):
@@ -38,6 +43,8 @@ class RunState(msgspec.Struct):
     warnings       of the run; commands without effect add to them
     exit           verdict of the command that ends the run; None before it
     executed       custom commands since the last frame
+    trailers       trailer of each towing vehicle since the last step of the world, by name
+    environment    of the last EnvironmentAction; weather_since  time at which the weather was set [s]
     """
 
     scenario: Scenario
@@ -51,6 +58,9 @@ class RunState(msgspec.Struct):
     inputs: StackInputs = msgspec.field(default_factory=StackInputs)
     exit: Verdict | None = None
     executed: list[ExecutedCommand] = msgspec.field(default_factory=list)
+    trailers: Mapping[str, str] = msgspec.field(default_factory=dict)
+    environment: Environment | None = None
+    weather_since: float = 0.0
 
     @classmethod
     def of(cls, setup: RunSetup) -> RunState:
@@ -73,6 +83,12 @@ class RunState(msgspec.Struct):
         executed, self.executed = tuple(self.executed), []
         return executed
 
+    def trailers_in(self, view: WorldView) -> Mapping[str, str]:
+        """Return the trailer of each towing vehicle of which both are present."""
+        if not self.trailers:
+            return {}
+        return {front: back for front, back in self.trailers.items() if front in view and back in view}
+
     def record(self, kind: str, content: str) -> None:
         """Add an executed command."""
         self.executed.append(ExecutedCommand(kind, content, self.world.time))
@@ -93,7 +109,8 @@ def remove_actors(commands: Commands, run: RunState) -> None:
 
 def set_trailers(commands: Commands, run: RunState) -> None:
     """Set which actors are connected, before a trailer enters the world."""
-    run.world.set_trailers(commands.trailers)
+    run.trailers = commands.trailers
+    run.world.set_trailers([frozenset(pair) for pair in commands.trailers.items()])
 
 
 def spawn_actors(commands: Commands, run: RunState) -> None:
@@ -121,9 +138,15 @@ def set_display_state(commands: Commands, run: RunState) -> None:
 
 
 def set_weather(commands: Commands, run: RunState) -> None:
-    """Set the weather of an EnvironmentAction, unless an option overrides it."""
-    if commands.environment is not None and not run.weather_fixed:
-        run.world.set_weather(weather_from_environment(commands.environment, run.world.time))
+    """Set the weather of an EnvironmentAction, unless an option overrides it. The sun follows a running clock."""
+    if run.weather_fixed:
+        return
+    if commands.environment is not None:
+        run.environment = commands.environment
+    elif run.environment is None or not run.environment.moves_sun or run.world.time < run.weather_since + SUN_PERIOD:
+        return
+    run.weather_since = run.world.time
+    run.world.set_weather(weather_from_environment(run.environment, run.world.time))
 
 
 def execute_custom(commands: Commands, run: RunState) -> None:

@@ -12,6 +12,8 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.model import Vehicle
+from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
@@ -20,12 +22,16 @@ from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.resolved_settings import canonical_json
 from eidrive_scenario.simulation.commands import CriteriaContext, criteria_context
 from eidrive_scenario.simulation.run import RunResult
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 OUTCOME = "outcome.json"
 """Name of the attachment with the outcome."""
 CONTEXT = "criteria_context"
 """Entry of the metadata with the names of the scenario to which criteria refer."""
+
+TRAILERS = "trailers"
+"""Entry of the metadata with the vehicle categories of trailers and semitrailers, by name."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,7 @@ class RecordedOutcome:
     warnings: tuple[str, ...]
     trace_hash: str
     simulated_s: float
+    final_links: tuple[LinkEvent, ...] = ()
 
 
 class RunRecorder(Recorder):
@@ -105,6 +112,7 @@ class RunRecorder(Recorder):
             result.warnings,
             result.trace_hash,
             result.simulated_s,
+            result.final_links,
         )
         text = json.dumps(codec(RecordedOutcome).encode(outcome), ensure_ascii=False, allow_nan=False)
         self.attach(OUTCOME, text.encode())
@@ -128,6 +136,26 @@ def plain_verdict(verdict: Verdict) -> Verdict:
 def criteria_context_text(scenario: Scenario) -> str:
     """Return the entry `CONTEXT` of the metadata of a run."""
     return canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))
+
+
+def trailer_metadata(scenario: Scenario) -> dict[str, str]:
+    """Return the entry `TRAILERS` of the metadata of a run; empty without trailers."""
+    towed = (VehicleCategory.TRAILER, VehicleCategory.SEMITRAILER)
+    found = {
+        name: entity.vehicle_category.value
+        for name, entity in scenario.entities.items()
+        if isinstance(entity, Vehicle) and entity.vehicle_category in towed
+    }
+    return {TRAILERS: canonical_json(found)} if found else {}
+
+
+def recorded_trailers(recording: Recording) -> Mapping[str, str]:
+    """Return the vehicle categories of trailers by name. Those of an older or damaged recording are unknown."""
+    try:
+        found: Mapping[str, str] = codec(Mapping[str, str]).decode(load_json(recording.metadata[TRAILERS].encode()))
+    except (AttributeError, LookupError, TypeError, ValueError):
+        return {}
+    return found
 
 
 def recorded_context(recording: Recording) -> CriteriaContext:

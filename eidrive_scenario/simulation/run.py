@@ -19,6 +19,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.simulation.added_settings import criteria_sources, drive_sources
 from eidrive_scenario.simulation.result_views import result_html, result_row
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 DEFAULT_SEED = 1
@@ -164,6 +165,8 @@ class RunResult:
     """Index among the runs of a parameter value distribution, from 0."""
     links: Mapping[tuple[str, str], LinkStatistics] = field(default_factory=dict)
     """Link statistics, by (sender, receiver)."""
+    final_links: tuple[LinkEvent, ...] = ()
+    """Message outcomes that became known in the last tick; those before are in `Frame.links`."""
     settings: ResolvedSettings = field(default_factory=ResolvedSettings)
     """All settings that determine the run."""
     final_state: tuple[str, ...] = ()

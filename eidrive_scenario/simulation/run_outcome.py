@@ -19,6 +19,7 @@ from eidrive_scenario.storyboard.state.external_inputs import user_value_warning
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.v2x.messages.message import LinkEvent
 
 TIME_LIMIT = "time limit"
 """Reason for the end of a run that reaches the limit of simulated time."""
@@ -28,11 +29,20 @@ FATAL_CRITERION = "criterion: "
 
 
 class RunEnd(msgspec.Struct, frozen=True):
-    """End of a run: the last frame, the reason, and the wall time until then [s]."""
+    """End of a run: the last frame, the reason, the wall time until then [s], and `RunResult.final_links`."""
 
     frame: Frame
     reason: str
     wall_s: float
+    final_links: Sequence[LinkEvent] = ()
+
+    @classmethod
+    def of(cls, state: RunState, frame: Frame, reason: str, wall_s: float) -> RunEnd:
+        """Return the end of a run after its last frame, and pass the outcomes of the last tick to the criteria."""
+        links = state.stack.final_links()
+        for criterion in state.criteria:
+            criterion.observe_final_links(links)
+        return cls(frame, reason, wall_s, links)
 
 
 def build_result(
@@ -72,6 +82,7 @@ def build_result(
         parameters=dict(scenario.parameters),
         run=settings.run,
         links=links,
+        final_links=tuple(end.final_links),
         settings=settings,
         final_state=final_state,
     )

@@ -244,6 +244,7 @@ class Simulation:
             commands.monitors,
             commands.routes,
             self._state.take_executed(),
+            self._state.trailers_in(view),
         )
         self._observe(frame, commands.driven)
         end = end_reason(self._state, self.storyboard, view.time, self.settings.time_limit)
@@ -252,7 +253,7 @@ class Simulation:
             execute(commands, self._state)
             self.world.step(commands.placements, self.stack.controls(steps, commands.overrides))
         else:
-            self._ended = RunEnd(frame, end, time.perf_counter() - self._started)
+            self._ended = RunEnd.of(self._state, frame, end, time.perf_counter() - self._started)
         return frame, end
 
     def _observe(self, frame: Frame, driven: Collection[str]) -> None:

@@ -156,7 +156,7 @@ class Storyboard:
         towed_pairs = list(pairs(self.context.actors))
         if not towed_pairs:
             return towed_pairs
-        self.context.commands.trailers = frozenset(frozenset((front.name, back.name)) for front, back in towed_pairs)
+        self.context.commands.trailers = {front.name: back.name for front, back in towed_pairs}
         for front, back in towed_pairs:
             if front.present and (not back.present or self.context.view.tick < 0):
                 back.motion.set_speed(front.motion.speed)

@@ -43,6 +43,13 @@ class Channel(ABC):
         """
         return [event for message, receivers in outbox for event in self.send(message, receivers, now)]
 
+    def drain_events(self) -> Sequence[LinkEvent]:
+        """Return events of all messages whose outcome has become known since the last call or transmission.
+
+        It is called after the last tick of a run, in which nothing is transmitted.
+        """
+        return ()
+
     @abstractmethod
     def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         """Return messages that have arrived at `receiver` by `now` [s], each once, in order of arrival."""

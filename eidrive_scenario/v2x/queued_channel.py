@@ -58,6 +58,5 @@ class QueuedChannel(Channel):
         """Determine all pending outcomes before another channel replaces this one."""
 
     def drain_events(self) -> Sequence[LinkEvent]:
-        """Return events of all messages whose outcome has become known since the last call."""
         events, self._remaining = self._remaining, []
         return events

@@ -41,9 +41,19 @@ class Environment:
     pressure: float | None = None
     dome_image: str | None = None
 
+    @property
+    def moves_sun(self) -> bool:
+        """Whether the time of day determines the position of the sun, and runs."""
+        return self.clock_runs and self.date_time is not None and self.sun_elevation is None
+
     def clock(self, time: float) -> datetime | None:
-        """Return the simulated date and time at a time of the run [s]."""
+        """Return the simulated date and time at a time of the run [s]; at most the end of the year 9999."""
         if self.date_time is None:
             return None
         start = datetime.fromisoformat(self.date_time)
-        return start + timedelta(seconds=time - self.clock_since) if self.clock_runs else start
+        if not self.clock_runs:
+            return start
+        try:
+            return start + timedelta(seconds=time - self.clock_since)
+        except OverflowError:
+            return datetime.max.replace(tzinfo=start.tzinfo)

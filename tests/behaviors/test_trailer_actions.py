@@ -173,3 +173,12 @@ def test_trailer_of_a_deleted_vehicle_stops_at_its_position(run: Run) -> None:
     trailer = played.x("Trailer")
     assert trailer[-1] == trailer[43] == pytest.approx(216.0, abs=0.6)
     assert played.of("Trailer", "speed")[-1] == 0.0
+
+
+@pytest.mark.element("ConnectTrailerAction", "DisconnectTrailerAction")
+def test_frames_contain_couplings_of_their_time(run: Run) -> None:
+    """The commands of a tick apply to the world of the next one."""
+    played = play(run, 2, ("Truck", COUPLE, after(0.5)), ("Truck", UNCOUPLE, after(1.0)))
+    times = [frame.view.time for frame in played.frames if frame.trailers]
+    assert [times[0], times[-1]] == pytest.approx([0.6, 1.05])
+    assert {tuple(frame.trailers.items()) for frame in played.frames} == {(), (("Truck", "Trailer"),)}

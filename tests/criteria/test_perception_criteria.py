@@ -11,6 +11,7 @@ from eidrive_criteria.detection_recall import DetectionRecall, DetectionRecallSe
 from eidrive_criteria.false_braking import FalseBraking, FalseBrakingSettings
 from eidrive_criteria.first_detection import FirstDetection, FirstDetectionSettings
 from eidrive_criteria.position_error import PositionError, PositionErrorSettings
+from msgspec.structs import replace
 from pydantic import ValidationError
 
 from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
@@ -204,3 +205,9 @@ def test_false_braking(brake: Any) -> None:
     assert braking(frames, at_most=2).passed
     assert braking(frames, harder_than=3.5).value == 1.0
     assert braking(brake((None, -3.0, (1,)))).value == 0.0
+
+
+def test_own_trailers_are_no_objects_of_recall(queue: Any) -> None:
+    """Without the truck, which the Ego tows, one of two other objects is known in the second frame."""
+    frames = [replace(one, trailers={"Ego": "Truck"}) for one in queue()]
+    assert recall(frames, objects="all").value == pytest.approx(1 / 4)

@@ -32,7 +32,7 @@ def test_run_with_truck_between_antennas_has_the_model_blockage_loss(tmp_path: P
     hidden = edited(tmp_path, (RSU_AT, BEHIND_THE_TRUCK))
     with_truck, without = FrameCollector(), FrameCollector()
     log, recording = tmp_path / "run.log", tmp_path / "recording.mcap"
-    simulate(hidden, PLAIN, with_truck, RunLog(log), Recorder(recording, metadata={}), time_limit=1.5)
+    result = simulate(hidden, PLAIN, with_truck, RunLog(log), Recorder(recording, metadata={}), time_limit=1.5)
     away = edited(
         tmp_path, (RSU_AT, BEHIND_THE_TRUCK), ('<WorldPosition x="25.4" y="8.016"', '<WorldPosition x="25.4" y="80"')
     )
@@ -47,7 +47,7 @@ def test_run_with_truck_between_antennas_has_the_model_blockage_loss(tmp_path: P
         assert hit.path_loss_db - free.path_loss_db == pytest.approx(9.0, abs=1e-6)  # type: ignore[operator]
         assert free.snr_db - hit.snr_db == pytest.approx(9.0, abs=1e-6)  # type: ignore[operator]
     lines = [line for line in log.read_text().splitlines() if "RSU to Ego" in line]
-    assert len(lines) == len(blocked)
+    assert len(lines) == len(blocked) + len(result.final_links)
     words = r"message \d+: arrives at .* path loss [\d.]+ dB, signal to noise [\d.]+ dB, NLOSv: behind Firetruck"
     assert all(re.search(words, line) for line in lines)
     read = [event for frame in read_recording(recording).frames() for event in frame.links]

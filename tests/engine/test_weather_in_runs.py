@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,9 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation.command_execution import execute
+from eidrive_scenario.storyboard.state.commands import Commands
+from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.weather import load_weather
 
 INIT = "<Init>\n         <Actions>"
@@ -30,6 +34,25 @@ def test_environment_action_sets_light_fog_and_friction(tmp_path: Path) -> None:
         assert (weather.name, weather.cloud_cover, weather.visual_range) == ("Shower", 0.75, 800.0)
         assert (weather.precipitation, weather.precipitation_intensity, weather.wetness) == ("rain", 12.0, 0.5)
         assert run.world._friction == weather.friction_scale == 0.6
+
+
+@pytest.mark.parametrize("animation", [True, False])
+def test_sun_follows_a_running_clock(tmp_path: Path, animation: bool) -> None:
+    """At an equinox the sun is 48° from the zenith at noon and sets at 18 h, sinking 15° cos 48° per hour."""
+    clock = f"""<GlobalAction><EnvironmentAction><Environment name="Dusk">
+      <TimeOfDay animation="{str(animation).lower()}" dateTime="2026-03-22T17:58:00"/></Environment>
+      </EnvironmentAction></GlobalAction>"""
+    with Simulation(load_scenario(edited(tmp_path, (INIT, INIT + clock)))) as run:
+        before = run.world.weather.sun_elevation
+        run.world.tick += round(120.0 / run.world.dt)
+        execute(Commands(), run._state)
+        sunk = before - run.world.weather.sun_elevation
+    assert sunk == pytest.approx(2.0 / 60.0 * 15.0 * math.cos(math.radians(48.0)) if animation else 0.0, abs=0.01)
+
+
+def test_clock_stops_at_the_end_of_the_calendar() -> None:
+    last = Environment(date_time="9999-12-31T23:59:59+00:00", clock_runs=True)
+    assert [last.clock(time).isoformat()[:19] for time in (0.5, 2.0)] == ["9999-12-31T23:59:59"] * 2  # type: ignore[union-attr]
 
 
 def test_environment_of_catalog_is_applied(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from eidrive_scenario.recording.text.decisions import Decisions
 from eidrive_scenario.recording.text.link_text import describe_link
 from eidrive_scenario.recording.text.run_log import describe_change, describe_kind
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.v2x.messages.message import LinkEvent
 
 
 class RunMessages:
@@ -46,11 +47,11 @@ class RunMessages:
             yield self._message(time, level, "criterion", f"{verdict.name}: violated; {verdict.reason}")
         self._violations = [one for one in self._violations if one not in due]
 
-    def of_links(self, frame: Frame) -> Iterator[Any]:
+    def of_links(self, events: Sequence[LinkEvent], time: float) -> Iterator[Any]:
         """Yield the outcomes of messages between stations."""
-        for event in frame.links:
+        for event in events:
             level = "DEBUG" if event.outcome == "delivered" else "WARNING"
-            yield self._message(frame.view.time, level, event.receiver, describe_link(event))
+            yield self._message(time, level, event.receiver, describe_link(event))
 
     def at_end(self, time: float) -> Iterator[Any]:
         """Yield the verdicts."""

@@ -33,7 +33,6 @@ from eidrive_scenario.export.foxglove.schemas import (
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder
-from eidrive_scenario.simulation.recorded_outcome import recorded_outcome
 
 _OWN: Color = (0.2, 0.8, 0.9, 0.35)
 _RECEIVED: Color = (0.95, 0.6, 0.15, 0.35)
@@ -53,7 +52,8 @@ class Topics:
     def __init__(self, foxglove: Foxglove, run: RecordedRun) -> None:
         self._foxglove = foxglove
         self._run = run
-        outcome = recorded_outcome(run.recording)
+        outcome = run.outcome()
+        self._final_links = () if outcome is None else outcome.final_links
         self._log = RunMessages(foxglove, () if outcome is None else outcome.criteria)
         self._actors = ActorScene(foxglove)
         self._images = CameraImages(run.recording.path, run.warnings)
@@ -82,12 +82,14 @@ class Topics:
             yield Entry("/messages", link_scene(self._foxglove, frame))
         for message in self._log.of_frame(frame):
             yield Entry("/log", message)
-        for message in self._log.of_links(frame):
+        for message in self._log.of_links(frame.links, time):
             yield Entry("/log/messages", message)
         yield from self._of_cameras(frame)
 
     def at_end(self) -> Iterator[Entry]:
         """Yield the messages after the last frame."""
+        for message in self._log.of_links(self._final_links, self._time):
+            yield Entry("/log/messages", message)
         for message in self._log.at_end(self._time):
             yield Entry("/log", message)
 

@@ -7,6 +7,10 @@ from typing import Any
 
 from eidrive_scenario.export.osi.schemas import Osi
 from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.environment_weather import weather_from_environment
+from eidrive_scenario.world.render.illumination.daylight import daylight
+from eidrive_scenario.world.render.tone_mapping import LUMA
+from eidrive_scenario.world.weather import Weather
 
 _RAIN = (0.1, 0.5, 1.9, 8.1, 34.0, 149.0)
 """Limits of the classes of precipitation [mm/h]."""
@@ -21,18 +25,19 @@ _LIGHT = (0.01, 1.0, 3.0, 10.0, 20.0, 400.0, 1000.0, 10_000.0)
 """Limits of the classes of ambient illumination [lx]."""
 
 
-def set_environment(osi: Osi, conditions: Any, environment: Environment, time: float) -> None:
-    """Set the values that the scenario specifies, at `time` [s] of the run."""
-    kinds = osi.environment
-    intensity = 0.0 if environment.precipitation == "dry" else environment.precipitation_intensity
-    if intensity is not None:
-        conditions.precipitation = kinds.Precipitation.Value(f"PRECIPITATION_{_RAINS[bisect_right(_RAIN, intensity)]}")
-    if environment.fog_range is not None:
-        conditions.fog = kinds.Fog.Value(f"FOG_{_FOGS[bisect_right(_RANGE, environment.fog_range)]}")
-    if environment.illuminance is not None:
-        level = bisect_right(_LIGHT, environment.illuminance) + 1
-        name = f"AMBIENT_ILLUMINATION_LEVEL{level}"
-        conditions.ambient_illumination = kinds.AmbientIllumination.Value(name)
+def set_environment(
+    osi: Osi, conditions: Any, environment: Environment | None, time: float, fixed: Weather | None = None
+) -> None:
+    """Set the values that the scenario or an option of the run specifies, at `time` [s] of the run.
+
+    fixed  weather that overrides that of the scenario
+    """
+    if fixed is not None:
+        _set_weather(osi, conditions, fixed)
+    if environment is None:
+        return
+    if fixed is None:
+        _set_environment_weather(osi, conditions, environment, time)
     if environment.temperature is not None:
         conditions.temperature = environment.temperature
     if environment.pressure is not None:
@@ -42,3 +47,37 @@ def set_environment(osi: Osi, conditions: Any, environment: Environment, time: f
         conditions.time_of_day.seconds_since_midnight = clock.hour * 3600 + clock.minute * 60 + clock.second
         if clock.tzinfo is not None:
             conditions.unix_timestamp = int(clock.timestamp())
+
+
+def _set_weather(osi: Osi, conditions: Any, weather: Weather) -> None:
+    conditions.precipitation = _precipitation(osi, weather)
+    conditions.fog = _fog(osi, weather.visual_range)
+    conditions.ambient_illumination = _illumination(osi, weather)
+
+
+def _set_environment_weather(osi: Osi, conditions: Any, environment: Environment, time: float) -> None:
+    """Set the values of the weather that the environment contains."""
+    weather = weather_from_environment(environment, time)
+    given = environment.precipitation_intensity, environment.precipitation_share
+    if environment.precipitation == "dry" or given != (None, None):
+        conditions.precipitation = _precipitation(osi, weather)
+    if environment.fog_range is not None:
+        conditions.fog = _fog(osi, environment.fog_range)
+    if (environment.sun_elevation, environment.date_time) != (None, None):
+        conditions.ambient_illumination = _illumination(osi, weather)
+
+
+def _precipitation(osi: Osi, weather: Weather) -> int:
+    name = _RAINS[bisect_right(_RAIN, weather.precipitation_intensity)]
+    return int(osi.environment.Precipitation.Value(f"PRECIPITATION_{name}"))
+
+
+def _fog(osi: Osi, visual_range: float) -> int:
+    return int(osi.environment.Fog.Value(f"FOG_{_FOGS[bisect_right(_RANGE, visual_range)]}"))
+
+
+def _illumination(osi: Osi, weather: Weather) -> int:
+    """Return the class of the light on level ground in camera images, by sun, sky and street lamps."""
+    lamps = weather.street_lighting if weather.lamps_on else 0.0
+    level = bisect_right(_LIGHT, float(daylight(weather).ground @ LUMA) + lamps) + 1
+    return int(osi.environment.AmbientIllumination.Value(f"AMBIENT_ILLUMINATION_LEVEL{level}"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ VEHICLES: Mapping[str, str] = {
     "bicycle": "TYPE_BICYCLE",
 }
 """Types of vehicles by category."""
+_TOWED: Mapping[str, str] = {"trailer": "TYPE_TRAILER", "semitrailer": "TYPE_SEMITRAILER"}
+"""Types of trailers by the vehicle category of OpenSCENARIO."""
 _GENERIC: Mapping[str, str] = {
     "lowBeam": "head_light",
     "highBeam": "high_beam",
@@ -46,10 +49,18 @@ def object_type(category: str) -> str:
     return "TYPE_PEDESTRIAN" if category == "pedestrian" else "TYPE_OTHER"
 
 
-def add_moving_objects(osi: Osi, message: Any, frame: Frame, ids: Identifiers, lanes: Mapping[int, int]) -> None:
+def add_moving_objects(
+    osi: Osi,
+    message: Any,
+    frame: Frame,
+    ids: Identifiers,
+    lanes: Mapping[int, int],
+    towed: Mapping[str, str] = MappingProxyType({}),
+) -> None:
     """Add all actors to a GroundTruth message.
 
     lanes  identifiers of lanes by the row of the actor
+    towed  vehicle categories of trailers and semitrailers, by name
     """
     view = frame.view
     turns = rotations(view.yaw, view.pitch, view.roll)
@@ -73,9 +84,13 @@ def add_moving_objects(osi: Osi, message: Any, frame: Frame, ids: Identifiers, l
             found.moving_object_classification.assigned_lane_id.add().value = lanes[row]
         if category in VEHICLES:
             kind = osi.moving_object.VehicleClassification.Type
-            found.vehicle_classification.type = kind.Value(VEHICLES[category])
+            data = found.vehicle_classification
+            data.type = kind.Value(_TOWED.get(towed.get(name, ""), VEHICLES[category]))
+            data.has_trailer = name in frame.trailers
+            if data.has_trailer:
+                data.trailer_id.value = ids.of(ACTOR, frame.trailers[name])
             set_vector(found.vehicle_attributes.bbcenter_to_rear, -view.offset[row])
-            _set_lights(osi, found.vehicle_classification.light_state, frame.appearances.get(name))
+            _set_lights(osi, data.light_state, frame.appearances.get(name))
 
 
 def center_motion(view: WorldView, arms: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.export.bodies import rotations
+from eidrive_scenario.export.bodies import angles, rotations
 from eidrive_scenario.export.osi.identifiers import Identifiers
 from eidrive_scenario.export.osi.moving_objects import VEHICLES, object_type
 from eidrive_scenario.export.osi.schemas import Osi, set_orientation, set_time, set_vector
@@ -17,13 +17,21 @@ from eidrive_scenario.recording.frame import Frame
 
 
 class _Origin(NamedTuple):
-    """Vehicle frame of a station: position (3,) [m], rotation (3, 3), yaw [rad], velocity (3,) [m/s], yaw rate."""
+    """Vehicle frame of a station: position (3,) [m], rotation (3, 3), velocity (3,) [m/s], yaw rate [rad/s]."""
 
     position: Array
     turn: Array
-    yaw: float
     velocity: Array
     yaw_rate: float
+
+    @property
+    def along_ground(self) -> Array:
+        """Matrix (3, 2) that adds the height to a horizontal vector so that it lies in the ground plane of the vehicle.
+
+        Stations do not estimate vertical velocities; on a constant slope other vehicles move in this plane.
+        """
+        x, y, z = self.turn[:, 2]
+        return np.array([[1.0, 0.0], [0.0, 1.0], [-x / z, -y / z]])
 
 
 class SensorDataBuilder:
@@ -74,15 +82,16 @@ class SensorDataBuilder:
         base.dimension.length, base.dimension.width, base.dimension.height = box[3:6].tolist()
         position = origin.turn.T @ (box[:3] - origin.position)
         set_vector(base.position, position)
-        set_orientation(base.orientation, float(box[6]) - origin.yaw)
-        velocity = np.append(objects.velocity[row], 0.0)
-        if np.isfinite(velocity).all():
-            spin = origin.yaw_rate * np.array([-position[1], position[0], 0.0])
-            set_vector(base.velocity, origin.turn.T @ (velocity - origin.velocity) - spin)
+        set_orientation(base.orientation, *angles(origin.turn.T @ _upright(float(box[6]))))
+        arm = box[:3] - origin.position
+        if np.isfinite(objects.velocity[row]).all():
+            spin = origin.yaw_rate * np.array([-arm[1], arm[0], 0.0])
+            moved = origin.along_ground @ objects.velocity[row]
+            set_vector(base.velocity, origin.turn.T @ (moved - origin.velocity - spin))
         covariance = objects.covariance[row]
         if np.isfinite(covariance).all():
-            plane = origin.turn[:2, :2]
-            spread = np.sqrt(np.maximum(np.diag(plane.T @ covariance @ plane), 0.0))
+            plane = (origin.turn.T @ origin.along_ground)[:2]
+            spread = np.sqrt(np.maximum(np.diag(plane @ covariance @ plane.T), 0.0))
             found.base_rmse.position.x, found.base_rmse.position.y = spread.tolist()
         reference = self._osi.detected.DetectedMovingObject.ReferencePoint
         found.reference_point = reference.Value("REFERENCE_POINT_CENTER")
@@ -104,10 +113,15 @@ def _origin(frame: Frame, station: str) -> _Origin | None:
     if estimate is not None:
         turn = rotations(*(np.array([one]) for one in (estimate.yaw, estimate.pitch, estimate.roll)))[0]
         velocity = turn @ np.array([estimate.speed, 0.0, 0.0])
-        return _Origin(estimate.position, turn, estimate.yaw, velocity, estimate.yaw_rate)
+        return _Origin(estimate.position, turn, velocity, estimate.yaw_rate)
     if station not in view:
         return None
     row = view.row(station)
     turn = rotations(view.yaw[row : row + 1], view.pitch[row : row + 1], view.roll[row : row + 1])[0]
-    rate, yaw = float(view.yaw_rate[row]), float(view.yaw[row])
-    return _Origin(view.position[row], turn, yaw, view.velocity[row], rate)
+    return _Origin(view.position[row], turn, view.velocity[row], float(view.yaw_rate[row]))
+
+
+def _upright(yaw: float) -> Array:
+    """Return the rotation (3, 3) of a detected box, which stands upright in the world."""
+    found: Array = rotations(*np.array([[yaw], [0.0], [0.0]]))[0]
+    return found

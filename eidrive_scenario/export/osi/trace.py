@@ -58,7 +58,7 @@ def check_osi() -> None:
 
 
 def _write_single_channel(osi: Osi, run: RecordedRun, stream: BinaryIO) -> None:
-    builder = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run))
+    builder = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run), run.towed, run.weather)
     for frame in run.frames():
         for data in run.converted(frame, lambda one: [builder.build(one).SerializeToString()]):
             stream.write(struct.pack("<I", len(data)) + data)
@@ -129,7 +129,7 @@ class _Traces:
     def __init__(self, osi: Osi, run: RecordedRun) -> None:
         self._osi = osi
         self._sensors = Identifiers(_FIRST_SENSOR)
-        self._truth = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run))
+        self._truth = GroundTruthBuilder(osi, run.roads, Identifiers(), host_vehicle(run), run.towed, run.weather)
         self._title = run.title
         self._stations: dict[tuple[str, str], SensorDataBuilder] = {}
 

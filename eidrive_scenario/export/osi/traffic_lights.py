@@ -25,11 +25,10 @@ class TrafficLights:
         self._heads = [(head, colors) for head in heads if (colors := lamp_colors(head.signal))]
 
     def add(self, message: Any, states: Mapping[str, str]) -> None:
-        """Add the lamps with their states, by the id of the signal. The mode of a light without a state is unknown."""
+        """Add the lamps with their states, by the id of the signal. A light without a state is dark, as in images."""
         kinds = self._osi.traffic_light.Classification
         for head, colors in self._heads:
-            state = states.get(head.signal.id)
-            shown = [(color, None) for color in colors] if state is None else list(lamps(state, colors))
+            shown = lamps(states.get(head.signal.id, ""), colors)
             height = head.height / len(shown)
             for index, (color, mode) in enumerate(shown):
                 lamp = message.traffic_light.add()
@@ -45,7 +44,5 @@ class TrafficLights:
                 lamp.source_reference.add(type="net.asam.opendrive", identifier=[head.signal.id])
 
 
-def _mode(mode: str | None) -> str:
-    if mode is None:
-        return "MODE_UNKNOWN"
+def _mode(mode: str) -> str:
     return {ON: "MODE_CONSTANT", FLASHING: "MODE_FLASHING"}.get(mode, "MODE_OFF")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ NEAREST = 0.1
 def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
     """Return image positions (N, 2) of world points (N, 3) [px], and depths (N,) along the optical axis [m].
 
-    Positions of points that are not in front of the camera are NaN. The distortion is Brown's, as in OpenCV.
+    Positions of points that are not in front of the camera are NaN. The distortion is Brown's, as in OpenCV. So far off
+    the optical axis that it would return towards the axis, points have no position either: they are outside the image.
     """
 
     import cv2
@@ -27,6 +29,9 @@ def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
     in_camera = (points - camera.pose[:3, 3]) @ inverse.T
     found = np.full((len(points), 2), np.nan)
     ahead = in_camera[:, 2] > NEAREST
+    limit = _largest_radius(*camera.distortion.tolist())
+    if limit < math.inf:
+        ahead &= np.hypot(in_camera[:, 0], in_camera[:, 1]) < limit * in_camera[:, 2]
     if ahead.any():
         plane: Any
         plane, _ = cv2.projectPoints(
@@ -34,6 +39,19 @@ def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
         )
         found[ahead] = plane[:, 0]
     return found, in_camera[:, 2]
+
+
+@lru_cache(maxsize=64)
+def _largest_radius(k1: float, k2: float, p1: float, p2: float, k3: float) -> float:
+    """Return the distance from the axis at depth 1 up to which the distorted one increases in every direction.
+
+    At radius r, p1 and p2 move a point by at most 3 |p| r². Infinite without such a limit.
+    """
+    if not any((k1, k2, p1, p2, k3)):
+        return math.inf
+    slope = [1.0, -6.0 * math.hypot(p1, p2), 3.0 * k1, 0.0, 5.0 * k2, 0.0, 7.0 * k3]
+    roots = np.polynomial.Polynomial(slope).trim().roots()
+    return min((root.real for root in roots.tolist() if root.real > 0.0 and abs(root.imag) < 1e-9), default=math.inf)
 
 
 def straight_boxes(boxes: Array, camera: CameraReading) -> Array:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Protocol, TextIO
 
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.frame import Frame
@@ -13,6 +14,7 @@ from eidrive_scenario.recording.text.decisions import Decisions
 from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_link
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
+from eidrive_scenario.v2x.messages.message import LinkEvent
 
 STANDARD_OUTPUT = "-"
 _VERBS = {
@@ -22,6 +24,14 @@ _VERBS = {
     ElementTransition.SKIP: "is skipped",
     None: "enters standbyState",
 }
+
+
+class _Result(Protocol):
+    """Result of a run, which a higher layer defines."""
+
+    @property
+    def final_links(self) -> Sequence[LinkEvent]:
+        """Message outcomes that became known in the last tick."""
 
 
 class RunLog:
@@ -51,9 +61,17 @@ class RunLog:
                 self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {describe_change(change)}\n")
         for name, plan in self._decisions.new(frame):
             self._stream.write(f"{frame.view.time:9.3f} s  {name}: {plan.reason}\n")
-        for link in frame.links:
+        self.write_links(frame.links)
+
+    def write_links(self, links: Sequence[LinkEvent]) -> None:
+        """Write a line for each message of a radio channel."""
+        for link in links:
             if link.path_loss_db is not None or link.reason in NOT_TRANSMITTED:
                 self._stream.write(f"{link.sent:9.3f} s  {describe_link(link)}\n")
+
+    def conclude(self, result: _Result) -> None:
+        """Write the messages whose outcome became known in the last tick."""
+        self.write_links(result.final_links)
 
     def close(self) -> None:
         """Close the file."""

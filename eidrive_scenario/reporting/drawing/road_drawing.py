@@ -47,9 +47,9 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
         for section in road.sections:
             if section.length <= 0.0:
                 continue
-            stations = _stations(section.s, section.end, spacing)
+            parts = _half_turns(road, _stations(section.s, section.end, spacing))
             for lane in section.lanes.values():
-                if lane.id != 0:
+                for stations in parts if lane.id != 0 else ():
                     inner = _edge(road, section, lane, stations, outer=False)
                     outer = _edge(road, section, lane, stations, outer=True)
                     polygon = np.concatenate([simplify_line(inner), simplify_line(outer)[::-1]])
@@ -129,6 +129,22 @@ def _stations(start: float, end: float, spacing: float) -> list[float]:
     """Return equidistant s coordinates along a road, including both ends [m]."""
     found: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
     return found
+
+
+def _half_turns(road: Road, stations: list[float]) -> list[list[float]]:
+    """Return the s coordinates in parts in which the road turns by at most about 180°; neighbors share a station.
+
+    A polygon over several turns, such as those of a helical ramp, would overlap itself, and its fill would have holes.
+    """
+    headings = np.unwrap([road.reference.at(s)[2] for s in stations])
+    parts: list[list[float]] = [[stations[0]]]
+    start = headings[0]
+    for s, heading in zip(stations[1:], headings[1:].tolist(), strict=True):
+        parts[-1].append(s)
+        if abs(heading - start) > math.pi and s < stations[-1]:
+            parts.append([s])
+            start = heading
+    return parts
 
 
 def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *, outer: bool) -> Array:

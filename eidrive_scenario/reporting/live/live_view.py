@@ -149,6 +149,9 @@ class LiveView:
 
     def conclude(self, result: RunResult) -> None:
         """Show the verdicts. `Simulation.run` calls it at the end."""
+        with self._building:
+            if self._builder is not None:
+                self._builder.observe_links(result.final_links)
         self._end(parse_run(json.loads(as_json_text(result))))
 
     def close(self) -> None:
@@ -177,7 +180,7 @@ class LiveView:
                 return
             part = self._builder.take()
             self._instants = {key: part[key] for key in ("contact", "decisive")}
-            if part["times"]:
+            if part["times"] or part["messages"]:
                 self._feed.add("part", packed(part))
             if self._report.lines() != self._values["notices"]:
                 self._values = {**self._values, "notices": self._report.lines()}

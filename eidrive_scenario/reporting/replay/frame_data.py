@@ -19,6 +19,7 @@ from eidrive_scenario.reporting.replay.series import SeriesBuilder
 from eidrive_scenario.reporting.replay.timeline import Timeline
 from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
+from eidrive_scenario.v2x.messages.message import LinkEvent
 
 _LARGEST_PAGE = 64 * 2**20
 """Approximate maximum size of the frames in a page [bytes]."""
@@ -94,12 +95,18 @@ class ReplayBuilder:
             return
         self._append(part)
         self._series.keep()
+        self.observe_links(frame.links)
+        self._timeline.observe(frame.changes)
+
+    def observe_links(self, events: Iterable[LinkEvent]) -> None:
+        """Add the outcomes of messages: those of a frame, or those that became known in the last tick."""
+        if self.is_full:
+            return
         complete = not self._messages.omitted
-        self._messages.observe(frame.links)
+        self._messages.observe(events)
         if complete and self._messages.omitted and self._report is not None:
             shown = f"the first {self._messages.count} are shown"
             self._report.add("the page does not show all messages", shown)
-        self._timeline.observe(frame.changes)
 
     def take(self) -> Data:
         """Return the data of the frames since the last call, in the format of `replay_data`.
@@ -137,6 +144,7 @@ def replay_data(
     frames: Iterable[Frame],
     report: DamageReport | None = None,
     settings: Mapping[str, AgentSettings] | None = None,
+    final_links: Iterable[LinkEvent] = (),
 ) -> Data:
     """Return the frames as plain lists, with lengths in cm and angles in mrad resolution.
 
@@ -151,13 +159,14 @@ def replay_data(
     messages   see `MessageList`; timeline  see `Timeline`; series, contact, decisive  see `SeriesBuilder`
     changes    [time, path, after, why] of the storyboard transitions
 
-    For `report` and `settings` see `ReplayBuilder`.
+    For `report` and `settings` see `ReplayBuilder`. `final_links` are the message outcomes of the last tick.
     """
     builder = ReplayBuilder(report, settings)
     for frame in frames:
         builder.observe(frame)
         if builder.is_full:
             break
+    builder.observe_links(final_links)
     return builder.take()
 
 

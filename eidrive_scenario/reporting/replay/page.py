@@ -26,7 +26,8 @@ from eidrive_scenario.reporting.replay.page_values import TEMPLATE, decisive_ins
 from eidrive_scenario.reporting.run_report.reported_run import parse_run
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
-from eidrive_scenario.simulation.recorded_outcome import CONTEXT
+from eidrive_scenario.simulation.recorded_outcome import CONTEXT, TRAILERS, recorded_outcome
+from eidrive_scenario.v2x.messages.message import LinkEvent
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def make_replay(
     trace = TraceHash()
     settings = run_settings(recording, report)
     frames, roads = _drawable(recording, report, trace), readable_roads(recording, report)
-    data = replay_data(frames, report, station_settings(settings))
+    data = replay_data(frames, report, station_settings(settings), _final_links(recording, report))
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
         raise InputError(Diagnostic("the recording contains no readable frame", reason, str(recording.path)))
@@ -92,6 +93,16 @@ def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> I
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             report.add("frames are inconsistent", f"tick {frame.view.tick}: {describe_error(error)}")
         yield frame
+
+
+def _final_links(recording: Recording, report: DamageReport) -> tuple[LinkEvent, ...]:
+    """Return the message outcomes of the last tick; of an outcome that cannot be read none."""
+    try:
+        outcome = recorded_outcome(recording)
+    except InputError as error:
+        report.add("the messages of the last tick are not shown", describe_error(error))
+        return ()
+    return () if outcome is None else outcome.final_links
 
 
 def readable_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
@@ -136,6 +147,6 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
     """Return the facts about the run that the page lists."""
     if settings:
         return run_facts(settings)
-    hidden = ("format", "parameters", "settings", "command", CONTEXT)
+    hidden = ("format", "parameters", "settings", "command", CONTEXT, TRAILERS)
     facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})

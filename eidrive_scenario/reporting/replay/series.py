@@ -25,7 +25,7 @@ class SeriesBuilder:
     columns   by station and frame: speed [m/s], gap to the nearest body [m], smallest time to collision [s], and the
               age of information by sender [s]: the time since the newest received message was generated. None:
               absent, farther than FAR, above TTC_LIMIT, nothing received yet
-    contact   the first contact of a driven vehicle: time [s] and description; None without a contact
+    contact   the first contact of a driven vehicle or of its trailers: time [s] and description; None without a contact
     decisive  that contact, else the smallest gap of a driven vehicle. Without driven vehicles all actors are
               considered; None if no two actors were present at the same time
     """
@@ -56,9 +56,10 @@ class SeriesBuilder:
             ages = {sender: _rounded(now - generated, 3) for sender, generated in newest.items()}
             self._pending[name] = {"age": ages}
             if name in driven:
-                gap, other = nearest_body(view, name)
+                attached = frame.attached(name)
+                gap, other = nearest_body(view, name, attached)
                 self._note_gap(gap, now, f"{name} and {other}")
-                ttc = min_time_to_collision(view, name, TTC_LIMIT) if is_finite else math.inf
+                ttc = min_time_to_collision(view, name, TTC_LIMIT, attached) if is_finite else math.inf
                 self._pending[name] |= {
                     "speed": _rounded(float(view.speed[view.row(name)]), 2),
                     "gap": _rounded(gap, 2) if gap <= FAR else None,
@@ -107,15 +108,16 @@ class SeriesBuilder:
     def _note_contact(self, frame: Frame, driven: list[str]) -> None:
         self._driven |= bool(driven)
         for contact in frame.view.contacts if self._contact is None else ():
-            if not self._driven or contact.first in driven or contact.second in driven:
+            trains = {*driven}.union(*map(frame.attached, driven))
+            if not self._driven or contact.first in trains or contact.second in trains:
                 self._contact = frame.view.time, f"contact of {contact.first} and {contact.second}"
                 return
-        if not self._driven and (pair := nearest_pair(frame.view, self._least[0])) is not None:
+        if not self._driven and (pair := nearest_pair(frame.view, self._least[0], frame.trailers)) is not None:
             gap, name, other = pair
             self._note_gap(gap, frame.view.time, f"{name} and {other}")
 
     def _note_gap(self, gap: float, time: float, pair: str) -> None:
-        # Bodies that touch without a contact are a vehicle and its trailer.
+        # In recordings of former versions a vehicle and its trailer touch without a contact.
         if 0.0 < gap < self._least[0]:
             self._least = gap, time, pair
 

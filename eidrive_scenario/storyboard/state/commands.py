@@ -36,7 +36,7 @@ class Commands:
     spawns       placements of the actors that enter the world
     actor_specs  bodies of entering actors whose body does not follow from an entity, such as background traffic
     removals     actors that leave the world
-    trailers     pairs of names of a vehicle and its trailer
+    trailers     trailer of each towing vehicle, by name
     driven       actors whose own controller is active, lateral and longitudinal
     overrides    controls that are held, by actor
     custom       CustomCommandActions that started in this tick
@@ -52,7 +52,7 @@ class Commands:
     spawns: dict[str, Placement] = field(default_factory=dict)
     actor_specs: dict[str, ActorSpec] = field(default_factory=dict)
     removals: set[str] = field(default_factory=set)
-    trailers: frozenset[frozenset[str]] = frozenset()
+    trailers: Mapping[str, str] = field(default_factory=dict)
     driven: frozenset[str] = frozenset()
     overrides: Mapping[str, Overrides] = field(default_factory=dict)
     custom: list[CustomCommand] = field(default_factory=list)

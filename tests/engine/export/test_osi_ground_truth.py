@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 from osi3trace.osi_trace import OSITrace
 from scipy.spatial.transform import Rotation
 from written_recording import Body, detected, step, view, write_run
@@ -20,7 +19,6 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings
 from eidrive_scenario.world.appearance import Appearance, LightState
-from eidrive_scenario.world.environment import Environment
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
 MILLIMETER = 1e-3
@@ -170,7 +168,10 @@ def test_switched_lights_are_states(tmp_path: Path) -> None:
 
 
 def test_traffic_lights_have_one_entity_per_lamp(scenario_3: tuple[Path, Path]) -> None:
-    """Modes follow from the recorded states, which are lists of lamps from top to bottom or names of colors."""
+    """Modes follow from the recorded states, which are lists of lamps from top to bottom or names of colors.
+
+    osi_trafficlight.proto excludes MODE_UNKNOWN from ground truth; lights without a state are dark.
+    """
     frames = list(read_recording(scenario_3[0]).frames())
     truths = messages(scenario_3[1])
     shown = set()
@@ -185,8 +186,10 @@ def test_traffic_lights_have_one_entity_per_lamp(scenario_3: tuple[Path, Path]) 
             assert len(lamps) == 3
             kinds = type(lamps[0].classification)
             lit = [lamp for lamp in lamps if kinds.Mode.Name(lamp.classification.mode) == "MODE_CONSTANT"]
+            modes_found = {kinds.Mode.Name(lamp.classification.mode) for lamp in lamps}
             state = frame.signals.get(signal)
             assert (state is None) == (not lit)
+            assert modes_found == ({"MODE_OFF"} if state is None else {"MODE_OFF", "MODE_CONSTANT"})
             if state is not None:
                 colors = {kinds.Color.Name(lamp.classification.color).removeprefix("COLOR_").lower() for lamp in lit}
                 modes = dict(zip(("red", "yellow", "green"), state.split(";"), strict=True))
@@ -248,29 +251,26 @@ def test_actor_is_assigned_to_its_lane(tmp_path: Path) -> None:
     assert not off_road.assigned_lane_id
 
 
-def test_environment_is_in_classes_of_standard(tmp_path: Path) -> None:
-    """By the definitions in osi_environment.proto: 2 mm/h moderate, 150 m thick fog, 15000 lx level 9."""
-    environment = Environment(
-        date_time="2026-06-01T10:30:15",
-        precipitation="rain",
-        precipitation_intensity=2.0,
-        fog_range=150.0,
-        illuminance=15_000.0,
-        temperature=280.0,
-        pressure=100_000.0,
-    )
-    (truth,) = exported(tmp_path, replace(Frame(view({"A": {}})), environment=environment))
-    found = truth.environmental_conditions
-    kinds = type(found)
-    assert kinds.Precipitation.Name(found.precipitation) == "PRECIPITATION_MODERATE"
-    assert kinds.Fog.Name(found.fog) == "FOG_THICK"
-    assert kinds.AmbientIllumination.Name(found.ambient_illumination) == "AMBIENT_ILLUMINATION_LEVEL9"
-    assert (found.temperature, found.atmospheric_pressure) == (280.0, 100_000.0)
-    assert found.time_of_day.seconds_since_midnight == 10 * 3600 + 30 * 60 + 15
-
-
 def test_single_channel_trace_contains_the_same_messages(scenario_3: tuple[Path, Path], tmp_path: Path) -> None:
     write_osi(open_run(scenario_3[0]), tmp_path / "trace.osi")
     assert [one.SerializeToString() for one in messages(tmp_path / "trace.osi")] == [
         one.SerializeToString() for one in messages(scenario_3[1])
     ]
+
+
+def test_trailers_have_their_types_and_identifiers(tmp_path: Path) -> None:
+    """Per OSI, trailer_id is that of the towed object. A trailer is no host, even as the first vehicle."""
+    bodies: dict[str, Body] = {name: {"category": "truck"} for name in ("Trailer", "Truck", "Dolly")}
+    frames = [Frame(view(bodies), trailers={"Truck": "Dolly", "Dolly": "Trailer"}), Frame(view(bodies, 1))]
+    metadata = {"trailers": '{"Dolly": "trailer", "Trailer": "semitrailer"}'}
+    run = write_run(tmp_path, frames, metadata=metadata)
+    assert [dict(frame.trailers) for frame in run.frames()] == [dict(frame.trailers) for frame in frames]
+    write_osi(run, tmp_path / "trace.mcap")
+    coupled, apart = messages(tmp_path / "trace.mcap")
+    trailer, truck, dolly = (found.id.value for found in coupled.moving_object)
+    kinds = type(coupled.moving_object[0].vehicle_classification)
+    assert coupled.host_vehicle_id.value == truck
+    data = [found.vehicle_classification for found in coupled.moving_object]
+    assert [one.type for one in data] == [kinds.TYPE_SEMITRAILER, kinds.TYPE_HEAVY_TRUCK, kinds.TYPE_TRAILER]
+    assert [(one.has_trailer, one.trailer_id.value) for one in data] == [(False, 0), (True, dolly), (True, trailer)]
+    assert not any(found.vehicle_classification.has_trailer for found in apart.moving_object)

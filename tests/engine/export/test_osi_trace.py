@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from msgspec.structs import replace
 from osi3trace.osi_trace import OSITrace
+from scipy.spatial.transform import Rotation
 from written_recording import detected, step, view, write_run
 
 from eidrive_scenario.errors import InputError, SettingError
@@ -57,6 +59,32 @@ def test_detections_are_relative_to_the_estimated_pose(tmp_path: Path) -> None:
     (message,) = sensor_data(tmp_path / "t.mcap", "Ego")
     assert message.moving_object[0].base.position.x == pytest.approx(10.0)
     assert not message.moving_object[0].base.HasField("velocity")
+
+
+@pytest.mark.parametrize("angles", [(0.4, -0.1, 0.05), (0.0, 0.1, 0.0), (-2.0, 0.0, -0.2)])
+def test_detections_on_a_slope_are_rotated_by_yaw_pitch_and_roll(
+    tmp_path: Path, angles: tuple[float, float, float]
+) -> None:
+    """In the world the detected boxes are upright; an object with the velocity of the vehicle rests in its frame.
+
+    A deviation along x of the level plane is one along the slope, which is longer by 1 / cos(pitch).
+    """
+    turn = Rotation.from_euler("ZYX", angles)
+    velocity = turn.apply([10.0, 0.0, 0.0])
+    body = {"position": (10.0, 20.0, 5.0), "angles": angles, "velocity": velocity}
+    box = (40.0, 30.0, 6.0, 4.0, 2.0, 1.5, 0.7)
+    own = replace(detected(0.0, [box], velocity=[velocity[:2].tolist()]), covariance=np.array([np.diag([4.0, 1.0])]))
+    write_osi(write_run(tmp_path, [Frame(view({"Ego": body}), {"Ego": step(own)})]), tmp_path / "t.mcap")
+    (found,) = sensor_data(tmp_path / "t.mcap", "Ego")[0].moving_object
+    position, speed, tilt = found.base.position, found.base.velocity, found.base.orientation
+    arm = np.array(box[:3]) - (10.0, 20.0, 5.0)
+    assert turn.apply([position.x, position.y, position.z]) == pytest.approx(arm)
+    back = turn * Rotation.from_euler("ZYX", [tilt.yaw, tilt.pitch, tilt.roll])
+    assert back.as_euler("ZYX") == pytest.approx([0.7, 0.0, 0.0], abs=1e-9)
+    assert (speed.x, speed.y, speed.z) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    if angles[0] == angles[2] == 0.0:
+        rmse = found.base_rmse.position
+        assert (rmse.x, rmse.y) == pytest.approx((2.0 / np.cos(angles[1]), 1.0))
 
 
 def test_trace_has_metadata_of_the_format(tmp_path: Path) -> None:

@@ -28,6 +28,18 @@ def test_pixels_of_known_points_equal_hand_calculation() -> None:
     np.testing.assert_allclose(depth, [10, 10, -5])
 
 
+def test_points_beyond_the_fold_of_a_lens_have_no_pixels() -> None:
+    """With k1 = -0.1 the radius r (1 - 0.1 r²) decreases from r = sqrt(10/3) on, so that r = 3 would appear at 0.3."""
+    view = camera(distortion=np.array([-0.1, 0.0, 0.0, 0.0, 0.0]))
+    fold = np.sqrt(10.0 / 3.0)
+    tangents = np.array([1.5, fold - 0.01, fold + 0.01, 3.0])
+    places, _ = pixels(np.column_stack([np.ones(4), -tangents, np.full(4, 1.5)]), view)
+    focal, (middle, _) = view.intrinsics[0, 0], view.intrinsics[:2, 2]
+    expected = middle + focal * tangents * (1.0 - 0.1 * tangents**2)
+    assert places[:2, 0] == pytest.approx(expected[:2])
+    assert np.isnan(places[2:]).all()
+
+
 def test_straight_boxes_inverts_distortion() -> None:
     """Points at the middles of edges return to the plane of their origin."""
     view = camera(distortion=np.array([-0.2, 0.03, 0.001, -0.002, 0.0]))

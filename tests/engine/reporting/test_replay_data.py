@@ -248,3 +248,27 @@ def test_camera_files_lists_ticks_with_relative_address(tmp_path: Path) -> None:
         }
     }
     assert camera_files(tmp_path / "pages", tmp_path) == {}
+
+
+def test_gap_of_road_train_excludes_its_own_bodies(street: Play) -> None:
+    """The truck and the RSU are coupled to the ego here, so that the crossing car is the only other body."""
+    frames = [replace(frame, trailers={"Ego": "Truck", "Truck": "RSU"}) for frame in street(1)]
+    assert frames[0].attached("Ego") == {"Truck", "RSU"}
+    assert frames[0].attached("RSU") == {"Ego", "Truck"}
+    view = frames[0].view
+    (other,) = set(view.names) - {"Ego", "Truck", "RSU"}
+    gap = box_distance(view.boxes[view.row("Ego")], view.boxes[view.row(other)])
+    assert observe(frames).take()["Ego"]["gap"][0] == pytest.approx(gap, abs=0.005)
+    pair = nearest_pair(view, math.inf, {"Ego": other})
+    assert pair is not None
+    assert {pair[1], pair[2]} != {"Ego", other}
+
+
+def test_contact_of_own_trailer_is_decisive(street: Play) -> None:
+    frames = street(1)
+    touch = Contact("Truck", "RSU", (0.0, 0.0, 0.0), 5.0)
+    hit = replace(frames[50], view=replace(frames[50].view, contacts=(touch,)))
+    assert observe([*frames[:50], hit]).contact is None
+    contact = observe([*frames[:50], replace(hit, trailers={"Ego": "Truck"})]).contact
+    assert contact is not None
+    assert contact["text"] == "contact of Truck and RSU"

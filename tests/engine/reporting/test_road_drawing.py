@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
+from eidrive_scenario.reporting.drawing.canvas import Canvas
 from eidrive_scenario.reporting.drawing.road_drawing import road_drawing, simplify_line
 from eidrive_scenario.reporting.drawing.top_view import Window
 from eidrive_scenario.roads.model.road_map import Road
@@ -67,3 +70,17 @@ def test_simplify_line_keeps_corners_only() -> None:
 def test_simplify_line_of_closed_line_keeps_farthest_point() -> None:
     loop = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
     assert simplify_line(loop) == pytest.approx(loop)
+
+
+@pytest.mark.parametrize("turns", [1.5, 2.0])
+def test_helical_ramp_is_filled_in_pictures(turns: float) -> None:
+    """The lane of 4 m is right of a left-hand circle of 20 m, so that its middle is 22 m from the axis."""
+    length = 2.0 * math.pi * 20.0 * turns
+    lanes = section_xml("", lane_xml(-1, 4.0))
+    text = map_xml(road_xml(length=length, y=-20.0, curvature=0.05, lanes=lanes))
+    canvas = Canvas(Window(-30.0, 30.0, -30.0, 30.0), (300, 300))
+    canvas.roads(road_drawing(parse_road_map(text.encode(), "helix.xodr").roads.values()))
+    for degrees in range(5, 360, 10):
+        angle = math.radians(degrees)
+        x, y = canvas.pixel((22.0 * math.cos(angle), 22.0 * math.sin(angle)))
+        assert canvas.image[y, x].tolist() == [0xD1, 0xC7, 0xC1], degrees

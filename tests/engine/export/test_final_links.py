@@ -1,0 +1,58 @@
+"""Outcomes of the messages of the last tick of a run: in its result, its log, its recording, and the files of these."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.experiments.judgement import judge_recording
+from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.export.recorded_run import open_run
+from eidrive_scenario.export.table_files import write_csv
+from eidrive_scenario.recording import read_recording
+from eidrive_scenario.reporting.replay.frame_data import replay_data
+from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation.recorded_outcome import recorded_outcome
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
+
+
+@pytest.mark.parametrize("channel", ["80211p_urban", "ideal"])
+def test_outcomes_of_all_ticks_are_those_that_the_statistics_count(tmp_path: Path, channel: str) -> None:
+    """By definition sent = received + lost + in_flight; a radio decides messages after their tick."""
+    log = tmp_path / "run.log"
+    settings = RunSettings(
+        channel=channel, criteria={"packet_reception_ratio": {"sender": "RSU", "receiver": "Ego"}}, time_limit=1.0
+    )
+    result = run_and_save("coop/scenario_1", settings=settings, out=tmp_path, log=log)
+    link: LinkStatistics = result.links["RSU", "Ego"]
+    known = link.received + link.lost
+    (ratio,) = (one for one in result.criteria if one.name == "packet_reception_ratio")
+    assert ratio.value == pytest.approx(link.received / known)
+
+    recording = read_recording(tmp_path)
+    frames, outcome = list(recording.frames()), recorded_outcome(recording)
+    assert outcome is not None
+    assert outcome.final_links == result.final_links
+    assert (len(result.final_links) > 0) == (channel == "80211p_urban")
+    assert sum(len(frame.links) for frame in frames) + len(outcome.final_links) == known
+    assert judge_recording(tmp_path).criteria == result.criteria
+
+    write_csv(open_run(tmp_path), tmp_path / "t.csv", "messages")
+    with (tmp_path / "t.csv").open(newline="") as stream:
+        assert [row["outcome"] for row in csv.DictReader(stream)].count("lost") == link.lost
+    data = replay_data(frames, final_links=outcome.final_links)
+    assert len(data["messages"]) == known
+    lines = [line for line in log.read_text().splitlines() if "RSU to Ego" in line]
+    assert len(lines) == (known if channel == "80211p_urban" else 0)
+
+
+def test_repeated_results_count_final_links_once() -> None:
+    settings = RunSettings(
+        channel="80211p_urban", criteria={"packet_reception_ratio": {"receiver": "Ego"}}, time_limit=0.5
+    )
+    with Simulation("coop/scenario_1", settings=settings) as simulation:
+        first = simulation.run()
+        assert first.final_links
+        assert simulation.result().criteria == first.criteria
