@@ -22,6 +22,8 @@ TIGHTER = 1.5
 """Share of the lateral acceleration up to which an obstacle is passed that was recognized late."""
 TIGHTEST = 0.6
 """Share of the length of a lateral motion in which most of it must be possible."""
+AT_OFFSET = 0.1
+"""Difference to an offset up to which the vehicle is there [m]; its control has errors of this size."""
 
 
 class Body(NamedTuple):
@@ -138,10 +140,13 @@ def passing(
 ) -> LateralProfile | None:
     """Return the motion to an offset before `obstacle` (start and end along the line) and back to 0 behind it.
 
-    The result is None if the obstacle is too near for it.
+    The result is None if the obstacle is too near for it. A vehicle that is at the offset already, or farther aside,
+    needs no motion before it.
     """
     begin, end = obstacle
     length = change_length(value - start, speed, lateral_acceleration)
+    if side * (value - start) <= AT_OFFSET:
+        begin = max(begin, s + length)
     first = max(begin - length, s)
     if begin - first < TIGHTEST * change_length(value - start, speed, TIGHTER * lateral_acceleration):
         return None
