@@ -137,15 +137,17 @@ def passing(
     speed: float,
     lateral_acceleration: float,
     side: int,
+    *,
+    stands: bool = False,
 ) -> LateralProfile | None:
     """Return the motion to an offset before `obstacle` (start and end along the line) and back to 0 behind it.
 
-    The result is None if the obstacle is too near for it. A vehicle that is at the offset already, or farther aside,
-    needs no motion before it.
+    The result is None if the obstacle is too near for it. A vehicle at the offset, or farther aside, may be beside an
+    obstacle that `stands`: it needs no motion before it.
     """
     begin, end = obstacle
     length = change_length(value - start, speed, lateral_acceleration)
-    if side * (value - start) <= AT_OFFSET:
+    if stands and side * (value - start) <= AT_OFFSET:
         begin = max(begin, s + length)
     first = max(begin - length, s)
     if begin - first < TIGHTEST * change_length(value - start, speed, TIGHTER * lateral_acceleration):

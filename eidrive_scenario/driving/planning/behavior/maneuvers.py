@@ -189,12 +189,11 @@ def _is_beside(situation: Situation, one: Present, body: Body) -> bool:
 def _is_passable(situation: Situation, one: Present, body: Body) -> bool:
     """Return whether an object may be passed: not a crossing pedestrian, and standing for some time or moving."""
     known = situation.objects[one.owner]
-    if known.still_since is not None:
-        stands = situation.now - known.still_since
-        is_aside = abs(one.d) > ASIDE
-        waits = situation.speed < WAITING or stands >= LONG or _is_beside(situation, one, body)
-        return known.kind == "misc" or (stands >= PATIENCE and (is_aside or waits))
-    return known.kind not in ("pedestrian",)
+    if known.still_since is None:
+        return known.kind != "pedestrian"
+    stands = situation.now - known.still_since
+    waits = situation.speed < WAITING or stands >= LONG or _is_beside(situation, one, body)
+    return known.kind == "misc" or (stands >= PATIENCE and (abs(one.d) > ASIDE or waits))
 
 
 def _is_steady(situation: Situation, one: Present) -> bool:
@@ -268,6 +267,7 @@ def _around(
         max(situation.speed, 2.0),
         settings.lateral_acceleration,
         side,
+        stands=all(situation.objects[one.owner].still_since is not None for one in obstacle.objects),
     )
     if profile is not None and value + half_width > own:
         return msgspec.structs.replace(profile, uses_oncoming=True)

@@ -23,8 +23,8 @@ def test_parked_bus_that_another_hid_is_passed_as_well(y: float) -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(("start", "speed"), [(2.0, 0.0), (2.0, 10.0), (2.05, 10.0), (3.0, 5.0)])
-def test_vehicle_at_the_offset_beside_an_obstacle_continues(side: int, start: float, speed: float) -> None:
-    profile = passing("pass", side * 2.0, (80.0, 120.0), 100.0, side * start, 0.0, speed, 2.0, side)
+def test_vehicle_at_the_offset_beside_a_standing_obstacle_continues(side: int, start: float, speed: float) -> None:
+    profile = passing("pass", side * 2.0, (80.0, 120.0), 100.0, side * start, 0.0, speed, 2.0, side, stands=True)
     assert profile is not None
     assert side * profile.offset_at(100.0) == pytest.approx(start)
     inside = min(100.0 + change_length(2.0 - start, speed, 2.0), 120.0)
@@ -33,5 +33,5 @@ def test_vehicle_at_the_offset_beside_an_obstacle_continues(side: int, start: fl
     assert profile.offset_at(profile.places[-1]) == 0.0
 
 
-def test_vehicle_that_is_not_aside_of_a_near_obstacle_does_not_pass_it() -> None:
-    assert passing("pass", 2.0, (80.0, 120.0), 100.0, 1.5, 0.0, 5.0, 2.0, 1) is None
+def test_vehicle_not_aside_of_a_near_obstacle_does_not_pass_it() -> None:
+    assert passing("pass", 2.0, (80.0, 120.0), 100.0, 1.5, 0.0, 5.0, 2.0, 1, stands=True) is None
