@@ -62,6 +62,8 @@ class LateralProfile(msgspec.Struct, frozen=True):
     side: int = 0
     uses_oncoming: bool = False
     """Whether the vehicle enters a lane of the opposite direction."""
+    passes_standing: bool = False
+    """Whether it passes objects that stand, so that its end is known beyond the horizon."""
 
     def offset(self, s: Array) -> Array:
         """Return the offsets (…) at distances (…) along the line."""

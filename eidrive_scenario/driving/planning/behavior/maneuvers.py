@@ -250,15 +250,15 @@ def _around(
     situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle, body: Body, side: int
 ) -> LateralProfile | None:
     """Return the motion past an obstacle on one side; None if that is too narrow."""
-    half_width = body.half_width
     vulnerable = any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
     clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
     outer = max([side * one.d + one.half_width for one in obstacle.objects])
     own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in obstacle.beside), strict=True))
-    room = every - outer - 2.0 * half_width
+    room = every - outer - 2.0 * body.half_width
     if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
-    value = max(outer + _beside_obstacle(room, clearance) + half_width, 0.0)
+    value = max(outer + _beside_obstacle(room, clearance) + body.half_width, 0.0)
+    stands = all(situation.objects[one.owner].still_since is not None for one in obstacle.objects)
     profile = passing(
         f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
         side * value,
@@ -267,10 +267,10 @@ def _around(
         max(situation.speed, 2.0),
         settings.lateral_acceleration,
         side,
-        stands=all(situation.objects[one.owner].still_since is not None for one in obstacle.objects),
+        stands=stands,
     )
-    if profile is not None and value + half_width > own:
-        return msgspec.structs.replace(profile, uses_oncoming=True)
+    if profile is not None and value + body.half_width > own:
+        return msgspec.structs.replace(profile, uses_oncoming=True, passes_standing=stands)
     return profile
 
 

@@ -21,6 +21,27 @@ def test_parked_bus_that_another_hid_is_passed_as_well(y: float) -> None:
     assert min(speed for place, _, speed in run.path if 74.0 < place < 102.0) > 0.5
 
 
+def test_row_of_parked_cars_longer_than_the_horizon_is_passed() -> None:
+    """Cars every 12 m along 84 m, which take longer than 8 s at 6 m/s, without oncoming traffic."""
+    cars = [KnownBox(60.0 + 12.0 * number) for number in range(8)]
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads, 6.0), roads, speed=6.0)
+    run.run(60.0, lambda now: cars)
+    run.world.close()
+    assert run.front > 170.0
+    assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
+
+
+def test_standing_motorbike_is_passed() -> None:
+    """The vehicle stops `passing_gap` farther away than the standstill gap of 2 m, and then passes."""
+    bike = KnownBox(70.0, kind="motorbike", size=(2.2, 0.8))
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads), roads)
+    run.run(26.0, lambda now: [bike])
+    run.world.close()
+    assert run.front > 120.0
+
+
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(("start", "speed"), [(2.0, 0.0), (2.0, 10.0), (2.05, 10.0), (3.0, 5.0)])
 def test_vehicle_at_the_offset_beside_a_standing_obstacle_continues(side: int, start: float, speed: float) -> None:
