@@ -41,7 +41,8 @@ class YieldToEmergencyVehicle(Criterion):
     """Criterion that fails if an emergency vehicle that approaches from behind does not get past the actor.
 
     It approaches when it drives in the direction of the actor, at most `within` behind it, in any lane. The approach
-    ends when its center is ahead of that of the actor, or when it is farther behind.
+    ends when its center is ahead of that of the actor, or when it takes another way. It continues if the vehicle falls
+    farther behind or either of both is removed.
     """
 
     settings_type = YieldToEmergencyVehicleSettings
@@ -59,6 +60,12 @@ class YieldToEmergencyVehicle(Criterion):
         self._longest: float | None = None
         """Longest time from the start of an approach until the emergency vehicle was past, or until now [s]."""
         self._violated: float | None = None
+        self._gap = 0.0
+        """Last gap to the emergency vehicle during the present approach [m]."""
+        self._outcome = ""
+        """Description of the end of the last approach."""
+        self._removed = False
+        """Whether either of both is absent since the present approach."""
 
     def bind(self, roads: RoadNetwork | None) -> None:
         super().bind(roads)
@@ -68,6 +75,9 @@ class YieldToEmergencyVehicle(Criterion):
         view, settings = frame.view, self._settings
         if self._missing:
             self._missing.difference_update(view.names)
+        self._removed = not (settings.of in view.rows and settings.to in view.rows)
+        if self._removed:
+            return
         found = next(self._surroundings.relations(view, settings.of, (settings.to,)), None)
         if self._since is None:
             approaches = found is not None and found.ahead <= 0.0 < found.other_speed and found.gap <= settings.within
@@ -78,8 +88,14 @@ class YieldToEmergencyVehicle(Criterion):
         self._longest = waited if self._longest is None else max(self._longest, waited)
         if self._violated is None and settings.at_most is not None and waited > settings.at_most + TIME_TOLERANCE:
             self._violated = view.time
-        if found is None or found.ahead > 0.0 or found.gap > settings.within:
-            self._since = None
+        if found is None:
+            # Without a relation a vehicle that had fallen back is out of range; a near one is on another way.
+            if self._gap <= settings.within:
+                self._since, self._outcome = None, "took another way than"
+            return
+        self._gap = found.gap
+        if found.ahead > 0.0:
+            self._since, self._outcome = None, "was past"
 
     def verdict(self) -> Verdict:
         settings = self._settings
@@ -90,8 +106,9 @@ class YieldToEmergencyVehicle(Criterion):
             reason = f"{to} never approached {of} from behind within {settings.within:g} m"
         elif self._since is not None:
             reason = f"{to} was still behind {of}, {self._longest:.2f} s after it had approached"
+            reason += ", when one of both was removed" if self._removed else ""
         else:
-            reason = f"{to} was past {of} {self._longest:.2f} s after it had approached"
+            reason = f"{to} {self._outcome} {of} {self._longest:.2f} s after it had approached"
         return self.conclude(
             not self._missing and self._since is None and self._violated is None,
             reason,

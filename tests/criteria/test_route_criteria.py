@@ -189,6 +189,23 @@ def test_emergency_vehicle_that_stays_behind_fails(frame: Any, car: Any) -> None
     assert (verdict.passed, verdict.value) == (True, None)
 
 
+def test_emergency_vehicle_that_is_removed_or_falls_back_is_not_past(frame: Any, car: Any) -> None:
+    """From 1 s to 3 s the EV is behind, 26 m at the end. Then it is removed, or falls back by 20 m/s to 266 m."""
+    removed = [*chase(frame, car, 3), *(frame(t, {"Ego": car(10.0 * t, speed=10.0)}) for t in (4.0, 5.0))]
+    verdict = yields(removed, at_most=3.0)
+    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 2.0, None)
+    assert "still behind" in verdict.reason
+    assert "removed" in verdict.reason
+    ego = {t: 30.0 + 30.0 * (t - 3.0) for t in range(4, 16)}
+    back = [
+        frame(float(t), {"Ego": car(x, speed=30.0), "EV": car(10.0 * (t - 3.0), 3.5, speed=10.0)})
+        for t, x in ego.items()
+    ]
+    verdict = yields([*chase(frame, car, 3), *back])
+    assert not verdict.passed
+    assert "still behind" in verdict.reason
+
+
 def test_missing_actors_fail(frame: Any, car: Any, roads: Any) -> None:
     others = [frame(0.0, {"Other": car(0)})]
     for verdict in (in_route(others), completion(others), outside(others, roads), yields(others)):

@@ -10,6 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.lane_below import lane_below
 from eidrive_scenario.driving.planning.levels import path_heights
 from eidrive_scenario.driving.planning.path import SPACING, PlannedPath
 from eidrive_scenario.driving.planning.planner import Planner
@@ -69,7 +70,7 @@ class RoutePlanner(Planner):
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
-        path = self._advanced_path(x, y, ego.yaw, goal)
+        path = self._advanced_path(ego, goal)
         part = slice(self._progress, self._progress + HORIZON)
         target = self._target_speed(ego, goal)
         speeds = np.minimum(path.limits[part], target)
@@ -85,13 +86,13 @@ class RoutePlanner(Planner):
 
     def points_ahead(self, ego: EgoState, goal: Goal | None) -> Array:
         """Return the points (M, 2) of `plan` without its speeds [m]."""
-        x, y, _ = ego.position.tolist()
-        path = self._advanced_path(x, y, ego.yaw, goal)
+        path = self._advanced_path(ego, goal)
         return path.points[self._progress : self._progress + HORIZON]
 
-    def _advanced_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> PlannedPath:
+    def _advanced_path(self, ego: EgoState, goal: Goal | None) -> PlannedPath:
         """Return the path of the goal after setting the progress of the vehicle on it; extended where it continues."""
-        path = self._current_path(x, y, yaw, goal)
+        x, y, _ = ego.position.tolist()
+        path = self._current_path(ego, goal)
         self._progress = path.project(x, y, self._progress)
         if (
             self._way[0] is None
@@ -100,12 +101,12 @@ class RoutePlanner(Planner):
             and not self._is_past_end(path, x, y)
         ):
             self._lane = []
-            path = self._path = self._lane_ahead(x, y, yaw)
+            path = self._path = self._lane_ahead(ego)
             self._progress = path.project(x, y)
         if not path.ends and len(path) - self._progress < 2 * HORIZON:
             behind = path.points[max(self._progress - BEHIND, 0) :]
             lap = self._way[2]
-            path = self._path = self._lane_ahead(x, y, yaw) if lap is None else _with_laps(behind, lap)
+            path = self._path = self._lane_ahead(ego) if lap is None else _with_laps(behind, lap)
             self._progress = path.project(x, y)
         return path
 
@@ -142,24 +143,24 @@ class RoutePlanner(Planner):
     def _speed_limit(self, ego: EgoState, roads: RoadNetwork) -> float:
         """Return the speed limit of the lane at the vehicle [m/s], within the limit of the vehicle."""
         x, y, _ = ego.position.tolist()
-        self._place = roads.locate_at(x, y, self._place)
+        known = self._place
+        self._place = lane_below(roads, ego) if known is None else roads.locate_at(x, y, known)
         here = self._place
         limit = None if here is None else roads.speed_limit(here.road, here.s, here.lane)
         return min(assumed_speed(limit), self.spec.max_speed)
 
-    def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> PlannedPath:
+    def _current_path(self, ego: EgoState, goal: Goal | None) -> PlannedPath:
         if self._path is not None and goal is self._goal:
             return self._path
         self._goal = goal
         way = (None, None, None) if goal is None else (goal.path, goal.waypoints, goal.lap)
         if self._path is None or not all(map(_same, way, self._way)):
             self._way, self._progress, self._lane = way, 0, []
-            self._path = self._build_path(x, y, yaw, *way)
+            self._path = self._build_path(ego, *way)
         return self._path
 
-    def _build_path(
-        self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None, lap: Array | None
-    ) -> PlannedPath:
+    def _build_path(self, ego: EgoState, path: Array | None, waypoints: Array | None, lap: Array | None) -> PlannedPath:
+        (x, y, _), yaw = ego.position.tolist(), ego.yaw
         line: Array | None = None
         if path is not None and len(path) > 1:
             _check_length(path)
@@ -168,30 +169,30 @@ class RoutePlanner(Planner):
             line = path[:, :2]
         elif waypoints is not None and len(waypoints):
             _check_length(np.vstack([[x, y, 0.0], waypoints]))
-            line = self._by_road(x, y, waypoints)
+            line = self._by_road(ego, waypoints)
             line = _curve(x, y, yaw, waypoints) if line is None else line
         if line is None:
-            return self._lane_ahead(x, y, yaw)
+            return self._lane_ahead(ego)
         try:
             return PlannedPath(line, ends=True)
         except ValueError:  # The destination is at the vehicle
             return PlannedPath(np.array([[x - math.cos(yaw), y - math.sin(yaw)], [x, y]]), ends=True)
 
-    def _by_road(self, x: float, y: float, waypoints: Array) -> Array | None:
+    def _by_road(self, ego: EgoState, waypoints: Array) -> Array | None:
         """Return the route through all waypoints; None if one of them or the vehicle is outside the road."""
         if self.roads is None:
             return None
-        places = [self.roads.locate_at(px, py) for px, py in [(x, y), *waypoints[:, :2].tolist()]]
+        places = [lane_below(self.roads, ego), *(self.roads.locate_at(x, y) for x, y in waypoints[:, :2].tolist())]
         on_road = [place for place in places if place is not None]
         if len(on_road) < len(places):
             return None
         line = self.roads.route(on_road[0], on_road[-1], via=on_road[1:-1]).polyline(SPACING)
         return np.asarray(line)[:, :2]
 
-    def _lane_ahead(self, x: float, y: float, yaw: float) -> PlannedPath:
+    def _lane_ahead(self, ego: EgoState) -> PlannedPath:
         """Return a path along the lane and its successors, extended from the last call; straight without a lane."""
         if self.roads is not None:
-            self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(x, y, yaw)
+            self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(ego)
             onward = True
             while onward and self._lane and len(self._lane) < LOOK_AHEAD:
                 more = _further(self.roads, self._lane[-1])
@@ -200,18 +201,19 @@ class RoutePlanner(Planner):
             if len(self._lane) > 1:
                 return PlannedPath(self.roads.centers(self._lane), ends=not onward)
         reach = np.array([[0.0], [float(LOOK_AHEAD)]])
-        return PlannedPath(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
+        yaw = ego.yaw
+        return PlannedPath(ego.position[:2] + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 
-    def _lane_here(self, x: float, y: float, yaw: float) -> list[LaneLocation]:
+    def _lane_here(self, ego: EgoState) -> list[LaneLocation]:
         """Return the lane at the vehicle if its driving direction is that of the vehicle."""
         if self.roads is None:
             return []
-        place = self.roads.locate_at(x, y)
+        place = lane_below(self.roads, ego)
         if place is None:
             return []
         heading = self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0).h
         direction = self.roads.driving_direction(place.road, place.lane)
-        return [place] if direction * math.cos(yaw - heading) > 0.0 else []
+        return [place] if direction * math.cos(ego.yaw - heading) > 0.0 else []
 
 
 def _further(roads: RoadNetwork, place: LaneLocation) -> list[LaneLocation]:

@@ -22,6 +22,8 @@ TIGHTER = 1.5
 """Share of the lateral acceleration up to which an obstacle is passed that was recognized late."""
 TIGHTEST = 0.6
 """Share of the length of a lateral motion in which most of it must be possible."""
+AT_OFFSET = 0.1
+"""Difference to an offset up to which the vehicle is there [m]; its control has errors of this size."""
 
 
 class Body(NamedTuple):
@@ -60,6 +62,8 @@ class LateralProfile(msgspec.Struct, frozen=True):
     side: int = 0
     uses_oncoming: bool = False
     """Whether the vehicle enters a lane of the opposite direction."""
+    passes_standing: bool = False
+    """Whether it passes objects that stand, so that its end is known beyond the horizon."""
 
     def offset(self, s: Array) -> Array:
         """Return the offsets (…) at distances (…) along the line."""
@@ -135,13 +139,18 @@ def passing(
     speed: float,
     lateral_acceleration: float,
     side: int,
+    *,
+    stands: bool = False,
 ) -> LateralProfile | None:
     """Return the motion to an offset before `obstacle` (start and end along the line) and back to 0 behind it.
 
-    The result is None if the obstacle is too near for it.
+    The result is None if the obstacle is too near for it. A vehicle at the offset, or farther aside, may be beside an
+    obstacle that `stands`: it needs no motion before it.
     """
     begin, end = obstacle
     length = change_length(value - start, speed, lateral_acceleration)
+    if stands and side * (value - start) <= AT_OFFSET:
+        begin = max(begin, s + length)
     first = max(begin - length, s)
     if begin - first < TIGHTEST * change_length(value - start, speed, TIGHTER * lateral_acceleration):
         return None

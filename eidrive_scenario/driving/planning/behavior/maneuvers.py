@@ -77,8 +77,8 @@ def passing_profiles(
     held_out = _behind_neighbor(situation, scene, settings, body)
     if held_out is not None:
         found.append(held_out)
-    blocker = _blocker(situation, scene, body.center, body.half_width)
-    if blocker is None or _queues(situation, scene, blocker):
+    blocker = _blocker(situation, scene, body)
+    if blocker is None or _queues(situation, scene, blocker, body):
         return found
     beside = situation.line.lanes_beside(situation.lanes_at(situation.s + 10.0))
     faster, overtaking = beside.faster, beside.overtaking
@@ -166,30 +166,34 @@ def _is_in_way(one: Present, half_width: float) -> bool:
     return abs(one.d) - one.half_width < half_width + one.margin
 
 
-def _blocker(situation: Situation, scene: Surroundings, center: float, half_width: float) -> Present | None:
+def _blocker(situation: Situation, scene: Surroundings, body: Body) -> Present | None:
     """Return the nearest hypothesis on the route ahead that is slower than the vehicle wants to drive."""
-    place, slower = situation.s + center, situation.wanted - SLOWER
+    place, slower = situation.s + body.center, situation.wanted - SLOWER
     found = [
         one
         for one in scene.present
         if one.s > place
         and -0.5 < one.speed < slower
         and not one.crosses
-        and _is_in_way(one, half_width)
-        and _is_passable(situation, one)
+        and _is_in_way(one, body.half_width)
+        and _is_passable(situation, one, body)
     ]
     return min(found, key=attrgetter("s"), default=None)
 
 
-def _is_passable(situation: Situation, one: Present) -> bool:
+def _is_beside(situation: Situation, one: Present, body: Body) -> bool:
+    """Return whether the vehicle is beside an object, which it is then passing, and behind which it cannot wait."""
+    return one.rear < situation.s + body.front and abs(situation.d - one.d) > one.half_width
+
+
+def _is_passable(situation: Situation, one: Present, body: Body) -> bool:
     """Return whether an object may be passed: not a crossing pedestrian, and standing for some time or moving."""
     known = situation.objects[one.owner]
-    if known.still_since is not None:
-        stands = situation.now - known.still_since
-        is_aside = abs(one.d) > ASIDE
-        waits = situation.speed < WAITING or stands >= LONG
-        return known.kind == "misc" or (stands >= PATIENCE and (is_aside or waits))
-    return known.kind not in ("pedestrian",)
+    if known.still_since is None:
+        return known.kind != "pedestrian"
+    stands = situation.now - known.still_since
+    waits = situation.speed < WAITING or stands >= LONG or _is_beside(situation, one, body)
+    return known.kind == "misc" or (stands >= PATIENCE and (abs(one.d) > ASIDE or waits))
 
 
 def _is_steady(situation: Situation, one: Present) -> bool:
@@ -199,12 +203,13 @@ def _is_steady(situation: Situation, one: Present) -> bool:
     return has_moved and known.acceleration > -NOTICEABLE
 
 
-def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool:
+def _queues(situation: Situation, scene: Surroundings, blocker: Present, body: Body) -> bool:
     """Return whether the blocker waits at a place where the vehicle stops as well, or behind another vehicle."""
     if situation.stop is not None and situation.stop.s < blocker.s + NEAR_STOP:
         return True
     known = situation.objects[blocker.owner]
-    if known.still_since is None or situation.now - known.still_since >= QUEUE_PATIENCE:
+    since = known.still_since
+    if since is None or situation.now - since >= QUEUE_PATIENCE or _is_beside(situation, blocker, body):
         return False
     return any(-0.5 < one.rear - blocker.front < QUEUE_GAP and abs(one.d - blocker.d) < 1.0 for one in scene.present)
 
@@ -245,15 +250,15 @@ def _around(
     situation: Situation, settings: BehaviorSettings, obstacle: _Obstacle, body: Body, side: int
 ) -> LateralProfile | None:
     """Return the motion past an obstacle on one side; None if that is too narrow."""
-    half_width = body.half_width
     vulnerable = any(situation.kind_of(one.owner) in VULNERABLE for one in obstacle.objects)
     clearance = settings.pedestrian_margin if vulnerable else settings.lateral_margin
     outer = max([side * one.d + one.half_width for one in obstacle.objects])
     own, every = (min(edges) for edges in zip(*(lanes.room(side) for lanes in obstacle.beside), strict=True))
-    room = every - outer - 2.0 * half_width
+    room = every - outer - 2.0 * body.half_width
     if room < (clearance + SPARE if vulnerable else min(LEAST_CLEARANCE, clearance + SPARE)):
         return None
-    value = max(outer + _beside_obstacle(room, clearance) + half_width, 0.0)
+    value = max(outer + _beside_obstacle(room, clearance) + body.half_width, 0.0)
+    stands = all(situation.objects[one.owner].still_since is not None for one in obstacle.objects)
     profile = passing(
         f"pass {situation.kind_of(obstacle.objects[0].owner)} on the {'left' if side > 0 else 'right'}",
         side * value,
@@ -262,9 +267,10 @@ def _around(
         max(situation.speed, 2.0),
         settings.lateral_acceleration,
         side,
+        stands=stands,
     )
-    if profile is not None and value + half_width > own:
-        return msgspec.structs.replace(profile, uses_oncoming=True)
+    if profile is not None and value + body.half_width > own:
+        return msgspec.structs.replace(profile, uses_oncoming=True, passes_standing=stands)
     return profile
 
 

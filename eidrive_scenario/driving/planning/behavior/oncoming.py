@@ -42,7 +42,7 @@ class OncomingTraffic:
         center   distance of the center of the vehicle along the line [m]
         held_up  whether the vehicle would pass something
         """
-        if bool(_ahead(scene, center).any()):
+        if bool(_is_oncoming(scene, 0, center).any()):
             self._last = now
         if held_up:
             self._held_up_until = now
@@ -81,20 +81,41 @@ def first_oncoming(way: Bools, s: float, scene: Surroundings) -> int:
     return int(meets.argmax()) if meets.any() else len(meets)
 
 
-def meets_oncoming(profile: LateralProfile, s: Array, times: Array, oncoming: int, hidden: tuple[float, float]) -> bool:
+def meets_oncoming(
+    profile: LateralProfile,
+    motion: tuple[Array, float],
+    times: Array,
+    oncoming: int,
+    hidden: tuple[float, float],
+    scene: Surroundings,
+) -> bool:
     """Return whether the vehicle meets oncoming traffic before it is back on its side, or does not return.
 
-    s         distances along the line (K,) of the vehicle at `times`
+    Past objects that stand it also returns after the horizon, until which all keep their last speeds.
+
+    motion    distances along the line (K,) of the vehicle at `times` [m], and its last speed [m/s]
     oncoming  index of the time from which on oncoming traffic is in its way
     hidden    place from which traffic may come unseen [m], inf without one, and its speed [m/s]
     """
+    s, own_speed = motion
     back = int(s.searchsorted(profile.places[-2]))
-    if back == len(s) or oncoming <= back:
+    if oncoming < len(s) and oncoming <= back:
+        return True
+    if back < len(s):
+        end, duration = float(s[back]), float(times[back])
+    elif profile.passes_standing and own_speed > ONCOMING_SPEED:
+        end = profile.places[-2]
+        after = (end - float(s[-1])) / own_speed
+        duration = float(times[-1]) + after
+        if bool((_is_oncoming(scene, -1, float(s[-1])) & (scene.rear[:, -1] + scene.speed[:, -1] * after < end)).any()):
+            return True
+    else:
         return True
     place, speed = hidden
-    return bool(place - speed * times[back] < s[back])
+    return bool(place - speed * duration < end)
 
 
-def _ahead(scene: Surroundings, place: float) -> Bools:
-    is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < LANES)
-    return np.asarray(is_oncoming & (scene.front[:, 0] > place))
+def _is_oncoming(scene: Surroundings, step: int, place: float) -> Bools:
+    """Return which hypotheses (N,) are oncoming traffic ahead of a place [m] at a time step."""
+    is_oncoming = (scene.speed[:, step] < -ONCOMING_SPEED) & (np.abs(scene.d[:, step]) < LANES)
+    return np.asarray(is_oncoming & (scene.front[:, step] > place))

@@ -93,7 +93,7 @@ class BehaviorPlanner(RoutePlanner):
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
-        path = self._advanced_path(x, y, ego.yaw, goal)
+        path = self._advanced_path(ego, goal)
         line = self._line_of(path, ego)
         place = self._place_on(line, x, y)
         wanted = self._target_speed(ego, goal)

@@ -23,13 +23,17 @@ def reason_of(situation: Situation, options: Options, best: int) -> tuple[str, t
     causes = options.rolled.cause[best].tolist()
     for cause in causes:
         if cause >= 0:
-            return f"{maneuver}follow {situation.describe(owners[cause])}", situation.rows_of(owners[cause])
+            verb = "stop for" if situation.approaches(owners[cause]) else "follow"
+            return f"{maneuver}{verb} {situation.describe(owners[cause])}", situation.rows_of(owners[cause])
         if cause <= WALL:
             wall = options.walls[best][WALL - cause]
             held = None if wall.owner is None else owners[wall.owner]
             return f"{maneuver}{wall.reason}", situation.rows_of(held)
-    if proposal.share < 1.0:
+    if proposal.share < 1.0 and owners:
         return f"{maneuver}slow down for traffic ahead", ()
+    if proposal.share < 1.0:
+        walls = options.walls[best]
+        return f"{maneuver}{walls[0].reason if walls else 'curve or end of route ahead'}", ()
     if LIMIT in causes and causes[0] != FREE:
         hidden = situation.hidden_at(float(options.rolled.s[best, causes.index(LIMIT) + 1]))
         if hidden:

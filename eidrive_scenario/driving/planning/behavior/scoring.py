@@ -103,7 +103,8 @@ def evaluate(
         values[row] -= SLOWER * (1.0 - proposal.share) + GENTLE * proposal.is_gentle
         if profile.uses_oncoming and switches:
             first = oncoming[proposal.profile]
-            values[row] -= RISK * meets_oncoming(profile, rolled.s[row], times, first, (hidden, wanted))
+            motion = rolled.s[row], float(rolled.speed[row, -1])
+            values[row] -= RISK * meets_oncoming(profile, motion, times, first, (hidden, wanted), scene)
         values[row] -= ASIDE * (profile.side != 0) + ONCOMING * profile.uses_oncoming + SWITCH * switches
     return Evaluation(np.array(values), collision, risk, impact, cause)
 

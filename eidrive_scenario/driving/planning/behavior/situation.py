@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
-from eidrive_scenario.driving.planning.behavior.proposals import Wall
+from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Wall
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
 
@@ -53,7 +53,15 @@ class Situation(msgspec.Struct, frozen=True):
         known = self.objects[owner]
         x, y = self.line.points[self.line.index_at(self.s)].tolist()
         distance = math.hypot(known.x - x, known.y - y)
-        return f"{known.kind} {distance:.0f} m ahead at {known.speed:.1f} m/s"
+        motion = "that approaches at" if self.approaches(owner) else "at"
+        return f"{known.kind} {distance:.0f} m ahead {motion} {known.speed:.1f} m/s"
+
+    def approaches(self, owner: int) -> bool:
+        """Return whether an object moves against the direction of the line."""
+        known = self.objects[owner]
+        _, _, heading = self.line.project(np.array([known.x]), np.array([known.y]), *self.window)
+        along = known.vx * math.cos(heading[0]) + known.vy * math.sin(heading[0])
+        return bool(along < -ONCOMING_SPEED)
 
     def hidden_at(self, s: float) -> str:
         """Return the kind of the hidden way if such ways limit the speed at a distance along the line more than curves

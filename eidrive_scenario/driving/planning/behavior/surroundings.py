@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.detections import VULNERABLE
-from eidrive_scenario.driving.planning.behavior.memory import KnownObject
+from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
@@ -178,7 +178,7 @@ def position_errors(objects: list[KnownObject], direction: Array) -> tuple[Array
 
 
 def _may_be_passed(known: KnownObject) -> bool:
-    return known.still_since is not None and known.kind not in VULNERABLE
+    return known.still_since is not None and known.kind not in ON_FOOT
 
 
 def _yields(prediction: Prediction, gives_way: Callable[[Passage], bool] | None) -> Bools:

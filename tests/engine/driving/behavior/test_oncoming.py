@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.driving.planning.behavior.lateral import LateralProfile
 from eidrive_scenario.driving.planning.behavior.oncoming import PAUSE, OncomingTraffic, first_oncoming, meets_oncoming
@@ -13,6 +14,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import inside_way
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
+UNKNOWN = math.inf
 BESIDE = LanesBeside(oncoming=3.5)
 TIMES = np.arange(0.0, 8.01, 0.25)
 PASSING = LateralProfile("pass", (0.0, 20.0, 50.0, 70.0), (0.0, 3.0, 3.0, 0.0), side=1, uses_oncoming=True)
@@ -80,9 +82,8 @@ def test_without_a_lane_of_the_opposite_direction_nothing_is_expected() -> None:
 @pytest.mark.parametrize(("start", "meets"), [(200.0, False), (100.0, True)])
 def test_meeting_before_the_return(start: float, meets: bool) -> None:
     # At 10 m/s the return begins after 5 s at 50 m; at -10 m/s an object from 100 m is there at the same time.
-    s = 10.0 * TIMES
-    oncoming = first(scene((start, 3.5, -10.0)))
-    assert meets_oncoming(PASSING, s, TIMES, oncoming, (math.inf, 10.0)) == meets
+    there = scene((start, 3.5, -10.0))
+    assert meets_oncoming(PASSING, (10.0 * TIMES, 10.0), TIMES, first(there), (math.inf, 10.0), there) == meets
 
 
 def test_oncoming_traffic_is_in_the_way_once_on_the_lane() -> None:
@@ -94,8 +95,30 @@ def test_oncoming_traffic_is_in_the_way_once_on_the_lane() -> None:
 
 @pytest.mark.parametrize(("place", "meets"), [(95.0, True), (105.0, False)])
 def test_unseen_traffic_counts_from_its_place(place: float, meets: bool) -> None:
-    assert meets_oncoming(PASSING, 10.0 * TIMES, TIMES, len(TIMES), (place, 10.0)) == meets
+    assert meets_oncoming(PASSING, (10.0 * TIMES, 10.0), TIMES, len(TIMES), (place, 10.0), scene()) == meets
 
 
 def test_maneuver_that_does_not_return_within_the_horizon_meets_traffic() -> None:
-    assert meets_oncoming(PASSING, 5.0 * TIMES, TIMES, len(TIMES), (math.inf, 10.0))
+    assert meets_oncoming(PASSING, (5.0 * TIMES, 5.0), TIMES, len(TIMES), (math.inf, 10.0), scene())
+
+
+@pytest.mark.parametrize(
+    ("place", "start", "meets"),
+    [
+        (UNKNOWN, UNKNOWN, False),
+        (155.0, UNKNOWN, False),
+        (145.0, UNKNOWN, True),
+        (UNKNOWN, 155.0, False),
+        (UNKNOWN, 145.0, True),
+    ],
+)
+def test_return_past_standing_objects_after_the_horizon(place: float, start: float, meets: bool) -> None:
+    """At 5 m/s the return begins after 10 s at 50 m; the front of traffic at -10 m/s is there from 150 m.
+
+    place  of unseen traffic [m];  start  of the front of an oncoming car [m]
+    """
+    profile = replace(PASSING, passes_standing=True)
+    there = scene((start + 2.5, 3.5, -10.0)) if math.isfinite(start) else scene()
+    motion = 5.0 * TIMES, 5.0
+    assert meets_oncoming(profile, motion, TIMES, len(TIMES), (place, 10.0), there) == meets
+    assert meets_oncoming(profile, (5.0 * TIMES, 0.0), TIMES, len(TIMES), (place, 10.0), there), "it stands"
