@@ -139,6 +139,22 @@ def test_trajectory_in_follow_mode_starts_from_the_actual_position(scene: RunSce
     assert scene(1, ("Ego", follow_points(way, "position"))).at(0.1).y == pytest.approx(-6.0)
 
 
+@pytest.mark.parametrize(
+    ("x", "y"), [(590.0, -2.0), (590.0, -60.0), (160.0, -150.0)], ids=["beyond", "beyond and beside", "far beside"]
+)
+def test_distant_vehicle_in_follow_mode_drives_to_the_trajectory_end(scene: RunScene, x: float, y: float) -> None:
+    """Ego starts in lane -1 at `x`; the trajectory is 120 m long, ends at 220 m and lies at `y`.
+
+    Within the preview of 0.5 s (10 m) or the turning circle (2 / 0.182 = 11.0 m) the vehicle has reached the end.
+    """
+    way = [(100.0, y, None), (220.0, y, None)]
+    played = scene(45, ("Ego", follow_points(way, "follow")), ego=(-1, x, 20.0), dt=0.05)
+    done = played.when("action 0", "completeState")
+    assert done is not None
+    there = played.at(done)
+    assert math.hypot(there.x - 220.0, there.y - y) < 2.0 / LARGEST_CURVATURE
+
+
 def test_feasible_bend_is_equal_in_both_modes(scene: RunScene) -> None:
     """Corners of 0.1 rad, which a polyline rounds within 4 m: 0.025 1/m."""
     points, heading = [(100.0, -2.0)], 0.0
