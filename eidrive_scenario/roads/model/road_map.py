@@ -190,13 +190,14 @@ class Connection(msgspec.Struct, frozen=True):
 
 
 class Junction(msgspec.Struct, frozen=True):
-    """Junction of type default, direct or virtual."""
+    """Junction of type default, direct or virtual. `priorities`: connecting roads, as pairs (high, low)."""
 
     id: str
     name: str
     type: str
     connections: tuple[Connection, ...]
     controllers: tuple[str, ...] = ()
+    priorities: tuple[tuple[str, str], ...] = ()
 
 
 class SignalPlace(msgspec.Struct, frozen=True):

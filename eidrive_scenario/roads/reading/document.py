@@ -207,6 +207,9 @@ def _read_junction(element: etree._Element, roads: dict[str, Road], collector: A
         type=kind,
         connections=tuple(connections),
         controllers=tuple(collector.text(controller, "id") for controller in element.iterfind("controller")),
+        priorities=tuple(
+            (collector.text(one, "high"), collector.text(one, "low")) for one in element.iterfind("priority")
+        ),
     )
 
 
