@@ -22,9 +22,9 @@ from eidrive_scenario.roads.model.road_map import (
     Road,
     RoadLink,
     RoadMap,
-    RoadObject,
     RoadType,
 )
+from eidrive_scenario.roads.model.road_objects import RoadObject
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 from eidrive_scenario.roads.reading.extent import check_extent
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
