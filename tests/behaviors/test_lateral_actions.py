@@ -287,6 +287,21 @@ def test_preempted_init_trajectory_is_no_longer_followed(run: Run) -> None:
     assert not followed[0.6]
 
 
+@pytest.mark.parametrize("target", [lane(-2), beside(-1)], ids=["absolute", "relative"])
+def test_lane_change_ends_in_its_lane_after_a_teleport_to_the_first_lane(scene: RunScene, target: str) -> None:
+    """After the teleport at 1 s to the center of lane -1, 4 m remain for the remaining 2.9 s of the transition."""
+    teleport = (
+        '<PrivateAction><TeleportAction><Position><LanePosition roadId="1" laneId="-1" s="500"/></Position>'
+        "</TeleportAction></PrivateAction>"
+    )
+    played = scene(5, ("Ego", change(target)), ("Ego", teleport, after(0.95)))
+    assert played.at(1.1).y == pytest.approx(-2.0)
+    assert played.at(2.6).y == pytest.approx(-4.0, abs=0.1)
+    done = played.when("action 0", "completeState")
+    assert done == pytest.approx(4.0)
+    assert played.at(done).y == pytest.approx(-6.0)
+
+
 @pytest.mark.parametrize("change", [False, True])
 def test_lateral_transition_continues_from_the_place_of_a_teleport(scene: RunScene, change: bool) -> None:
     """After 1 s Ego is moved to 1 m on the right of the center of its lane, y = -2 m, and continues to the left."""
