@@ -288,7 +288,7 @@ def test_preempted_init_trajectory_is_no_longer_followed(run: Run) -> None:
 
 
 @pytest.mark.parametrize("target", [lane(-2), beside(-1)], ids=["absolute", "relative"])
-def test_lane_change_ends_in_its_lane_after_a_teleport_to_the_first_lane(scene: RunScene, target: str) -> None:
+def test_lane_change_after_a_teleport_ends_in_its_target_lane(scene: RunScene, target: str) -> None:
     """After the teleport at 1 s to the center of lane -1, 4 m remain for the remaining 2.9 s of the transition."""
     teleport = (
         '<PrivateAction><TeleportAction><Position><LanePosition roadId="1" laneId="-1" s="500"/></Position>'
