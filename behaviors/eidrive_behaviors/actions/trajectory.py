@@ -8,6 +8,7 @@ from functools import partial
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_trajectory import DrivenTrajectory
+from eidrive_behaviors.actions.driven_vehicles import warn_of_missed_end
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
 from eidrive_behaviors.actions.routing import check_way
 from eidrive_scenario.api.actions import (
@@ -292,6 +293,8 @@ class FollowTrajectoryAction(ActionBehaviour):
                 motion.set_speed(speed)
         self._s = driven.place
         self.actor.set_goal(driven.goal(self.actor.goal, speed))
+        if driven.has_missed:
+            warn_of_missed_end(self)
         return Status.SUCCESS if driven.has_arrived else Status.RUNNING
 
     def _resolve_pose(self, position: model.Position) -> Pose:
