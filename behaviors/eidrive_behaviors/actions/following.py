@@ -17,6 +17,8 @@ ON_PATH = 1e-3
 """Maximum distance to the trajectory at which a vehicle counts as on it [m]."""
 PREVIEW = 0.5
 """Preview time of a vehicle that is off its trajectory [s]."""
+SEARCH_STEP = 1.0
+"""Maximum step of the search for the place of a vehicle along its trajectory [m]."""
 
 
 class RateLimitedValue:
@@ -85,8 +87,9 @@ class PathPursuit:
     def __init__(self, layout: TrajectoryCurve, s: float, pose: Pose, curvature: float, wheelbase: float) -> None:
         self.s, self.pose = s, pose
         self._layout, self._curvature, self._wheelbase = layout, curvature, wheelbase
-        start = layout.at(s)
-        self.on_path = math.hypot(start.x - pose.x, start.y - pose.y) < ON_PATH
+        self.on_path = _distance(layout.at(s), pose.x, pose.y) < ON_PATH
+        if not self.on_path and not layout.closed:
+            self.s = self._beside(pose.x, pose.y)
         self._has_joined = self.on_path
 
     def advance(self, ds: float, dt: float, *, tail_first: bool = False) -> Pose:
@@ -137,6 +140,20 @@ class PathPursuit:
         if ahead <= 0.0:
             return math.copysign(self._curvature, left)
         return min(max(2.0 * left / (dx * dx + dy * dy), -self._curvature), self._curvature)
+
+    def _beside(self, x: float, y: float) -> float:
+        """Return the first arc length from `s` on at which the trajectory is beside a position [m].
+
+        It is `s` itself for a position that is not ahead of it, and for one beyond the end.
+        """
+        layout, s = self._layout, self.s
+        while s < layout.length:
+            point, tangent = layout.at(s), layout.tangent(s)
+            ahead = math.cos(tangent) * (x - point.x) + math.sin(tangent) * (y - point.y)
+            if ahead <= ON_PATH:
+                return s
+            s += min(ahead, SEARCH_STEP)
+        return self.s
 
     def _is_beyond_end(self, x: float, y: float, near: float) -> bool:
         """Return True for a position beyond the end of an open trajectory, and farther than `near` [m] from the end.
