@@ -88,6 +88,15 @@ def test_priorities_of_the_map_precede_priority_to_the_right(own: str, other: st
     assert known.gives_way(first._replace(gives_way=True), second)
 
 
+@pytest.mark.parametrize("pair", ['high="101" low="999"', 'high="101"', ""])
+def test_priority_without_roads_is_a_warning(pair: str) -> None:
+    text = (ROADS / "four_way_junction.xodr").read_text()
+    roads = RoadNetwork.parse(text.replace("</junction>", f"<priority {pair}/></junction>"))
+    assert roads.junctions["100"].priorities == ()
+    (warning,) = roads.map_warnings
+    assert "<priority> of junction '100' has no effect" in str(warning)
+
+
 def test_priorities_of_the_map_hold_unseen_traffic() -> None:
     known = rules_with_priorities()
     street, stem = (known.passages(way("four_way_junction", *text.split()))[0] for text in ("west east", "south north"))
