@@ -287,6 +287,16 @@ def test_preempted_init_trajectory_is_no_longer_followed(run: Run) -> None:
     assert not followed[0.6]
 
 
+def test_lane_offset_relative_to_the_actor_itself_refers_to_its_start(scene: RunScene) -> None:
+    """A continuous offset of 1 m from the own position at the start is y = -1 m."""
+    offset = """<PrivateAction><LateralAction><LaneOffsetAction continuous="true">
+      <LaneOffsetActionDynamics dynamicsShape="cubic" maxLateralAcc="1"/><LaneOffsetTarget>
+      <RelativeTargetLaneOffset entityRef="Ego" value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>
+      </PrivateAction>"""
+    played = scene(8, ("Ego", offset))
+    assert [played.at(time).y for time in (4.0, 6.0, 8.0)] == pytest.approx([-1.0] * 3)
+
+
 @pytest.mark.parametrize("target", [lane(-2), beside(-1)], ids=["absolute", "relative"])
 def test_lane_change_after_a_teleport_ends_in_its_target_lane(scene: RunScene, target: str) -> None:
     """After the teleport at 1 s to the center of lane -1, 4 m remain for the remaining 2.9 s of the transition."""
