@@ -9,6 +9,7 @@ from py_trees.common import Status
 from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
 from eidrive_behaviors.actions.lane_change import STANDING
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS, infinite_if_none
+from eidrive_behaviors.actions.reference_entities import check_other_entity
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
@@ -43,6 +44,7 @@ class LateralDistanceAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Select the side."""
+        check_other_entity(self, self.action.entity_ref)
         self._rate = 0.0
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
