@@ -56,6 +56,41 @@ def test_action_stops_when_its_reference_entity_is_deleted(scene: RunScene) -> N
     assert next(c.why for c in played.changes if c.element == "action 0" and c.why) == "Other is absent"
 
 
+LIMITS = '<DynamicConstraints maxAcceleration="1" maxDeceleration="1" maxSpeed="30"/>'
+AS_FAST = private_xml(
+    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="rate" value="1"/>'
+    '<SpeedActionTarget><RelativeTargetSpeed entityRef="Other" value="2" speedTargetValueType="delta" continuous="{}"/>'
+    "</SpeedActionTarget></SpeedAction></LongitudinalAction>"
+)
+KEEP_BEHIND = private_xml(
+    '<LongitudinalAction><LongitudinalDistanceAction entityRef="Other" distance="20" continuous="{}" '
+    f'freespace="false">{LIMITS}</LongitudinalDistanceAction></LongitudinalAction>'
+)
+KEEP_ASIDE = private_xml(
+    '<LateralAction><LateralDistanceAction entityRef="Other" distance="9" continuous="{}" freespace="false">'
+    f"{LIMITS}</LateralDistanceAction></LateralAction>"
+)
+MEET = private_xml(
+    '<SynchronizeAction masterEntityRef="Other"><TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="400"/>'
+    '</TargetPositionMaster><TargetPosition><LanePosition roadId="1" laneId="-1" s="400"/></TargetPosition>'
+    "</SynchronizeAction>"
+)
+
+
+@pytest.mark.parametrize("continuous", ["true", "false"])
+@pytest.mark.parametrize("action", [AS_FAST, KEEP_BEHIND, KEEP_ASIDE, MEET], ids=["speed", "behind", "aside", "meet"])
+def test_action_relative_to_a_deleted_entity_stops(scene: RunScene, action: str, continuous: str) -> None:
+    played = scene(3, ("Ego", action.format(continuous)), ("Ego", DELETE, after(0.95)))
+    assert transitions(played, "action 0") == [(0.0, "START"), (1.1, "STOP")]
+    assert played.at(3.0).speed == played.at(2.0).speed
+
+
+def test_speed_relative_to_an_absent_entity_is_stopped_at_its_start(scene: RunScene) -> None:
+    played = scene(2, ("Ego", DELETE, after(0.45)), ("Ego", AS_FAST.format("false"), after(0.95)))
+    assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]
+    assert played.at(2.0).speed == 20.0
+
+
 def test_action_with_absent_entity_warns_at_the_end(run: Run) -> None:
     others = {"Other": (-2, 150.0, 10.0)}
     played = run(2, ("Ego", DELETE, after(0.45)), ("Other", DRIVE_TO, after(0.95)), others=others, driven=False)

@@ -7,7 +7,7 @@ import math
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
-from eidrive_behaviors.actions.reference_entities import check_other_entity
+from eidrive_behaviors.actions.reference_entities import check_other_entity, check_presence
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
 
 STIFFNESS = 0.4
@@ -45,6 +45,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         """Set the speed for the step."""
         if self.actor.driven:
             warn_without_effect(self)
+        check_presence(self, self.action.entity_ref)
         if not self.context.actors[self.action.entity_ref].present or self.actor.driven:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._gap() - self._wanted()

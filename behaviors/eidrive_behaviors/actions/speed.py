@@ -9,6 +9,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
 from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, speed_limiter
+from eidrive_behaviors.actions.reference_entities import check_presence
 from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
 
@@ -136,6 +137,7 @@ class SpeedAction(ActionBehaviour):
         else:
             assert self._relative is not None
             name = self._relative.entity_ref
+            check_presence(self, name)
             reference = self._start if name == self.actor_name else self.context.speed(name)
             speed = relative_speed(reference, self._relative.value, self._relative.speed_target_value_type)
         return math.copysign(min(abs(speed), top), speed)
