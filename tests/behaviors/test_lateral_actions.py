@@ -307,9 +307,8 @@ def test_lane_change_after_a_teleport_ends_in_its_target_lane(scene: RunScene, t
     played = scene(5, ("Ego", change(target)), ("Ego", teleport, after(0.95)))
     assert played.at(1.1).y == pytest.approx(-2.0)
     assert played.at(2.6).y == pytest.approx(-4.0, abs=0.1)
-    done = played.when("action 0", "completeState")
-    assert done == pytest.approx(4.0)
-    assert played.at(done).y == pytest.approx(-6.0)
+    assert played.when("action 0", "completeState") == pytest.approx(4.0)
+    assert played.at(4.0).y == pytest.approx(-6.0)
 
 
 @pytest.mark.parametrize("change", [False, True])
