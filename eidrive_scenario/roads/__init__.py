@@ -6,11 +6,11 @@ from eidrive_scenario.roads.model.road_map import (
     Lane,
     LaneSection,
     Road,
-    RoadObject,
     Signal,
     SignalController,
     SignalPlace,
 )
+from eidrive_scenario.roads.model.road_objects import RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import PlacedObject, outlines, placed_objects
 from eidrive_scenario.roads.route_costs import fastest, fewest_junctions, random_costs

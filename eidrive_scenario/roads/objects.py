@@ -10,8 +10,9 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads.model.location import Pose
-from eidrive_scenario.roads.model.road_map import Corner, RoadObject
+from eidrive_scenario.roads.model.road_objects import Corner, RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
+from eidrive_scenario.tolerances import EPSILON
 
 LONGEST_PART = 5.0
 """Maximum length of a part of an object that repeats without gaps, such as a barrier [m]."""
@@ -84,13 +85,14 @@ def _repeated(network: RoadNetwork, item: RoadObject) -> Iterator[PlacedObject]:
         step = min(LONGEST_PART, repeat.length) if gapless else repeat.distance
         if step <= 0.0:
             continue
-        count = max(math.ceil(repeat.length / step), 1) if gapless else math.floor(repeat.length / step) + 1
+        ratio = repeat.length / step
+        count = max(math.ceil(ratio), 1) if gapless else math.floor(ratio + EPSILON) + 1
         part = repeat.length / count if gapless else step
         for i in range(count):
             ds = (i + 0.5) * part if gapless else i * part
             share = ds / repeat.length if repeat.length > 0.0 else 0.0
-            t, width, height, z = (
-                a + (b - a) * share for a, b in (repeat.t, repeat.width, repeat.height, repeat.z_offset)
-            )
+            ends = repeat.t, repeat.width, repeat.height, repeat.z_offset, repeat.size, repeat.radius
+            t, width, height, z, length, radius = (a + (b - a) * share for a, b in ends)
+            length, width = (2.0 * radius, 2.0 * radius) if radius else (length or item.length, width or item.width)
             pose = _pose(network, item, repeat.s + ds, t, z)
-            yield PlacedObject(item, pose, part if gapless else item.length, width or item.width, height or item.height)
+            yield PlacedObject(item, pose, part if gapless else length, width, height or item.height)

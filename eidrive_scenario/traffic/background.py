@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.traffic.spawning.generators import MaintainedTraffic, TrafficGenerator
+from eidrive_scenario.traffic.spawning.generators import TrafficGenerator
 from eidrive_scenario.traffic.spawning.population import Changes, Population
 from eidrive_scenario.world.view import WorldView
 
@@ -17,8 +17,8 @@ class BackgroundTraffic:
         self.population = population
         self.fleet = population.fleet
         self.instances: list[TrafficGenerator] = []
-        self._maintained: list[MaintainedTraffic] = []
-        """All generators of a number of road users, also those that have stopped."""
+        self._generators: list[TrafficGenerator] = []
+        """All generators, also those that have stopped."""
         self._started: dict[str, int] = {}
         self._begun = False
 
@@ -35,8 +35,7 @@ class BackgroundTraffic:
     def start(self, instance: TrafficGenerator) -> None:
         """Start a generator. It takes effect from the next step on."""
         self.instances.append(instance)
-        if isinstance(instance, MaintainedTraffic):
-            self._maintained.append(instance)
+        self._generators.append(instance)
         self._begun = True
 
     def stop(self, name: str | None) -> None:
@@ -46,8 +45,8 @@ class BackgroundTraffic:
                 instance.active = False
 
     def shortages(self) -> Iterator[Diagnostic]:
-        """Yield a warning for each generator whose road users were never complete so far."""
-        for instance in self._maintained:
+        """Yield a warning for each generator whose road users were never complete so far, or had no suitable lane."""
+        for instance in self._generators:
             if (shortage := instance.shortage) is not None:
                 yield shortage
 

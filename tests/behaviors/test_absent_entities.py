@@ -56,6 +56,41 @@ def test_action_stops_when_its_reference_entity_is_deleted(scene: RunScene) -> N
     assert next(c.why for c in played.changes if c.element == "action 0" and c.why) == "Other is absent"
 
 
+LIMITS = '<DynamicConstraints maxAcceleration="1" maxDeceleration="1" maxSpeed="30"/>'
+AS_FAST = private_xml(
+    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="rate" value="1"/>'
+    '<SpeedActionTarget><RelativeTargetSpeed entityRef="Other" value="2" speedTargetValueType="delta" continuous="{}"/>'
+    "</SpeedActionTarget></SpeedAction></LongitudinalAction>"
+)
+KEEP_BEHIND = private_xml(
+    '<LongitudinalAction><LongitudinalDistanceAction entityRef="Other" distance="20" continuous="{}" '
+    f'freespace="false">{LIMITS}</LongitudinalDistanceAction></LongitudinalAction>'
+)
+KEEP_ASIDE = private_xml(
+    '<LateralAction><LateralDistanceAction entityRef="Other" distance="9" continuous="{}" freespace="false">'
+    f"{LIMITS}</LateralDistanceAction></LateralAction>"
+)
+MEET = private_xml(
+    '<SynchronizeAction masterEntityRef="Other"><TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="400"/>'
+    '</TargetPositionMaster><TargetPosition><LanePosition roadId="1" laneId="-1" s="400"/></TargetPosition>'
+    "</SynchronizeAction>"
+)
+
+
+@pytest.mark.parametrize("continuous", ["true", "false"])
+@pytest.mark.parametrize("action", [AS_FAST, KEEP_BEHIND, KEEP_ASIDE, MEET], ids=["speed", "behind", "aside", "meet"])
+def test_action_relative_to_a_deleted_entity_stops(scene: RunScene, action: str, continuous: str) -> None:
+    played = scene(3, ("Ego", action.format(continuous)), ("Ego", DELETE, after(0.95)))
+    assert transitions(played, "action 0") == [(0.0, "START"), (1.1, "STOP")]
+    assert played.at(3.0).speed == played.at(2.0).speed
+
+
+def test_speed_relative_to_an_absent_entity_is_stopped_at_its_start(scene: RunScene) -> None:
+    played = scene(2, ("Ego", DELETE, after(0.45)), ("Ego", AS_FAST.format("false"), after(0.95)))
+    assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]
+    assert played.at(2.0).speed == 20.0
+
+
 def test_action_with_absent_entity_warns_at_the_end(run: Run) -> None:
     others = {"Other": (-2, 150.0, 10.0)}
     played = run(2, ("Ego", DELETE, after(0.45)), ("Other", DRIVE_TO, after(0.95)), others=others, driven=False)
@@ -65,7 +100,7 @@ def test_action_with_absent_entity_warns_at_the_end(run: Run) -> None:
 
 @pytest.mark.element("AddEntityAction", "DeleteEntityAction")
 def test_entity_deleted_and_added_at_one_instant_is_moved(run: Run) -> None:
-    """After deletion and addition in one event, Other is at its new position in the next view, as after a teleport."""
+    """After deletion and addition in one event, Other stands at its new position from the next view on."""
     back = global_xml(
         '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
         "</Position></AddEntityAction></EntityAction>"
@@ -73,7 +108,7 @@ def test_entity_deleted_and_added_at_one_instant_is_moved(run: Run) -> None:
     others = {"Other": (-2, 150.0, 10.0)}
     both = (("Ego", DELETE, after(0.475)), ("Ego", back, after(0.475)))
     x = run(1, *both, others=others, driven=False).x("Other")
-    assert x[10:13] == pytest.approx([155.0, 300.0, 300.5])
+    assert x[10:13] == pytest.approx([155.0, 300.0, 300.0])
 
 
 SPEED_UP = speed_xml(20, 1)
@@ -105,7 +140,7 @@ def test_action_of_absent_entity_has_no_effect(scene: RunScene, action: str) -> 
     assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]
     assert next(c.why for c in played.changes if c.element == "action 1" and c.why) == "Other is absent"
     assert (played.at(2.2, "Other").x, played.at(2.2, "Other").y) == (300.0, -2.0)
-    assert played.at(3.0, "Other").speed == 10.0
+    assert played.at(3.0, "Other").speed == 0.0
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["enters first", "acts first"])
@@ -113,13 +148,23 @@ def test_action_of_absent_entity_has_no_effect(scene: RunScene, action: str) -> 
 def test_action_of_entity_added_at_the_same_instant_is_performed(
     scene: RunScene, order: tuple[int, int], action: str
 ) -> None:
-    """Triggers that hold at one instant have no order, nor do their actions."""
+    """Triggers that hold at one instant have no order, nor do their actions. An added entity stands, so that it moves
+    sideways once it has a speed.
+    """
     both = (("Ego", BACK, after(0.95)), ("Other", action, after(0.95)))
-    played = scene(4, ("Ego", DELETE, after(0.45)), *(both[number] for number in order))
+    more = (("Other", speed_xml(10), after(1.25)),) if action == TO_THE_SIDE else ()
+    played = scene(4, ("Ego", DELETE, after(0.45)), *(both[number] for number in order), *more)
     ended = [name for _, name in transitions(played, f"action {1 + order.index(1)}")]
     assert ended == ["START", "END"]
     there = played.at(4.0, "Other")
     assert (there.speed, there.y) == ((20.0, -2.0) if action == SPEED_UP else (10.0, -1.0))
+
+
+def test_entity_added_again_stands_at_its_position(scene: RunScene) -> None:
+    """AddEntityAction has a position only: the speed is not that before the deletion."""
+    played = scene(3, ("Other", DRIVE_TO), ("Ego", DELETE, after(0.95)), ("Ego", BACK, after(1.95)))
+    assert {played.at(time, "Other").x for time in (2.1, 2.5, 3.0)} == {300.0}
+    assert played.at(3.0, "Other").speed == 0.0
 
 
 def test_driven_ego_is_deleted_and_added_again(run: Run) -> None:

@@ -104,3 +104,22 @@ def test_alks_with_invalid_property_is_rejected(scene: RunScene) -> None:
         scene(1, cruise=dict(aebTTC="soon"), controller_model="alks")
     with pytest.raises(ScenarioError, match=r"invalid property fullStop \(got 'ja'; expected true or false\)"):
         scene(1, cruise=dict(fullStop="ja"), controller_model="alks")
+
+
+@pytest.mark.parametrize("cruise", ["true", "false"])
+@pytest.mark.parametrize("speed", [20.0, 36.0])
+@pytest.mark.parametrize("model", ["RSS", "FSM"])
+def test_alks_stops_before_standing_car_outside_esmini_range(
+    scene: RunScene, model: str, speed: float, cruise: str
+) -> None:
+    """The safe distances of both models contain the stopping distance at their deceleration (69 m and 194 m by FSM)."""
+    played = scene(
+        25,
+        ("Ego", ON),
+        cruise=dict(model=model, cruise=cruise),
+        controller_model="alks",
+        ego=(-1, 100.0, speed),
+        other=(-1, 400.0, 0.0),
+        dt=0.1,
+    )
+    assert played.at(25).x < 400.0 - 5.0

@@ -139,6 +139,53 @@ def test_trajectory_in_follow_mode_starts_from_the_actual_position(scene: RunSce
     assert scene(1, ("Ego", follow_points(way, "position"))).at(0.1).y == pytest.approx(-6.0)
 
 
+@pytest.mark.parametrize(
+    ("x", "y"), [(590.0, -2.0), (590.0, -60.0), (160.0, -150.0)], ids=["beyond", "beyond and beside", "far beside"]
+)
+def test_distant_vehicle_in_follow_mode_drives_to_the_trajectory_end(scene: RunScene, x: float, y: float) -> None:
+    """Ego starts in lane -1 at `x`; the trajectory is 120 m long, ends at 220 m and lies at `y`.
+
+    Within the preview of 0.5 s (10 m) or the turning circle (2 / 0.182 = 11.0 m) the vehicle has reached the end.
+    """
+    way = [(100.0, y, None), (220.0, y, None)]
+    played = scene(45, ("Ego", follow_points(way, "follow")), ego=(-1, x, 20.0), dt=0.05)
+    done = played.when("action 0", "completeState")
+    assert done is not None
+    there = played.at(done)
+    assert math.hypot(there.x - 220.0, there.y - y) < 2.0 / LARGEST_CURVATURE
+
+
+ABSOLUTE = '<Timing domainAbsoluteRelative="absolute" offset="{}" scale="1"/>'
+
+
+def test_late_vehicle_on_its_trajectory_catches_up_within_its_performance(scene: RunScene) -> None:
+    """At 0 s it should be at 160 m. It gains 10 m/s per second, then loses as much: 60 m in 2 √(60 / 10) = 4.9 s."""
+    way = [(100.0, -2.0, 0.0), (400.0, -2.0, 15.0)]
+    played = scene(6, ("Ego", follow_points(way, "follow", ABSOLUTE.format(-3))), dt=0.05)
+    speeds = [row["Ego"].speed for row in played.rows]
+    assert all(abs(after - before) < 10.0 * 0.05 + 1e-6 for before, after in pairwise(speeds))
+    assert max(speeds) == pytest.approx(20.0 + 10.0 * math.sqrt(6.0), abs=0.5)
+    assert played.at(4.5).x < 160.0 + 20.0 * 4.5 - 0.5
+    assert played.at(5.5).x == pytest.approx(160.0 + 20.0 * 5.5, abs=0.1)
+
+
+def test_vehicle_beside_the_curve_ahead_of_its_start_does_not_turn_back(scene: RunScene) -> None:
+    played = scene(4, ("Ego", follow_points([(60.0, -2.0, None), (400.0, -2.0, None)], "follow")), dt=0.05)
+    assert {row["Ego"].y for row in played.rows} == {-2.0}
+    assert played.at(4).x == pytest.approx(180.0)
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+def test_trajectory_whose_times_have_passed_ends_at_its_end(scene: RunScene, mode: str) -> None:
+    """Its times end 14 s before the action starts. In the mode `position` the first step is 1 m beyond the end."""
+    way = [(100.0, -2.0, 0.0), (220.0, -2.0, 6.0)]
+    played = scene(10, ("Ego", follow_points(way, mode, ABSOLUTE.format(-20))), dt=0.05)
+    done = played.when("action 0", "completeState")
+    assert done is not None
+    assert 219.9 <= played.at(done).x <= 222.5
+    assert max(row["Ego"].speed for row in played.rows) < 70.0
+
+
 def test_feasible_bend_is_equal_in_both_modes(scene: RunScene) -> None:
     """Corners of 0.1 rad, which a polyline rounds within 4 m: 0.025 1/m."""
     points, heading = [(100.0, -2.0)], 0.0

@@ -287,6 +287,30 @@ def test_preempted_init_trajectory_is_no_longer_followed(run: Run) -> None:
     assert not followed[0.6]
 
 
+def test_lane_offset_relative_to_the_actor_itself_refers_to_its_start(scene: RunScene) -> None:
+    """A continuous offset of 1 m from the own position at the start is y = -1 m."""
+    offset = """<PrivateAction><LateralAction><LaneOffsetAction continuous="true">
+      <LaneOffsetActionDynamics dynamicsShape="cubic" maxLateralAcc="1"/><LaneOffsetTarget>
+      <RelativeTargetLaneOffset entityRef="Ego" value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>
+      </PrivateAction>"""
+    played = scene(8, ("Ego", offset))
+    assert [played.at(time).y for time in (4.0, 6.0, 8.0)] == pytest.approx([-1.0] * 3)
+
+
+@pytest.mark.parametrize("target", [lane(-2), beside(-1)], ids=["absolute", "relative"])
+def test_lane_change_after_a_teleport_ends_in_its_target_lane(scene: RunScene, target: str) -> None:
+    """After the teleport at 1 s to the center of lane -1, 4 m remain for the remaining 2.9 s of the transition."""
+    teleport = (
+        '<PrivateAction><TeleportAction><Position><LanePosition roadId="1" laneId="-1" s="500"/></Position>'
+        "</TeleportAction></PrivateAction>"
+    )
+    played = scene(5, ("Ego", change(target)), ("Ego", teleport, after(0.95)))
+    assert played.at(1.1).y == pytest.approx(-2.0)
+    assert played.at(2.6).y == pytest.approx(-4.0, abs=0.1)
+    assert played.when("action 0", "completeState") == pytest.approx(4.0)
+    assert played.at(4.0).y == pytest.approx(-6.0)
+
+
 @pytest.mark.parametrize("change", [False, True])
 def test_lateral_transition_continues_from_the_place_of_a_teleport(scene: RunScene, change: bool) -> None:
     """After 1 s Ego is moved to 1 m on the right of the center of its lane, y = -2 m, and continues to the left."""

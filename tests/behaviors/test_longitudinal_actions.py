@@ -92,6 +92,19 @@ def test_speed_action_continuous_follows_until_it_is_preempted(scene: RunScene) 
     assert played.at(3.1).speed == 3.0
 
 
+@pytest.mark.parametrize(("dimension", "value"), [("time", 2.0), ("rate", 2.5), ("distance", 45.0)])
+@pytest.mark.parametrize(("kind", "amount"), [("delta", 5.0), ("factor", 1.25)])
+@pytest.mark.parametrize("continuous", [False, True])
+def test_speed_relative_to_the_actor_itself_refers_to_its_start(
+    scene: RunScene, dimension: str, value: float, kind: str, amount: float, continuous: bool
+) -> None:
+    """From 20 to 25 m/s in 2 s, at 2.5 m/s², or over 45 m at a mean of 22.5 m/s."""
+    target = relative(amount, kind, continuous).replace("Other", "Ego")
+    played = scene(3, ("Ego", speed(target, "linear", dimension, value)))
+    assert [played.at(time).speed for time in (1.0, 2.0, 3.0)] == pytest.approx([22.5, 25.0, 25.0])
+    assert played.when("action 0", "completeState") == (None if continuous else pytest.approx(2.0))
+
+
 @pytest.mark.parametrize(
     ("start", "target", "expected"), [(10, 20, 4.0), (10, 10, 0.0), (20, 0, 6.0), (-10, 10, 2 * 30 / 10 + 2 * 30 / 10)]
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recorded_scene import RunScene
 from storyboard_xml import global_xml, private_xml
-from street_scene import after
+from street_scene import NOTHING, after
 
 from eidrive_scenario.api.actions import CustomCommand, LightState, Override, Visibility
 from eidrive_scenario.errors import ScenarioError
@@ -131,6 +131,18 @@ def test_parameter_set_and_modify_apply_to_conditions(scene: RunScene) -> None:
         *(("Ego", nothing, seen.format(value)) for value in (2, 7, 21, 20)),
     )
     assert [played.when(f"event {n}", "runningState") for n in (3, 4, 5, 6)] == pytest.approx([0.0, 0.2, 0.4, 0.6])
+
+
+def test_variable_beyond_all_numbers_remains_a_number(scene: RunScene) -> None:
+    """In the notation of XML infinity is INF; as a text it would be below "a"."""
+    change = '<VariableAction variableRef="Mood">{}</VariableAction>'
+    rule = '<ModifyAction><Rule><MultiplyByValue value="-1e9"/></Rule></ModifyAction>'
+    seen = '<ByValueCondition><VariableCondition variableRef="Mood" rule="lessThan" value="-1e300"/></ByValueCondition>'
+    steps = [("Ego", global_xml(change.format('<SetAction value="1e305"/>')), after(0.15))]
+    steps += [("Ego", global_xml(change.format(rule)), after(0.35))]
+    played = scene(1, *steps, ("Ego", NOTHING, seen))
+    assert played.when("event 2", "runningState") == pytest.approx(0.4)
+    assert "variable Mood = -INF" in played.why("event 2")
 
 
 def test_variable_modify_of_text_is_rejected(scene: RunScene) -> None:

@@ -14,6 +14,7 @@ from storyboard_xml import by_entity_xml, speed_xml
 from street_scene import street
 from traffic_scene import (
     PEDESTRIAN,
+    VEHICLE,
     area,
     at_time,
     crowd,
@@ -46,6 +47,15 @@ def test_swarm_in_init_is_present_after_the_first_step(run: Run) -> None:
     assert not [contact for frame in played.frames for contact in frame.view.contacts]
     moved = {name: played.frames[40].view.row(name) for name in crowd(played, 2.0)}
     assert min(played.frames[40].view.speed[row] for row in moved.values()) > 5.0
+
+
+def test_source_continues_with_vehicles_where_pedestrians_have_no_sidewalk(run: Run) -> None:
+    """A vehicle every 2 s from 0 s on; the pedestrians of the mix are replaced, which is a warning."""
+    mix = distribution((1.0, VEHICLE.format(20)), (1.0, PEDESTRIAN))
+    played = run(4.5, driven=False, ego=(1, 900.0, 0.0), globally=traffic(source(0.5, 300, more=mix)))
+    assert len(crowd(played, 4.4)) == 3
+    (warning,) = [text for text in played.result.warnings if "traffic 'crowd'" in text]
+    assert "no lane at the source is suitable for: pedestrian" in warning
 
 
 @pytest.mark.parametrize("continuous", ["true", "false"])

@@ -71,6 +71,14 @@ def test_trajectory_of_driven_vehicle_ends_at_its_end(run: Run) -> None:
     assert row(played, ended, "Ego")[0] == pytest.approx(219.0, abs=1.5)
 
 
+def test_trajectory_behind_a_driven_vehicle_does_not_end_and_warns(run: Run) -> None:
+    """Ego starts 370 m beyond the end of the trajectory, and driving stacks do not turn around."""
+    played = run(1.0, ("Ego", follow(STRAIGHT), after(0.25)), ego=(-1, 590.0, 10.0))
+    assert ends_of_action(played) == pytest.approx([1.0]), "with the run"
+    (warning,) = [text for text in played.result.warnings if "FollowTrajectoryAction" in text]
+    assert "the action does not end: 'Ego' passes the end of the trajectory at a distance" in warning
+
+
 def test_trajectory_that_returns_to_its_start_is_driven_to_its_end(run: Run) -> None:
     """A circle as an open polyline: its end is its start."""
     circle = [(100.0 + 30.0 * math.sin(a), 28.0 - 30.0 * math.cos(a)) for a in np.linspace(0.0, math.tau, 73)]

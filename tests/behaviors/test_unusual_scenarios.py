@@ -103,10 +103,28 @@ def test_traveled_distance_excludes_the_teleport_to_a_trajectory(run: Run, timin
 
 
 def test_longitudinal_distance_is_limited_by_the_maximum_speed(run: Run) -> None:
-    """A time gap to the actor itself is never reached; the Performance of the car is limited to 70 m/s."""
+    """A car stands 800 m ahead; the Performance of Ego is limited to 70 m/s."""
     gap = private_xml(
-        '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="true" freespace="false" '
+        '<LongitudinalAction><LongitudinalDistanceAction entityRef="Far" continuous="true" freespace="false" '
         'timeGap="10"><DynamicConstraints maxAcceleration="100"/></LongitudinalDistanceAction></LongitudinalAction>'
     )
-    played = run(4, ("Ego", gap), driven=False)
+    played = run(4, ("Ego", gap), driven=False, others={"Far": (-1, 900.0, 0.0)})
     assert max(map(abs, played.of("Ego", "speed"))) == pytest.approx(70.0)
+
+
+TO_ITSELF = {
+    "lateral distance": '<LateralAction><LateralDistanceAction entityRef="Ego" distance="3" continuous="true" '
+    'freespace="false"/></LateralAction>',
+    "longitudinal distance": '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="20" '
+    'continuous="true" freespace="false"/></LongitudinalAction>',
+    "synchronize": '<SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster><LanePosition roadId="1" '
+    'laneId="-1" s="200"/></TargetPositionMaster><TargetPosition><LanePosition roadId="1" laneId="-1" s="250"/>'
+    "</TargetPosition>"
+    "</SynchronizeAction>",
+}
+
+
+@pytest.mark.parametrize("action", TO_ITSELF.values(), ids=TO_ITSELF.keys())
+def test_distance_of_an_actor_to_itself_is_rejected_with_its_line(run: Run, action: str) -> None:
+    with pytest.raises(InputError, match=r"scene\.xosc:\d+: .*the reference entity is the actor itself \(got 'Ego'"):
+        run(1, ("Ego", private_xml(action)), driven=False)

@@ -33,9 +33,13 @@ def test_parameter_and_user_defined_value_conditions(scene: RunScene) -> None:
         ("INF", "greaterThan", "1e300", True),
         ("a", "lessOrEqual", "a", True),
         (None, "notEqualTo", "a", False),
+        ("2026-01-01T12:00:00+10:00", "lessThan", "2026-01-01T03:00:00Z", True),
+        ("2026-01-01T12:00:00Z", "equalTo", "2026-01-01T13:00:00.0+01:00", True),
+        ("2026-01-01T12:00:00", "equalTo", "2026-01-01T12:00:00.000", True),
+        ("2026-13-01T12:00:00", "greaterThan", "2026-01-01T12:00:00", True),
     ],
 )
-def test_satisfies_compares_numbers_if_both_texts_are_numbers(
+def test_satisfies_compares_numbers_and_instants_if_both_texts_are_such(
     text: str | None, rule: str, limit: str, expected: bool
 ) -> None:
     assert satisfies(text, model.Rule(rule), limit) is expected

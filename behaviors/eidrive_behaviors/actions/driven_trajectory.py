@@ -13,6 +13,8 @@ from eidrive_scenario.api.common import Array, Pose
 
 ARRIVED = 2.0
 """Maximum distance to the end along the trajectory at which a driven vehicle has arrived [m]."""
+MISSED = 10.0
+"""Minimum distance of a driven vehicle from the end, once it is beside or beyond it, at which it has missed it [m]."""
 
 
 class DrivenTrajectory:
@@ -23,6 +25,7 @@ class DrivenTrajectory:
 
     def __init__(self, layout: TrajectoryCurve, place: float) -> None:
         self.place = place
+        self._away = 0.0
         self._layout = layout
         self._path = _points(layout, place)
         self._lap = _points(layout, 0.0) if layout.closed else None
@@ -32,11 +35,22 @@ class DrivenTrajectory:
         layout = self._layout
         at = layout.track(pose.x, pose.y, self.place)
         self.place = at if layout.closed else min(max(at, 0.0), layout.length)
+        end = layout.at(layout.length)
+        self._away = math.hypot(pose.x - end.x, pose.y - end.y)
         return at
 
     @property
     def has_arrived(self) -> bool:
         """Whether the vehicle is at the end; False for a closed trajectory, which is driven in laps."""
+        return self._has_passed and self._away < MISSED
+
+    @property
+    def has_missed(self) -> bool:
+        """Whether the vehicle is beside or beyond the end, but not at it."""
+        return self._has_passed and self._away >= MISSED
+
+    @property
+    def _has_passed(self) -> bool:
         return not self._layout.closed and self._layout.length - self.place <= ARRIVED
 
     def goal(self, before: Goal | None, speed: float | None) -> Goal:

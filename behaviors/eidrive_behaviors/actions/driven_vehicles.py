@@ -17,3 +17,10 @@ def warn_of_reverse(behaviour: ActionBehaviour, speed: float) -> None:
         what = f"{behaviour.actor.name!r} stops instead of reversing: a driving stack drives forwards only"
         hint = "drive it in reverse by the storyboard, without a driving stack"
         behaviour.context.warn(*behaviour.error(what, hint).diagnostics)
+
+
+def warn_of_missed_end(behaviour: ActionBehaviour) -> None:
+    """Add a warning to the result: the actor has passed the end of its trajectory at a distance."""
+    what = f"the action does not end: {behaviour.actor.name!r} passes the end of the trajectory at a distance"
+    hint = "start before the trajectory, as driving stacks do not turn around"
+    behaviour.context.warn(*behaviour.error(what, hint).diagnostics)

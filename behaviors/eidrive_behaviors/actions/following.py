@@ -17,6 +17,8 @@ ON_PATH = 1e-3
 """Maximum distance to the trajectory at which a vehicle counts as on it [m]."""
 PREVIEW = 0.5
 """Preview time of a vehicle that is off its trajectory [s]."""
+SEARCH_STEP = 1.0
+"""Maximum step of the search for the place of a vehicle along its trajectory [m]."""
 
 
 class RateLimitedValue:
@@ -75,7 +77,7 @@ class PathPursuit:
     """Motion of a vehicle along a trajectory: on it while the wheels can turn far enough, else by pursuit.
 
     Off the trajectory the vehicle steers toward a preview point on it and turns about its rear axle (pure pursuit; R.
-    Coulter, CMU-RI-TR-92-01, 1992).
+    Coulter, CMU-RI-TR-92-01, 1992). Until it has joined the trajectory it cannot pass its end from afar.
 
     s, pose    covered arc length [m], and pose of the reference point
     curvature  maximum curvature that the wheels allow [1/m]
@@ -85,8 +87,10 @@ class PathPursuit:
     def __init__(self, layout: TrajectoryCurve, s: float, pose: Pose, curvature: float, wheelbase: float) -> None:
         self.s, self.pose = s, pose
         self._layout, self._curvature, self._wheelbase = layout, curvature, wheelbase
-        start = layout.at(s)
-        self.on_path = math.hypot(start.x - pose.x, start.y - pose.y) < ON_PATH
+        self.on_path = _distance(layout.at(s), pose.x, pose.y) < ON_PATH
+        if not self.on_path and not layout.closed:
+            self.s = self._beside(pose.x, pose.y)
+        self._has_joined = self.on_path
 
     def advance(self, ds: float, dt: float, *, tail_first: bool = False) -> Pose:
         """Return the pose after `ds` meters of the trajectory (backwards if negative), driven within dt.
@@ -103,22 +107,23 @@ class PathPursuit:
         back = math.pi if (sense < 0.0) != tail_first else 0.0
         x, y, _, h, _, _ = self.pose
         h += back
-        curvature = self._curvature_to(
-            self._layout.extended(self.s + sense * max(self._wheelbase, PREVIEW * way / dt)), h
-        )
+        preview = max(self._wheelbase, PREVIEW * way / dt)
+        near = max(preview, 2.0 / self._curvature)
+        self._has_joined = self._has_joined or _distance(self._layout.at(self.s), x, y) <= near
+        curvature = self._curvature_to(self._layout.extended(self.s + sense * preview), h)
         middle, h = h + 0.5 * curvature * way, wrap_angle(h + curvature * way)
         x, y = x + way * math.cos(middle), y + way * math.sin(middle)
         h = wrap_angle(h - back)
-        self.s = self._project(x, y, ds)
+        if self._has_joined or not self._is_beyond_end(x, y, near):
+            self.s = self._project(x, y, ds)
         goal = self._goal(self.s, tail_first)
-        near = math.hypot(goal.x - x, goal.y - y) < ON_PATH
-        self.on_path = near and abs(wrap_angle(goal.h - h)) <= self._curvature * way
+        self.on_path = _distance(goal, x, y) < ON_PATH and abs(wrap_angle(goal.h - h)) <= self._curvature * way
         self.pose = goal if self.on_path else Pose(x, y, goal.z, h, goal.p, goal.r)
         return self.pose
 
     def put(self, s: float, pose: Pose) -> None:
         """Set the vehicle onto the trajectory."""
-        self.s, self.pose, self.on_path = s, pose, True
+        self.s, self.pose, self.on_path, self._has_joined = s, pose, True, True
 
     def _goal(self, s: float, tail_first: bool) -> Pose:
         pose = self._layout.extended(s)
@@ -136,6 +141,31 @@ class PathPursuit:
             return math.copysign(self._curvature, left)
         return min(max(2.0 * left / (dx * dx + dy * dy), -self._curvature), self._curvature)
 
+    def _beside(self, x: float, y: float) -> float:
+        """Return the first arc length from `s` on at which the trajectory is beside a position [m].
+
+        It is `s` itself for a position that is not ahead of it, and for one beyond the end.
+        """
+        layout, s = self._layout, self.s
+        while s < layout.length:
+            point, tangent = layout.at(s), layout.tangent(s)
+            ahead = math.cos(tangent) * (x - point.x) + math.sin(tangent) * (y - point.y)
+            if ahead <= ON_PATH:
+                return s
+            s += min(ahead, SEARCH_STEP)
+        return self.s
+
+    def _is_beyond_end(self, x: float, y: float, near: float) -> bool:
+        """Return True for a position beyond the end of an open trajectory, and farther than `near` [m] from the end.
+
+        The end is within reach if it is nearer than the preview point or the diameter of the turning circle, as no
+        steering angle leads to a point inside this circle.
+        """
+        layout = self._layout
+        if layout.closed or _distance(layout.at(layout.length), x, y) <= near:
+            return False
+        return layout.project(x, y)[0] >= layout.length
+
     def _project(self, x: float, y: float, ds: float) -> float:
         """Return the arc length of the point of the trajectory nearest to a position [m].
 
@@ -147,6 +177,11 @@ class PathPursuit:
             s += math.cos(tangent) * (x - goal.x) + math.sin(tangent) * (y - goal.y)
             s = min(max(s, low), high)
         return s
+
+
+def _distance(pose: Pose, x: float, y: float) -> float:
+    """Return the horizontal distance of a position from a pose [m]."""
+    return math.hypot(pose.x - x, pose.y - y)
 
 
 def is_follow_mode(dynamics: model.TransitionDynamics) -> bool:

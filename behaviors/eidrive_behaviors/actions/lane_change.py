@@ -90,6 +90,7 @@ class LaneChangeAction(ActionBehaviour):
         self._transition = self._build_transition(start, target)
         self._path = None
         self._offset = start
+        self._road, self._teleports = here.road, self.actor.motion.teleports
         if is_follow_mode(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
             sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
             self._limited_offset = RateLimitedValue(start, sideways, up=math.inf, down=math.inf)
@@ -126,9 +127,14 @@ class LaneChangeAction(ActionBehaviour):
 
     def _switch_reference_lane(self) -> None:
         """Continue from the new offset after a teleport, or after the neighbor of an ended lane became the target."""
-        here, transition = self.actor.motion.location, self._transition
+        motion, transition = self.actor.motion, self._transition
+        here = motion.location
         if here is None:
             return
+        if motion.teleports != self._teleports:
+            self._teleports = motion.teleports
+            if self._has_target_lane(here):
+                here = motion.set_reference_lane(self._lane) or here
         offset = here.offset * self._roads.driving_direction(here.road, here.lane)
         if abs(offset - self._offset) <= SHIFTED:
             return
@@ -137,6 +143,11 @@ class LaneChangeAction(ActionBehaviour):
         if self._limited_offset is not None:
             self._limited_offset = RateLimitedValue(offset, self._limited_offset.rate, up=math.inf, down=math.inf)
         self._offset = offset
+
+    def _has_target_lane(self, here: LaneLocation) -> bool:
+        """Whether the target lane exists beside a location; ids of a relative target refer to the first road only."""
+        is_known = here.road == self._road or self.action.lane_change_target.absolute_target_lane is not None
+        return is_known and self._lane in self._roads.lane_ids(here.road, here.s)
 
     def _next_offset(self, way: float) -> float:
         transition = self._transition

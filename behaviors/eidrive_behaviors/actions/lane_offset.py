@@ -65,8 +65,9 @@ class LaneOffsetAction(ActionBehaviour):
         transition, speed, dt = self._transition, self.actor.motion.speed, self.context.dt
         if transition.extent > 0.0 and abs(speed) < STANDING:
             return Status.RUNNING
-        is_relative = self.action.lane_offset_target.relative_target_lane_offset is not None
-        if transition.done and self.action.continuous and is_relative:
+        relative = self.action.lane_offset_target.relative_target_lane_offset
+        follows = relative is not None and relative.entity_ref != self.actor_name
+        if transition.done and self.action.continuous and follows:
             transition.target = self._target(here) * self._way(here)
         offset, most = transition.advance(dt), STEEPEST * abs(speed) * dt
         steep = transition.extent > 0.0 and abs(offset - self._offset) > most

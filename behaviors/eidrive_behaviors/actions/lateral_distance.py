@@ -9,6 +9,7 @@ from py_trees.common import Status
 from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
 from eidrive_behaviors.actions.lane_change import STANDING
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS, infinite_if_none
+from eidrive_behaviors.actions.reference_entities import check_other_entity, check_presence
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
@@ -43,6 +44,7 @@ class LateralDistanceAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Select the side."""
+        check_other_entity(self, self.action.entity_ref)
         self._rate = 0.0
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
@@ -62,6 +64,7 @@ class LateralDistanceAction(ActionBehaviour):
         here, roads = motion.location, self.context.roads
         if self.actor.driven:
             warn_without_effect(self)
+        check_presence(self, self.action.entity_ref)
         if self.actor.driven or self.action.entity_ref not in self.context.view or here is None or roads is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._side * self._wanted_gap() + self._lateral_gap()

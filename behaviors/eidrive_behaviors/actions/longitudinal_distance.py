@@ -7,6 +7,7 @@ import math
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
+from eidrive_behaviors.actions.reference_entities import check_other_entity, check_presence
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
 
 STIFFNESS = 0.4
@@ -32,6 +33,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Reset the acceleration and select the side of the other entity."""
+        check_other_entity(self, self.action.entity_ref)
         self._acceleration = 0.0
         displacement = self.action.displacement
         self._side = -1.0 if displacement is model.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY else 1.0
@@ -43,6 +45,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         """Set the speed for the step."""
         if self.actor.driven:
             warn_without_effect(self)
+        check_presence(self, self.action.entity_ref)
         if not self.context.actors[self.action.entity_ref].present or self.actor.driven:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._gap() - self._wanted()

@@ -9,6 +9,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
 from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, speed_limiter
+from eidrive_behaviors.actions.reference_entities import check_presence
 from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
 
@@ -19,11 +20,12 @@ REACHED = 0.2
 class SpeedAction(ActionBehaviour):
     """Transition of the speed to an absolute or relative target by the given dynamics.
 
-    The shape is a function of time; for a distance it is the time in which that distance is covered. A relative target
-    is read in each step; a continuous one is kept until a later action ends it. The vehicle's Performance limits the
-    target, and the maximum slope of all shapes except the step. In the following mode `follow` it limits all
-    accelerations and jerks. An active controller receives the speed as its goal. The goal is reached when the vehicle
-    drives at that speed; a vehicle that was just teleported starts with it.
+    The shape is a function of time; for a distance it is the time in which that distance is covered. A relative
+    target is read in each step, one relative to the actor itself at the start. A continuous target is kept until a
+    later action ends it. The vehicle's Performance limits the target, and the maximum slope of all shapes except
+    the step. In the following mode `follow` it limits all accelerations and jerks. An active controller receives
+    the speed as its goal. The goal is reached when the vehicle drives at that speed; a vehicle that was just
+    teleported starts with it.
     """
 
     domains = Domain.LONGITUDINAL
@@ -43,6 +45,7 @@ class SpeedAction(ActionBehaviour):
         self._relative = action.speed_action_target.relative_target_speed
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         self._limiter: RateLimitedValue | None = None
+        self._start = 0.0
 
     @property
     def _continuous(self) -> bool:
@@ -58,7 +61,8 @@ class SpeedAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Start the transition from the current speed."""
-        start, target = self._current_speed(), self._target()
+        self._start = start = self._current_speed()
+        target = self._target()
         self._transition = self._build_transition(start, target)
         vehicle = self.actor.entity
         if is_follow_mode(self._dynamics) and isinstance(vehicle, model.Vehicle):
@@ -132,7 +136,9 @@ class SpeedAction(ActionBehaviour):
             speed = self._absolute.value
         else:
             assert self._relative is not None
-            reference = self.context.speed(self._relative.entity_ref)
+            name = self._relative.entity_ref
+            check_presence(self, name)
+            reference = self._start if name == self.actor_name else self.context.speed(name)
             speed = relative_speed(reference, self._relative.value, self._relative.speed_target_value_type)
         return math.copysign(min(abs(speed), top), speed)
 

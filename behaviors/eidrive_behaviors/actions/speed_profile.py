@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_of_reverse
+from eidrive_behaviors.actions.reference_entities import check_presence
 from eidrive_behaviors.actions.speed import slope_limit
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, model
 from eidrive_scenario.api.common import EPSILON
@@ -75,6 +76,8 @@ class SpeedProfileAction(ActionBehaviour):
         name = self.action.entity_ref
         if name is None and self.action.entity_ref_element is not None:
             name = self.action.entity_ref_element.entity_ref
+        if name is not None:
+            check_presence(self, name)
         base = self.context.speed(name) if name is not None else 0.0
         top = self._limit("max_speed")
         corners = [(0.0, start)]

@@ -8,6 +8,7 @@ from enum import Enum
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_vehicles import warn_without_effect
+from eidrive_behaviors.actions.reference_entities import check_other_entity, check_presence
 from eidrive_behaviors.actions.speed import relative_speed
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
@@ -62,6 +63,7 @@ class SynchronizeAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Start with the first phase."""
+        check_other_entity(self, self.action.master_entity_ref)
         self._phase = SynchronizationPhase.SWING
         self._rising: bool | None = None
         self._last = (math.inf, math.inf)
@@ -78,6 +80,7 @@ class SynchronizeAction(ActionBehaviour):
         """Set the speed for the step."""
         if self.actor.driven:
             warn_without_effect(self)
+        check_presence(self, self.action.master_entity_ref)
         motion, dt, final = self.actor.motion, self.context.dt, self._final_speed()
         if motion.speed != 0.0 or self._sense is None:
             self._sense = math.copysign(1.0, motion.speed or final or 1.0)

@@ -8,6 +8,7 @@ from functools import partial
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.driven_trajectory import DrivenTrajectory
+from eidrive_behaviors.actions.driven_vehicles import warn_of_missed_end
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
 from eidrive_behaviors.actions.routing import check_way
 from eidrive_scenario.api.actions import (
@@ -107,7 +108,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._put: Pose | None = None
         self._driven: DrivenTrajectory | None = None
         self._pursuit = self._run = None
-        self._begun = self._direction_known = self._teleports = False
+        self._begun = self._direction_known = self._teleports = self._is_late = False
         if self._timing is not None and not (self._follows_limits and present):
             self._s = self._layout.at_time(self._clock(0.0), self._speeds)
 
@@ -147,8 +148,10 @@ class FollowTrajectoryAction(ActionBehaviour):
             if self._timing is not None:
                 top, faster, slower = self.actor.limits()
                 self._run = RateLimitedValue(
-                    self._s, abs(motion.speed), up=faster, down=slower, lowest=0.0, highest=top
+                    self._pursuit.s, abs(motion.speed), up=faster, down=slower, lowest=0.0, highest=top
                 )
+                behind = layout.at_time(self._clock(0.0), self._speeds) - self._run.value
+                self._is_late = abs(behind) > TELEPORT_DISTANCE
         start = layout.at(self._s)
         self._teleports = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > TELEPORT_DISTANCE
 
@@ -201,7 +204,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             if dt > 0.0 and not (done and clock > layout.end_time + EPSILON):
                 motion.set_speed(self._forwards(after) * (after - self._s) / dt)
             if done:
-                after += max(0.0, clock - layout.end_time) * self._timing.scale * abs(motion.speed)
+                after += self._overrun(clock) * self._timing.scale * abs(motion.speed)
         before, self._s = self._s, after
         self._progress.move(self.context.view.tick, before, after)
         pose = self._pose(after)
@@ -239,10 +242,10 @@ class FollowTrajectoryAction(ActionBehaviour):
             beyond = max(0.0, clock - layout.end_time) * self._last_speed()
             wanted = layout.at_time(clock, self._speeds) + beyond
             self._run.value = pursuit.s
-            if pursuit.on_path:
+            if pursuit.on_path and not self._is_late:
                 self._run.keep(wanted, dt)
             else:
-                self._run.advance(wanted, dt)
+                self._is_late &= abs(self._run.advance(wanted, dt) - wanted) > EPSILON
             motion.set_speed(way * self._run.rate)
         pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
@@ -271,6 +274,11 @@ class FollowTrajectoryAction(ActionBehaviour):
             return (elapsed - self._timing.offset) / self._timing.scale
         return (elapsed - self._started - self._timing.offset) / self._timing.scale + self._head_start
 
+    def _overrun(self, clock: float) -> float:
+        """Return the part of this step after the end of the trajectory [s of its clock]."""
+        assert self._timing is not None
+        return min(max(0.0, clock - self._layout.end_time), self.context.dt / self._timing.scale)
+
     def _pose(self, s: float) -> Pose:
         pose = self._layout.extended(s)
         if self._progress.way > 0 or self._layout.given:
@@ -296,6 +304,8 @@ class FollowTrajectoryAction(ActionBehaviour):
                 motion.set_speed(speed)
         self._s = driven.place
         self.actor.set_goal(driven.goal(self.actor.goal, speed))
+        if driven.has_missed:
+            warn_of_missed_end(self)
         return Status.SUCCESS if driven.has_arrived else Status.RUNNING
 
     def _resolve_pose(self, position: model.Position) -> Pose:

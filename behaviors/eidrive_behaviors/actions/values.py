@@ -87,7 +87,7 @@ class VariableModifyAction(ModifyAction):
 def modify_value(
     behaviour: ActionBehaviour, text: str, name: str, rule: model.ModifyRule | model.VariableModifyRule
 ) -> str:
-    """Return the number in `text` after the rule, as text. Raise ScenarioError if it is not a number."""
+    """Return the number in `text` after the rule, in the notation of XML. Raise ScenarioError if it is not a number."""
     try:
         value = float(text)
     except ValueError:
@@ -96,7 +96,7 @@ def modify_value(
         value += rule.add_value.value
     elif rule.multiply_by_value is not None:
         value *= rule.multiply_by_value.value
-    return f"{value:.15g}"
+    return f"{value:.15g}".replace("inf", "INF")
 
 
 def describe_modification(rule: model.ModifyRule | model.VariableModifyRule) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
+from datetime import UTC, datetime
 
 from eidrive_scenario.api.actions import (
     Condition,
@@ -18,15 +19,17 @@ from eidrive_scenario.api.actions import (
 BOOLEANS = {"true": 1.0, "false": 0.0}
 """Numeric values of booleans."""
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?INF", re.ASCII)
+DATE_TIME = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|[+-]\d\d:\d\d)?", re.ASCII)
 
 
 def satisfies(text: str | None, rule: model.Rule, limit: str) -> bool:
-    """Compare two texts by a rule: as numbers if both are numbers, else in alphabetical order."""
+    """Compare two texts by a rule: as numbers or instants if both are such, else in alphabetical order."""
     if text is None:
         return False
-    first, second = _number(text), _number(limit)
-    if first is not None and second is not None:
-        return satisfies_rule(first, rule, second)
+    for convert in (_number, _instant):
+        first, second = convert(text), convert(limit)
+        if first is not None and second is not None:
+            return satisfies_rule(first, rule, second)
     match rule.value:
         case "equalTo":
             return text == limit
@@ -51,6 +54,17 @@ def _number(text: str) -> float | None:
     """Return a number in XML notation; None for Python's own notations, as 1_000, and for other text."""
     plain = text.strip()
     return float(plain) if NUMBER.fullmatch(plain) else BOOLEANS.get(plain.lower())
+
+
+def _instant(text: str) -> float | None:
+    """Return a date and time in seconds, in UTC without a time zone; None for other text."""
+    if not DATE_TIME.fullmatch(text.strip()):
+        return None
+    try:
+        moment = datetime.fromisoformat(text.strip())
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 class TextCondition(Condition):

@@ -8,6 +8,7 @@ sources leave open have the values of the Joint Research Center's program JRC-FS
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
@@ -39,8 +40,8 @@ class SafetyModel(ABC):
     Each driver has a separate instance, as most models have state.
     """
 
-    reach: ClassVar[float] = 100.0
-    """Range of the search for lead objects [m]."""
+    reach: ClassVar[float] = math.inf
+    """Range of the search for lead objects [m]; JRC-FSM has no limit."""
 
     @abstractmethod
     def decide(self, ego: EgoKinematics, seen: list[LeadObject]) -> float | None:
@@ -110,7 +111,8 @@ class MemorylessModel(SafetyModel):
 class Regulation(MemorylessModel):
     """Requirements of R157 on the system itself: following distances (5.2.3.3) and cut-ins (5.2.5.2).
 
-    A cut-in counts as soon as the front wheel is 0.3 m inside the lane. It is critical if the time to collision is less
+    The range is the detection range that the regulation requires at 60 km/h. A cut-in counts as soon as the front wheel
+    is 0.3 m inside the lane. It is critical if the time to collision is less
     than v_rel / (2 · 6 m/s²) + 0.35 s. JRC-FSM adds 0.1 s, its sampling interval.
     """
 
@@ -177,7 +179,6 @@ class Rss(MemorylessModel):
 class Fsm(MemorylessModel):
     """Fuzzy safety model, the second performance model of R157: it brakes harder, the less safe the distance is."""
 
-    reach = 46.0
     COMFORTABLE, HARDEST, LEAD = 4.0, 6.0, 7.0
     STANDING, MARGIN = 2.0, 2.0
     IN_TIME = 0.1

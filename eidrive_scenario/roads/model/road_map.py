@@ -1,4 +1,4 @@
-"""Plain data of an OpenDRIVE file: roads, lanes, junctions, signals, objects.
+"""Plain data of an OpenDRIVE file: roads, lanes, junctions, signals.
 
 Names follow ASAM OpenDRIVE 1.6 to 1.8; lengths in meters, angles in radians, speeds in m/s.
 """
@@ -16,6 +16,7 @@ import msgspec
 from eidrive_scenario.roads.model.curves import ReferenceLine
 from eidrive_scenario.roads.model.map_warnings import MapWarning
 from eidrive_scenario.roads.model.polynomials import Polynomials
+from eidrive_scenario.roads.model.road_objects import RoadObject
 
 Contact = Literal["start", "end"]
 
@@ -190,13 +191,17 @@ class Connection(msgspec.Struct, frozen=True):
 
 
 class Junction(msgspec.Struct, frozen=True):
-    """Junction of type default, direct or virtual."""
+    """Junction of type default, direct or virtual.
+
+    priorities  pairs of connecting roads: traffic on the second one gives way to that on the first one
+    """
 
     id: str
     name: str
     type: str
     connections: tuple[Connection, ...]
     controllers: tuple[str, ...] = ()
+    priorities: tuple[tuple[str, str], ...] = ()
 
 
 class SignalPlace(msgspec.Struct, frozen=True):
@@ -239,51 +244,6 @@ class SignalController(msgspec.Struct, frozen=True):
     id: str
     name: str
     signals: tuple[str, ...]
-
-
-class Corner(msgspec.Struct, frozen=True):
-    """Corner of the outline of an object: (s, t, dz) on the road, or (u, v, z) in the frame of the object."""
-
-    on_road: bool
-    x: float
-    y: float
-    z: float
-    height: float
-
-
-class Repeat(msgspec.Struct, frozen=True):
-    """Repetition of an object along the road; distance 0 means without gaps."""
-
-    s: float
-    length: float
-    distance: float
-    t: tuple[float, float]
-    width: tuple[float, float]
-    height: tuple[float, float]
-    z_offset: tuple[float, float]
-
-
-class RoadObject(msgspec.Struct, frozen=True):
-    """Object at a road, such as a barrier, pole, tree, building, crosswalk or parking space."""
-
-    id: str
-    name: str
-    type: str
-    subtype: str
-    road: str
-    s: float
-    t: float
-    z_offset: float
-    heading: float
-    pitch: float
-    roll: float
-    orientation: str
-    length: float
-    width: float
-    height: float
-    radius: float
-    outlines: tuple[tuple[Corner, ...], ...] = ()
-    repeats: tuple[Repeat, ...] = ()
 
 
 class RoadMap(msgspec.Struct, frozen=True):

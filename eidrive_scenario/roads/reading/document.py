@@ -12,7 +12,7 @@ from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
 from eidrive_scenario.files.xml_lines import line_of
-from eidrive_scenario.roads.model.map_warnings import ROAD_LINK, ROAD_SURFACE, MapWarning
+from eidrive_scenario.roads.model.map_warnings import JUNCTION_CONNECTION, ROAD_LINK, ROAD_SURFACE, MapWarning
 from eidrive_scenario.roads.model.polynomials import Polynomials
 from eidrive_scenario.roads.model.road_map import (
     Connection,
@@ -22,9 +22,9 @@ from eidrive_scenario.roads.model.road_map import (
     Road,
     RoadLink,
     RoadMap,
-    RoadObject,
     RoadType,
 )
+from eidrive_scenario.roads.model.road_objects import RoadObject
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 from eidrive_scenario.roads.reading.extent import check_extent
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
@@ -207,7 +207,24 @@ def _read_junction(element: etree._Element, roads: dict[str, Road], collector: A
         type=kind,
         connections=tuple(connections),
         controllers=tuple(collector.text(controller, "id") for controller in element.iterfind("controller")),
+        priorities=_read_priorities(element, roads, collector),
     )
+
+
+def _read_priorities(
+    junction: etree._Element, roads: dict[str, Road], collector: AttributeReader
+) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of roads with and without priority; incomplete pairs, optional up to 1.5, have no effect."""
+    pairs = []
+    for element in junction.iterfind("priority"):
+        pair = element.get("high", ""), element.get("low", "")
+        if all(road in roads for road in pair):
+            pairs.append(pair)
+            continue
+        message = f"<priority> of junction {junction.get('id')!r} has no effect: high={pair[0]!r}, low={pair[1]!r}"
+        hint = "specify the ids of two connecting roads"
+        collector.report_warning(element, JUNCTION_CONNECTION, "priorities without roads", message, hint)
+    return tuple(pairs)
 
 
 def _ends_at(road: Road, junction: str) -> bool:

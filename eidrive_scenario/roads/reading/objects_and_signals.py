@@ -9,15 +9,8 @@ from msgspec.structs import replace
 
 from eidrive_scenario.roads.geometry.poses import BEYOND
 from eidrive_scenario.roads.model.map_warnings import SIGNAL_OFF_ROAD
-from eidrive_scenario.roads.model.road_map import (
-    Corner,
-    Repeat,
-    Road,
-    RoadObject,
-    Signal,
-    SignalController,
-    SignalPlace,
-)
+from eidrive_scenario.roads.model.road_map import Road, Signal, SignalController, SignalPlace
+from eidrive_scenario.roads.model.road_objects import Corner, Repeat, RoadObject
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 MAX_REPETITIONS = 100_000
@@ -181,8 +174,8 @@ def _read_corners(outline: etree._Element, collector: AttributeReader) -> list[C
 
 
 def _read_repeat(repeat: etree._Element, element: etree._Element, collector: AttributeReader) -> Repeat:
-    def pair(name: str, own: str) -> tuple[float, float]:
-        fallback = collector.number(element, own, 0.0)
+    def pair(name: str) -> tuple[float, float]:
+        fallback = collector.number(element, name, 0.0)
         start = collector.number(repeat, f"{name}Start", fallback)
         return start, collector.number(repeat, f"{name}End", start)
 
@@ -193,15 +186,17 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, collector: Att
         length = 0.0
     step = distance if distance > 0.0 else 1.0
     collector.spend(repeat, "positions of objects", max(length, 0.0) / step, MAX_OBJECTS)
-    for name, own in (("width", "width"), ("height", "height"), ("t", "t"), ("zOffset", "zOffset")):
-        if max(map(abs, pair(name, own))) > MAX_OBJECT_SIZE:
+    for name in ("width", "height", "length", "radius", "t", "zOffset"):
+        if max(map(abs, pair(name))) > MAX_OBJECT_SIZE:
             collector.report_error(repeat, f"<repeat> has a {name} beyond {MAX_OBJECT_SIZE:g} m", "correct it")
     return Repeat(
         s=collector.number(repeat, "s", collector.number(element, "s", 0.0)),
         length=length,
         distance=distance,
-        t=pair("t", "t"),
-        width=pair("width", "width"),
-        height=pair("height", "height"),
-        z_offset=pair("zOffset", "zOffset"),
+        t=pair("t"),
+        width=pair("width"),
+        height=pair("height"),
+        z_offset=pair("zOffset"),
+        size=pair("length"),
+        radius=pair("radius"),
     )

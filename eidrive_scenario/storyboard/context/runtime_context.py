@@ -186,7 +186,7 @@ class RuntimeContext:
         actor = self.actors[name]
         disconnect(self.actors, name)
         if actor.present:
-            actor.present = False
+            actor.leave_world()
             if self.commands.spawns.pop(name, None) is None:
                 self.commands.removals.add(name)
         for holder_actor, _, occupant, holder in list(self._holders):

@@ -202,6 +202,13 @@ class Actor:
         self.present = True
         self.standing_since = self.off_road_since = self.end_of_road_since = None
 
+    def leave_world(self) -> None:
+        """Leave the world: speed, route and request to its agent end, so that an entity that is added again stands."""
+        self.present = False
+        self._goal = None
+        self.motion.set_speed(0.0)
+        self.motion.set_route(None)
+
     def location(self, roads: RoadNetwork, tick: int) -> LaneLocation | None:
         """Return its lane location, None without a road nearby. It is computed once per tick."""
         if self._location_tick != tick:

@@ -79,6 +79,7 @@ class Motion(MotionState):
         if self._route_lanes is not None:
             self._route_lanes.forget()
         self._teleport = self._teleported = True
+        self._teleports += 1
 
     def initialize(self) -> None:
         """Set the pose of the first view after Init; the first step of the run moves the actor from this pose."""

@@ -33,6 +33,7 @@ class MotionState:
         self._branch_selector: BranchSelector | None = None
         self._end_of_road = False
         self._teleported = False
+        self._teleports = 0
         self._lift = 0.0
 
     @property
@@ -74,6 +75,11 @@ class MotionState:
     def teleported(self) -> bool:
         """True from a teleport until the view that shows it."""
         return self._teleported
+
+    @property
+    def teleports(self) -> int:
+        """Number of teleports so far."""
+        return self._teleports
 
     @property
     def direction(self) -> int:

@@ -17,7 +17,7 @@ from eidrive_scenario.randomness import generator
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
 from eidrive_scenario.traffic.spawning.population import CarGroup, CentralObject, Population
-from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites
+from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites, is_wide_enough
 
 RETRY = 0.5
 """Delay of the next attempt if no site was free [s]."""
@@ -47,6 +47,16 @@ class TrafficGenerator(CarGroup, ABC):
     @abstractmethod
     def is_due(self, population: Population) -> bool:
         """Return whether a car may be spawned now."""
+
+    @property
+    def shortage(self) -> Diagnostic | None:
+        """Warning that road users are missing; None if they were complete, and before the first attempt."""
+        return None
+
+    def _warning(self, message: str, hint: str) -> Diagnostic:
+        element = self.element
+        source, line = ("", None) if element is None else (element.source, element.line)
+        return Diagnostic(f"traffic {quoted(self.name)}: {message}", hint, source, line)
 
     def rng(self, population: Population) -> np.random.Generator:
         """Return the random generator of the next attempt to spawn a car."""
@@ -85,13 +95,8 @@ class MaintainedTraffic(TrafficGenerator):
         """Warning that the participants were never complete; None if they were, and before the first attempt."""
         if self._most is None or self._most >= self.count:
             return None
-        element = self.element
-        return Diagnostic(
-            f"traffic {quoted(self.name)}: at most {self._most} of {self.count} road users found a free place",
-            "enlarge the area, or reduce the number",
-            element.source if element is not None else "",
-            element.line if element is not None else None,
-        )
+        message = f"at most {self._most} of {self.count} road users found a free place"
+        return self._warning(message, "enlarge the area, or reduce the number")
 
 
 @dataclass
@@ -183,6 +188,8 @@ class Swarm(MaintainedTraffic):
 class Source(TrafficGenerator):
     """Source of cars at a constant rate [1/s] at sites around a position. If none is free, the next car waits.
 
+    A participant without a suitable lane, such as a pedestrian without a sidewalk, is replaced by another draw.
+
     speed  initial speed [m/s], None for the speed limit
     """
 
@@ -194,6 +201,8 @@ class Source(TrafficGenerator):
     started: float
     _made: int = field(default=0, init=False)
     _waiting: Participant | None = field(default=None, init=False)
+    _without_lane: set[str] = field(default_factory=set, init=False)
+    """Categories of participants without a suitable lane."""
 
     def is_due(self, population: Population) -> bool:
         """Return whether the next car is due."""
@@ -205,14 +214,25 @@ class Source(TrafficGenerator):
             rng = self.rng(population)
             participant = self._waiting or self.mixture.draw(rng)
             sites = self.sites(participant)
+            if not np.any(is_wide_enough(sites, participant)):
+                self._without_lane.add(participant.spec.category)
+                return
             speed = population.starting_speed(sites, participant)
             if self.speed is not None:
                 speed = np.full(len(sites), self.speed)
-            if not len(sites) or not population.spawn(self, participant, sites, speed, rng, self.speed):
+            if not population.spawn(self, participant, sites, speed, rng, self.speed):
                 self._waiting = participant
                 return
             self._waiting = None
             self._made += 1
+
+    @property
+    def shortage(self) -> Diagnostic | None:
+        """Warning that participants had no suitable lane; None if all had one."""
+        if not self._without_lane:
+            return None
+        missing = ", ".join(sorted(self._without_lane))
+        return self._warning(f"no lane at the source is suitable for: {missing}", "remove them, or move the source")
 
 
 @dataclass

@@ -140,6 +140,12 @@ def sites_within_radius(
     return found
 
 
+def is_wide_enough(sites: SpawnSites, participant: Participant) -> Bools:
+    """Return whether the lane at each site is wide enough for a participant."""
+    width = participant.spec.size[1]
+    return np.asarray(sites.width >= (width if participant.walks else min(width, WIDEST)))
+
+
 def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Bools:
     """Return whether a participant can be spawned at each site with speeds (K,) [m/s].
 
@@ -148,7 +154,6 @@ def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, spe
     """
     lanes, spec, driver = fleet.lanes, participant.spec, participant.driver
     count = len(sites)
-    width = spec.size[1] if participant.walks else min(spec.size[1], WIDEST)
     half = 0.5 * spec.size[0]
     front, rear = np.full(count, spec.offset[0] + half), np.full(count, spec.offset[0] - half)
     occupants = fleet.occupants()
@@ -163,7 +168,7 @@ def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, spe
     table[known] = fleet.drivers.table[occupants.owner[behind[known]]]
     v = np.where(behind >= 0, occupants.speed[behind], 0.0) if len(occupants.row) else np.zeros(count)
     pressed = Drivers(table).response(v, np.maximum(v, 1.0), followers.gap, v - speed)
-    fit = (sites.width >= width) & (braking >= -driver.deceleration) & (leaders.gap > driver.standstill_gap)
+    fit = is_wide_enough(sites, participant) & (braking >= -driver.deceleration) & (leaders.gap > driver.standstill_gap)
     fit &= (behind < 0) | ((pressed >= -Drivers(table).deceleration) & (followers.gap > driver.standstill_gap))
     boxes = np.concatenate([foreign, fleet.boxes])
     for n in np.flatnonzero(fit).tolist():

@@ -90,6 +90,36 @@ def test_repeated_object_is_placed_along_the_road() -> None:
     assert np.array([(p.pose.x, p.length) for p in parts]) == pytest.approx(np.array([(2, 4), (6, 4), (10, 4)]))
 
 
+@pytest.mark.parametrize(
+    ("size", "repeat", "expected"),
+    [
+        ('radius="0.5"', "", [1.0, 1.0, 1.0]),
+        ('radius="0.5"', 'radiusStart="1" radiusEnd="2"', [2.0, 3.0, 4.0]),
+        ('length="4" width="2"', "", [4.0, 4.0, 4.0]),
+        ('length="4" width="2"', 'lengthStart="2" lengthEnd="6"', [2.0, 4.0, 6.0]),
+    ],
+)
+def test_repeated_objects_have_the_size_of_object_or_repetition(size: str, repeat: str, expected: list[float]) -> None:
+    """OpenDRIVE 1.5: values of the repetition override those of the object; a radius is half of length and width."""
+    objects = (
+        f'<objects><object id="1" type="tree" s="0" t="5" height="3" {size}>'
+        f'<repeat s="10" length="40" distance="20" {repeat}/></object></objects>'
+    )
+    placed = list(placed_objects(RoadNetwork.parse(map_xml(road_xml(extra=objects)))))
+    assert [one.length for one in placed] == pytest.approx(expected)
+    assert [one.width for one in placed] == pytest.approx(expected if "radius" in size else [2.0, 2.0, 2.0])
+
+
+@pytest.mark.parametrize(("length", "distance"), [(0.6, 0.2), (17.4, 5.8), (40.0, 20.0)])
+def test_last_repetition_at_a_multiple_of_the_distance_is_placed(length: float, distance: float) -> None:
+    """In floating point 0.6 / 0.2 and 17.4 / 5.8 are below 3."""
+    repeat = f'<repeat s="10" length="{length}" distance="{distance}"/>'
+    objects = f'<objects><object id="1" type="pole" s="0" t="5" radius="0.1" height="1">{repeat}</object></objects>'
+    placed = list(placed_objects(RoadNetwork.parse(map_xml(road_xml(extra=objects)))))
+    assert len(placed) == round(length / distance) + 1
+    assert placed[-1].pose.x == pytest.approx(10.0 + length)
+
+
 def test_cycle_lanes_in_junctions_are_below_driving_lanes() -> None:
     both = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'

@@ -63,6 +63,48 @@ def test_passage_has_entry_and_turn() -> None:
     assert passage("four_way_junction", "east", "west").turn == pytest.approx(0.0, abs=0.02)
 
 
+@cache
+def rules_with_priorities() -> JunctionRules:
+    """Return the rules of the four-way junction whose roads 101 to 106, from west and east, have priority."""
+    text = (ROADS / "four_way_junction.xodr").read_text()
+    pairs = "".join(f'<priority high="{a}" low="{b}"/>' for a in range(101, 107) for b in range(107, 113))
+    return JunctionRules(RoadNetwork.parse(text.replace("</junction>", f"{pairs}</junction>")))
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "expected"),
+    [
+        ("west east", "south north", False),  # against priority to the right
+        ("south north", "west east", True),
+        ("south west", "east north", True),
+        ("west north", "east west", True),  # left turn: no priority between both
+        ("south west", "north south", True),
+    ],
+)
+def test_priorities_of_the_map_precede_priority_to_the_right(own: str, other: str, expected: bool) -> None:
+    known = rules_with_priorities()
+    first, second = (known.passages(way("four_way_junction", *text.split()))[0] for text in (own, other))
+    assert known.gives_way(first, second) is expected
+    assert known.gives_way(first._replace(gives_way=True), second)
+
+
+@pytest.mark.parametrize("pair", ['high="101" low="999"', 'high="101"', ""])
+def test_priority_without_roads_is_a_warning(pair: str) -> None:
+    text = (ROADS / "four_way_junction.xodr").read_text()
+    roads = RoadNetwork.parse(text.replace("</junction>", f"<priority {pair}/></junction>"))
+    assert roads.junctions["100"].priorities == ()
+    (warning,) = roads.map_warnings
+    assert "<priority> of junction '100' has no effect" in str(warning)
+
+
+def test_priorities_of_the_map_hold_unseen_traffic() -> None:
+    known = rules_with_priorities()
+    street, stem = (known.passages(way("four_way_junction", *text.split()))[0] for text in ("west east", "south north"))
+    assert (street.road, stem.road) == ("101", "110")
+    assert not known.may_cross(street, stem)
+    assert known.may_cross(stem, street)
+
+
 @pytest.mark.parametrize(
     ("own", "other", "expected"),
     [
