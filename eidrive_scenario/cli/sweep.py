@@ -10,6 +10,7 @@ import typer
 
 from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Keep, UserValues
 from eidrive_scenario.cli.error_output import print_warnings
+from eidrive_scenario.cli.interruption import interrupt_once
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
 from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
@@ -161,7 +162,7 @@ def sweep(
         if len(plan.points) > 10:
             typer.echo(f"  and {len(plan.points) - 10} more")
         raise typer.Exit
-    with ResultStore.open(store, versions()) as opened:
+    with interrupt_once(), ResultStore.open(store, versions()) as opened:
         crew: Workers
         if scheduler is None:
             crew = LocalWorkers(min(workers or cores(), len(jobs) if search is None else BATCH))
