@@ -78,7 +78,7 @@ def sweep(
         str | None,
         typer.Option(metavar="NAME=LOW:HIGH", help="Find the value at which the success rate crosses --bound."),
     ] = None,
-    bound: Annotated[float, rare(help="Success rate of --find-boundary.")] = 0.5,
+    bound: Annotated[float | None, rare(help="Success rate of --find-boundary.", show_default="0.5")] = None,
     tolerance: Annotated[
         float | None,
         rare(help="Accuracy of --find-boundary.", show_default="2 % of the range"),
@@ -105,7 +105,7 @@ def sweep(
         start_server()  # First, as it imports for as long as the imports below
 
     from eidrive_scenario.cli.sweep_progress import ProgressDisplay
-    from eidrive_scenario.cli.sweep_search import Search
+    from eidrive_scenario.cli.sweep_search import Search, check_search_options
     from eidrive_scenario.experiments.repetitions import cores
     from eidrive_scenario.experiments.sweeps.axes import parse_axes
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
@@ -139,6 +139,7 @@ def sweep(
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
     axes = parse_axes(vary or [])
     search = None
+    check_search_options(find_boundary is not None, falsify, bound, tolerance, objective)
     if falsify or find_boundary is not None:
         search = Search.of(axes, find_boundary, bound, tolerance, falsify, objective, runs, chosen)
         axes, runs, chosen = search.fixed, None, chosen or [1]

@@ -21,6 +21,22 @@ from eidrive_scenario.experiments.sweeps.workers import Workers
 
 MOST_RUNS = 200
 """Default maximum number of runs of a search."""
+BOUND = 0.5
+"""Default success rate at the boundary."""
+
+
+def check_search_options(
+    finds_boundary: bool, falsifies: bool, bound: float | None, tolerance: float | None, objective: str | None
+) -> None:
+    """Raise SettingError for an option of a search that is not requested."""
+    options = (
+        ("--bound", bound, finds_boundary, "--find-boundary"),
+        ("--tolerance", tolerance, finds_boundary, "--find-boundary"),
+        ("--objective", objective, falsifies, "--falsify"),
+    )
+    for name, value, is_requested, search in options:
+        if value is not None and not is_requested:
+            raise SettingError(Diagnostic(f"{name} without {search} has no effect", f"add {search}, or remove {name}"))
 
 
 @dataclass(frozen=True)
@@ -45,7 +61,7 @@ class Search:
         cls,
         axes: Sequence[Axis],
         boundary: str | None,
-        bound: float,
+        bound: float | None,
         tolerance: float | None,
         falsified: bool,
         objective: str | None,
@@ -60,6 +76,7 @@ class Search:
                 "remove it: each run has another seed" if boundary is not None else "give one seed, which all runs have"
             )
             raise SettingError(Diagnostic("--seeds does not fit to the search", hint))
+        bound = BOUND if bound is None else bound
         space = tuple(axis for axis in axes if axis.is_interval or len(axis.values) > 1)
         fixed = tuple(axis for axis in axes if axis not in space)
         most = runs or MOST_RUNS

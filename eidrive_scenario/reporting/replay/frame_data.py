@@ -101,6 +101,11 @@ class ReplayBuilder:
             self._report.add("the page does not show all messages", shown)
         self._timeline.observe(frame.changes)
 
+    @property
+    def actors(self) -> frozenset[str]:
+        """Names of the actors of all frames."""
+        return frozenset(self._actors)
+
     def take(self) -> Data:
         """Return the data of the frames since the last call, in the format of `replay_data`.
 
