@@ -211,7 +211,14 @@ def results(
     """
     import json as json_text
 
-    from eidrive_scenario.experiments.sweeps.results import indistinct, stored_runs, summaries, write_csv, write_parquet
+    from eidrive_scenario.experiments.sweeps.results import (
+        indistinct,
+        mixed_versions,
+        stored_runs,
+        summaries,
+        write_csv,
+        write_parquet,
+    )
     from eidrive_scenario.experiments.sweeps.store import PASSED as PASSED_RUN
 
     if not 0.0 < confidence < 1.0:
@@ -219,7 +226,8 @@ def results(
     found = list(stored_runs(stores))
     names = None if by is None else [name.strip() for name in by.split(",")]
     rows = summaries(found, by=names, interval=interval, confidence=confidence)
-    print_warnings([f"{warning}; a new store keeps them apart"] if (warning := indistinct(found)) else [])
+    warnings = (indistinct(found), mixed_versions(found))
+    print_warnings([f"{warning}; a new store keeps them apart" for warning in warnings if warning])
     if csv is not None:
         write_csv(found, csv)
     if parquet is not None:

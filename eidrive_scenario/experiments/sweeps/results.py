@@ -67,6 +67,25 @@ def indistinct(runs: Sequence[StoredRun]) -> str:
     return f"{what} with other options, or after a change of a file"
 
 
+def mixed_versions(runs: Iterable[StoredRun]) -> str:
+    """Return a warning of runs by different versions of a package; empty without such runs.
+
+    A store has runs of one version of the engine, but combined stores and packages of extensions may differ.
+    """
+    found: dict[str, dict[str, int]] = {}
+    for run in runs:
+        versions = msgspec.json.decode(run.settings, type=_Versions).versions if run.settings else {}
+        for name, version in versions.items():
+            counts = found.setdefault(name, {})
+            counts[version] = counts.get(version, 0) + 1
+    texts = [
+        f"{name} {', '.join(f'{version} ({count})' for version, count in sorted(counts.items()))}"
+        for name, counts in sorted(found.items())
+        if len(counts) > 1
+    ]
+    return f"the success rates mix runs of different versions: {'; '.join(texts)}" if texts else ""
+
+
 def summaries(
     runs: Iterable[StoredRun], *, by: Sequence[str] | None = None, interval: str = "anytime", confidence: float = 0.95
 ) -> list[PointSummary]:
@@ -122,6 +141,12 @@ class _VariedNames(msgspec.Struct):
     """Part of the settings of a run that is read."""
 
     varied: tuple[str, ...] = ()
+
+
+class _Versions(msgspec.Struct):
+    """Versions of packages among the settings of a run."""
+
+    versions: dict[str, str] = {}
 
 
 def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:

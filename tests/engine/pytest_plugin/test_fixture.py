@@ -88,7 +88,7 @@ def test_marker_without_match_is_an_error(project: pytest.Pytester, marker: str,
     assert message in str(result.stdout) + str(result.stderr)
 
 
-def test_marker_with_distribution_says_what_it_is(project: pytest.Pytester) -> None:
+def test_marker_with_distribution_names_its_kind(project: pytest.Pytester) -> None:
     """Its runs are tests as those of a file; a marker names scenarios."""
     (project.path / "d.xosc").write_text("<OpenSCENARIO><FileHeader/><ParameterValueDistribution/></OpenSCENARIO>")
     result = run(project, '@pytest.mark.scenario("d")\ndef test_none(run_scenario):\n    pass')

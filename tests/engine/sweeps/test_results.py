@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive, eidrive
+from msgspec.structs import replace
 
 from eidrive_scenario.api.run import read_results
 from eidrive_scenario.errors import SettingError
@@ -236,3 +237,17 @@ def test_find_boundary_command_prints_value(eidrive: Eidrive, scenario: Path, tm
     value = float(done.stdout.split(" at ")[1].split()[0])
     assert value == pytest.approx(20.0, abs=0.5)
     assert "falls through 0.5" in done.stdout
+
+
+def test_results_of_different_versions_are_named(eidrive: Eidrive, store: Path, tmp_path: Path) -> None:
+    """Shards of two releases, and one package of an extension with two versions in one store."""
+    with ResultStore.open(store, {"numpy": "2"}) as opened:
+        opened.add(replace(RUNS[0], settings='{"versions": {"engine": "1.0", "radar": "3"}}'))
+        opened.add(replace(RUNS[1], settings='{"versions": {"engine": "1.0", "radar": "4"}}'))
+    other = tmp_path / "other.db"
+    with ResultStore.open(other, {"numpy": "3"}) as opened:
+        opened.add(replace(run(9, "passed", Speed=5), settings='{"versions": {"engine": "1.1", "radar": "4"}}'))
+    text = "the success rates mix runs of different versions: "
+    assert f"{text}radar 3 (1), 4 (1); a new store" in eidrive("results", store).stderr
+    assert f"{text}engine 1.0 (2), 1.1 (1); radar 3 (1), 4 (2); a new" in eidrive("results", store, other).stderr
+    assert text not in eidrive("results", other).stderr
