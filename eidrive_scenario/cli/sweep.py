@@ -19,6 +19,7 @@ from eidrive_scenario.exit_codes import ABORTED, PASSED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from eidrive_scenario.experiments.sweeps.axes import Axis
     from eidrive_scenario.experiments.sweeps.results import PointSummary
     from eidrive_scenario.experiments.sweeps.sweep import SweepProgress
 
@@ -107,7 +108,7 @@ def sweep(
     from eidrive_scenario.cli.sweep_progress import ProgressDisplay
     from eidrive_scenario.cli.sweep_search import Search, check_search_options
     from eidrive_scenario.experiments.repetitions import cores
-    from eidrive_scenario.experiments.sweeps.axes import parse_axes
+    from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
     from eidrive_scenario.experiments.sweeps.designs import points_of
     from eidrive_scenario.experiments.sweeps.execution import KeptFiles
@@ -115,6 +116,7 @@ def sweep(
     from eidrive_scenario.experiments.sweeps.searches import BATCH
     from eidrive_scenario.experiments.sweeps.store import ResultStore
     from eidrive_scenario.experiments.sweeps.sweep import run_sweep
+    from eidrive_scenario.experiments.sweeps.typed_axes import with_types
     from eidrive_scenario.experiments.sweeps.workers import LocalWorkers, Workers
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.simulation import RunSettings
@@ -137,11 +139,17 @@ def sweep(
         allow_torchscript=allow_torchscript,
     )
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
-    axes = parse_axes(vary or [])
+    kind = definition(path)
+
+    def typed(axes: Sequence[Axis]) -> tuple[Axis, ...]:
+        return with_types(axes, path, is_distribution=kind == "distribution")
+
+    axes = typed(parse_axes(vary or []))
     search = None
     check_search_options(find_boundary is not None, falsify, bound, tolerance, objective)
     if falsify or find_boundary is not None:
-        search = Search.of(axes, find_boundary, bound, tolerance, falsify, objective, runs, chosen)
+        (boundary,) = (None,) if find_boundary is None else typed([parse_axis(find_boundary)])
+        search = Search.of(axes, boundary, bound, tolerance, falsify, objective, runs, chosen)
         axes, runs, chosen = search.fixed, None, chosen or [1]
         if shard is not None or design != "grid":
             raise SettingError(Diagnostic("a search has neither shards nor a design", "remove --shard and --design"))
@@ -153,7 +161,7 @@ def sweep(
         seeds=chosen,
         runs=runs,
         space=() if search is None else search.axes,
-        is_distribution=definition(path) == "distribution",
+        is_distribution=kind == "distribution",
     )
     jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
     if dry_run:

@@ -10,7 +10,7 @@ from typing import Self
 import typer
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, check_different, parse_axis
+from eidrive_scenario.experiments.sweeps.axes import Axis, check_different
 from eidrive_scenario.experiments.sweeps.boundary import Boundary
 from eidrive_scenario.experiments.sweeps.execution import KeptFiles
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
@@ -60,7 +60,7 @@ class Search:
     def of(
         cls,
         axes: Sequence[Axis],
-        boundary: str | None,
+        boundary: Axis | None,
         bound: float | None,
         tolerance: float | None,
         falsified: bool,
@@ -82,7 +82,7 @@ class Search:
         most = runs or MOST_RUNS
         if boundary is None:
             return cls(None, bound, math.nan, space, fixed, objective, most)
-        axis = parse_axis(boundary)
+        axis = boundary
         check_different([*axes, axis])
         if not axis.is_interval:
             raise SettingError(Diagnostic(f"--find-boundary: {axis.name} is not an interval", "expected NAME=LOW:HIGH"))
@@ -91,7 +91,7 @@ class Search:
             raise SettingError(Diagnostic(f"--find-boundary: {space[0].name} varies, too", hint))
         if not 0.0 < bound < 1.0:
             raise SettingError(Diagnostic(f"--bound is {bound}", "give a success rate between 0 and 1"))
-        least = 0.02 * (axis.high - axis.low) if tolerance is None else tolerance
+        least = max(0.02 * (axis.high - axis.low), 0.5 * axis.is_whole) if tolerance is None else tolerance
         if not 0.0 < least < math.inf:
             raise SettingError(Diagnostic(f"--tolerance is {tolerance}", "give a positive number"))
         return cls(axis, bound, least, (), fixed, objective, most)

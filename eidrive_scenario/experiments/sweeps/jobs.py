@@ -159,7 +159,7 @@ def _with_space(points: Sequence[Point], space: Sequence[Axis]) -> Sequence[Poin
     if not space:
         return points
     start = {axis.name: axis.at(0.0) for axis in space}
-    ends = [(axis.name, value) for axis in space for value in axis.values or (axis.low, axis.high)]
+    ends = [(axis.name, value) for axis in space for value in axis.values or axis.ends]
     return [{**point, **start, name: value} for point in points for name, value in ends]
 
 

@@ -48,7 +48,7 @@ def find_boundary(
     search = BoundarySearch(axis.low, axis.high, bound)
     started = 0
     while started < runs:
-        values = search.proposals(min(BATCH, runs - started))
+        values = [axis.nearest(value) for value in search.proposals(min(BATCH, runs - started))]
         jobs = [
             plan.job(started + row, {**plan.points[0], axis.name: value}, started + row + 1)
             for row, value in enumerate(values)
@@ -195,7 +195,7 @@ def _margin(run: StoredRun, criterion: str) -> float | None:
     value: Any = run.result.get(f"{criterion}.value")
     limit: Any = run.result.get(f"{criterion}.limit")
     if _is_number(value) and _is_number(limit) and limit != 0:
-        margin = abs((value - limit) / limit)
+        margin = abs(float(value - limit) / float(limit))
         return margin if passed else -margin
     return None if passed else -1.0
 
@@ -206,12 +206,15 @@ def _is_number(value: Any) -> bool:
 
 def _distributions(optuna: Any, axes: Sequence[Axis]) -> dict[str, Any]:
     kinds = optuna.distributions
-    return {
-        axis.name: kinds.FloatDistribution(axis.low, axis.high)
-        if axis.is_interval
-        else kinds.CategoricalDistribution(axis.values)
-        for axis in axes
-    }
+    found = {}
+    for axis in axes:
+        if axis.is_whole:
+            found[axis.name] = kinds.IntDistribution(*axis.ends)
+        elif axis.is_interval:
+            found[axis.name] = kinds.FloatDistribution(*axis.ends)
+        else:
+            found[axis.name] = kinds.CategoricalDistribution(axis.values)
+    return found
 
 
 def _values(axes: Sequence[Axis], params: dict[str, Any]) -> dict[str, Scalar]:
