@@ -108,6 +108,7 @@ def sweep(
     from eidrive_scenario.cli.sweep_progress import ProgressDisplay
     from eidrive_scenario.cli.sweep_search import Search, check_search_options
     from eidrive_scenario.experiments.repetitions import cores
+    from eidrive_scenario.experiments.run_folder import check_writable
     from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
     from eidrive_scenario.experiments.sweeps.designs import points_of
@@ -171,6 +172,8 @@ def sweep(
         if len(plan.points) > 10:
             typer.echo(f"  and {len(plan.points) - 10} more")
         raise typer.Exit
+    if out is not None:
+        check_writable(out)
     with interrupt_once(), ResultStore.open(store, versions()) as opened:
         crew: Workers
         if scheduler is None:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from eidrive_scenario.errors import ConstraintError, InputError, WallLimitError
+from eidrive_scenario.errors import ConstraintError, InputError, OutputError, WallLimitError
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
@@ -88,6 +88,8 @@ def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = N
         )
     except ConstraintError as error:
         return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
+    except OutputError as error:  # not of the inputs, so that --retry repeats the run
+        return _without_result(job, ABORTED, str(error), time.perf_counter() - start)
     except InputError as error:
         return _without_result(job, INVALID, str(error), time.perf_counter() - start)
     except BaseException as error:

@@ -11,16 +11,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_fixtures import Eidrive, eidrive
 
 from eidrive_scenario.cli.interruption import interrupt_once
 from eidrive_scenario.experiments.sweeps.axes import parse_axes
 from eidrive_scenario.experiments.sweeps.designs import points_of
+from eidrive_scenario.experiments.sweeps.execution import KeptFiles, execute
 from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.sweep import run_sweep
 from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
 from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings
+
+__all__ = ["eidrive"]
 
 
 def run_with(
@@ -106,3 +110,32 @@ def test_second_interrupt_does_not_interrupt_the_end() -> None:
         interrupted_twice()
     assert ended == [True]
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_unwritable_folder_of_a_run_is_aborted_and_repeatable(scenario: Path, tmp_path: Path) -> None:
+    """The inputs are valid: the run is repeated once the folder can be written."""
+    (job,) = plan_of(scenario, [{}], RunSettings())
+    below = tmp_path / "out"
+    below.write_text("a file")
+    row = execute(job, None, KeptFiles(below, "always", tmp_path / "s.db"))
+    assert (row.status, row.error.partition(": ")[2]) == (
+        "aborted",
+        "cannot write: Not a directory; choose another folder",
+    )
+    with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        store.add(row)
+        below.unlink()
+        workers = LocalWorkers(1)
+        try:
+            run_sweep(Shard(plan_of(scenario, [{}], RunSettings())), store, workers, retry=True)
+        finally:
+            workers.close()
+        assert [run.status for run in store.runs()] == ["passed"]
+
+
+def test_sweep_into_unwritable_folder_ends_before_its_runs(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    store = tmp_path / "s.db"
+    result = eidrive("sweep", scenario, "--store", store, "--out", scenario)
+    assert result.exit_code == 2
+    assert "car.xosc: cannot write: File exists; choose another folder" in result.stderr
+    assert not store.exists()

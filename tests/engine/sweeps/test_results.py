@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from eidrive_scenario.api.run import read_results
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.statistics.proportions import anytime_interval, wilson
-from eidrive_scenario.experiments.sweeps.results import summaries, write_parquet
+from eidrive_scenario.experiments.sweeps.results import stored_runs, summaries, write_parquet
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 
 __all__ = ["eidrive"]
@@ -251,3 +251,14 @@ def test_results_of_different_versions_are_named(eidrive: Eidrive, store: Path, 
     assert f"{text}radar 3 (1), 4 (1); a new store" in eidrive("results", store).stderr
     assert f"{text}engine 1.0 (2), 1.1 (1); radar 3 (1), 4 (2); a new" in eidrive("results", store, other).stderr
     assert text not in eidrive("results", other).stderr
+
+
+def test_combined_stores_keep_the_verdict_of_a_run_that_was_aborted_elsewhere(tmp_path: Path) -> None:
+    """Overlapping shards: the order of the stores decides only between rows with a verdict."""
+    stores = [tmp_path / "a.db", tmp_path / "b.db"]
+    rows = ([run(1, "passed"), run(2, "aborted")], [run(1, "aborted"), run(2, "crashed")])
+    for path, held in zip(stores, rows, strict=True):
+        with ResultStore.open(path, {"numpy": "2"}) as opened:
+            opened.add(*held)
+    assert [one.status for one in stored_runs(stores)] == ["passed", "crashed"]
+    assert [one.status for one in stored_runs(stores[::-1])] == ["passed", "aborted"]
