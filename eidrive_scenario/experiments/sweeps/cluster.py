@@ -7,11 +7,11 @@ import uuid
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any, TypeVar
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.sweeps.cluster_calls import call_in_child
+from eidrive_scenario.experiments.sweeps.cluster_calls import call_in_child, end_children
 from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.project import VARIABLE
 
@@ -82,4 +82,7 @@ class DaskWorkers:
 
     def close(self) -> None:
         self._executor.shutdown(wait=False)
+        if self._client.status == "running":  # else the scheduler has ended
+            with suppress(Exception):  # of workers that have left
+                self._client.run(end_children, self._sweep, on_error="ignore")
         self._resources.close()

@@ -20,28 +20,45 @@ R = TypeVar("R")
 
 
 class _Children:
-    """Child processes of this worker that have no call, with the sweep for which they were started."""
+    """Child processes of this worker, with the sweep for which they were started."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._idle: list[tuple[str, LocalWorkers]] = []
+        self._busy: list[tuple[str, LocalWorkers]] = []
         self._finalizer: Finalize | None = None
 
     @contextmanager
     def of(self, sweep: str) -> Iterator[LocalWorkers]:
-        """Return a child of a sweep for one call. Idle children of other sweeps end."""
+        """Return a child of a sweep for one call. A new one replaces idle children of other sweeps."""
+        others: list[tuple[str, LocalWorkers]] = []
         with self._lock:
-            others = [child for of, child in self._idle if of != sweep]
-            self._idle = [(of, child) for of, child in self._idle if of == sweep]
-            held = self._idle.pop()[1] if self._idle else None
-        for child in others:
+            held = next((entry for entry in self._idle if entry[0] == sweep), None)
+            if held is not None:
+                self._idle.remove(held)
+            else:  # the command of another sweep may have been killed
+                others, self._idle = self._idle, []
+        for _, child in others:
             child.close()
-        child = self._start() if held is None else held
+        entry = held or (sweep, self._start())
+        with self._lock:
+            self._busy.append(entry)
         try:
-            yield child
+            yield entry[1]
         finally:
             with self._lock:
-                self._idle.append((sweep, child))
+                if entry in self._busy:  # else the sweep has ended
+                    self._busy.remove(entry)
+                    self._idle.append(entry)
+
+    def end(self, sweep: str | None = None) -> None:
+        """End the children of a sweep, None for all, with their calls."""
+        with self._lock:
+            ended = [entry for entry in (*self._idle, *self._busy) if sweep in (None, entry[0])]
+            self._idle = [entry for entry in self._idle if entry not in ended]
+            self._busy = [entry for entry in self._busy if entry not in ended]
+        for _, child in ended:
+            child.close()
 
     def _start(self) -> LocalWorkers:
         process = multiprocessing.current_process()
@@ -49,12 +66,8 @@ class _Children:
             process.daemon = False
         with self._lock:
             if self._finalizer is None:  # a process joins its children before it ends
-                self._finalizer = Finalize(None, self._close, exitpriority=10)
+                self._finalizer = Finalize(None, self.end, exitpriority=10)
         return LocalWorkers(1)
-
-    def _close(self) -> None:
-        for _, child in self._idle:
-            child.close()
 
 
 _children = _Children()
@@ -74,6 +87,11 @@ def call_in_child(sweep: str, folder: str | None, function: Callable[..., R], /,
     with _children.of(sweep) as child:
         result: R = child.submit(_call, folder, cloudpickle.dumps((function, arguments))).result()
         return result
+
+
+def end_children(sweep: str) -> None:
+    """End the child processes of a sweep in this worker, also those with a call."""
+    _children.end(sweep)
 
 
 def _call(folder: str | None, pickled: bytes) -> Any:

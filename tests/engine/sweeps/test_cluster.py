@@ -125,6 +125,26 @@ def test_hung_run_on_cluster_is_one_row_and_waiting_runs_have_results(
     assert {worker.pid for worker in cluster.workers.values()} == pids  # type: ignore[attr-defined]
 
 
+def test_end_of_a_sweep_ends_its_runs_on_the_workers(cluster: object, tmp_path: Path) -> None:
+    """Runs of an interrupted sweep would occupy the workers until their wall limit."""
+
+    def sleep(path: Path) -> None:
+        path.touch()
+        time.sleep(600.0)
+
+    workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
+    later = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
+    try:
+        for number in range(4):
+            workers.submit(sleep, tmp_path / str(number))
+        while len(list(tmp_path.iterdir())) < 2:  # both workers are busy
+            time.sleep(0.01)
+        workers.close()
+        assert later.submit(os.path.basename, "a/b").result(timeout=60) == "b"
+    finally:
+        later.close()
+
+
 def test_later_sweep_on_same_workers_uses_changed_extension(
     cluster: object, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
