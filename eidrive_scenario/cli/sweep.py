@@ -12,6 +12,7 @@ from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Ke
 from eidrive_scenario.cli.error_output import print_warnings
 from eidrive_scenario.cli.interruption import interrupt_once
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
+from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.exit_codes import ABORTED, PASSED
@@ -234,6 +235,7 @@ def results(
 
     if not 0.0 < confidence < 1.0:
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
+    check_output_paths({"--csv": csv, "--parquet": parquet}, stores)
     found = list(stored_runs(stores))
     names = None if by is None else [name.strip() for name in by.split(",")]
     rows = summaries(found, by=names, interval=interval, confidence=confidence)

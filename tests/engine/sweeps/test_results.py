@@ -262,3 +262,12 @@ def test_combined_stores_keep_the_verdict_of_a_run_that_was_aborted_elsewhere(tm
             opened.add(*held)
     assert [one.status for one in stored_runs(stores)] == ["passed", "crashed"]
     assert [one.status for one in stored_runs(stores[::-1])] == ["passed", "aborted"]
+
+
+@pytest.mark.parametrize("option", ["--csv", "--parquet"])
+def test_export_over_a_store_is_refused(eidrive: Eidrive, store: Path, option: str) -> None:
+    before = store.read_bytes()
+    result = eidrive("results", store, option, store.parent / "." / store.name)
+    assert result.exit_code == 2
+    assert f"{option} would overwrite an input file" in result.stderr
+    assert store.read_bytes() == before
