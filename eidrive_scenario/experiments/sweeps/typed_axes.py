@@ -25,17 +25,17 @@ def with_types(axes: Sequence[Axis], scenario: Path, *, is_distribution: bool = 
     """
     if not any(axis.is_interval and not is_setting(axis.name) for axis in axes):
         return tuple(axes)
-    whole: set[str] = set()
+    names: set[str] = set()
     with suppress(InputError):
         source = load_distribution(scenario).scenario if is_distribution else scenario
         declared = load_scenario(source).document.parameter_declarations
         if declared is not None:
-            whole = {one.name for one in declared.parameter_declaration if one.parameter_type in _WHOLE}
-    return tuple(_typed(axis, whole) for axis in axes)
+            names = {one.name for one in declared.parameter_declaration if one.parameter_type in _WHOLE}
+    return tuple(_typed(axis, names) for axis in axes)
 
 
-def _typed(axis: Axis, whole: set[str]) -> Axis:
-    if not axis.is_interval or is_setting(axis.name) or axis.name.removeprefix(PARAMETER) not in whole:
+def _typed(axis: Axis, names: set[str]) -> Axis:
+    if not axis.is_interval or is_setting(axis.name) or axis.name.removeprefix(PARAMETER) not in names:
         return axis
     typed = replace(axis, is_whole=True)
     low, high = typed.ends
