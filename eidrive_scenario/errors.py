@@ -99,6 +99,10 @@ class SettingError(InputError):
     """Invalid option, controller property or profile."""
 
 
+class OutputError(SettingError):
+    """Output path that cannot be written, or that another run writes."""
+
+
 class RegistryError(EidriveError):
     """Duplicate name of extensions, or an extension that does not load."""
 

@@ -75,5 +75,12 @@ class ReachPosition(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """Return the arrival time [s]; empty without arrival."""
-        return {} if self._reached is None else {f"{self.name}.time": self._reached}
+        """Return the arrival time [s] and the share of the time left until the deadline, 1 without one.
+
+        Empty without arrival. The nearest distance is no margin: a run that ends on arrival has that of the tolerance.
+        """
+        if self._reached is None:
+            return {}
+        by = self._settings.by
+        margin = 1.0 if by is None else max(0.0, 1.0 - self._reached / by)
+        return {f"{self.name}.time": self._reached, f"{self.name}.margin": margin}

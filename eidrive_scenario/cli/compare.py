@@ -61,6 +61,8 @@ def lines_of(found: Comparison) -> list[str]:
         lines.append(f"B is not worse than A by {found.margin:.1%} or more (p = {found.p_worse:.3g})")
     elif found.is_worse:
         lines.append("B is worse than A")
+    elif found.lost:
+        lines.append(f"undecided: B has no verdict of {found.lost} runs with a verdict in A; repeat them by --retry")
     else:
         lines.append(
             f"undecided: the runs do not show that B is not worse by {found.margin:.1%} or more "

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.recording import Explanation
 
+CONFIDENCE = 0.95
+"""Default confidence of `--success-rate`."""
+
 
 def run(
     ctx: typer.Context,
@@ -64,7 +67,9 @@ def run(
             help="Run seeds until it is shown whether the success rate is RATE; at most --repeat, or 500.",
         ),
     ] = None,
-    confidence: Annotated[float, rare(help="Confidence of --success-rate.")] = 0.95,
+    confidence: Annotated[
+        float | None, rare(help="Confidence of --success-rate.", show_default=f"{CONFIDENCE:g}")
+    ] = None,
     max_runs: Annotated[
         int | None,
         rare(
@@ -133,6 +138,8 @@ def run(
     if no_record and record not in (None, Keep.never):
         message = f"--no-record and --record {record} contradict each other"
         raise SettingError(Diagnostic(message, "remove one of them"))
+    if record is not None and out is None:
+        raise SettingError(Diagnostic("--record without --out has no effect", "add --out DIR"))
     kept = Keep.never.value if no_record else (record or Keep.always).value
     wanted: tuple[str, ...] = ()
     if topics is not None:
@@ -169,7 +176,9 @@ def run(
     if success_rate is not None:
         from eidrive_scenario.cli.rate import decision_code, rate_test
 
-        test = rate_test(success_rate, confidence, repeat)
+        test = rate_test(success_rate, CONFIDENCE if confidence is None else confidence, repeat)
+    elif confidence is not None:
+        raise SettingError(Diagnostic("--confidence without --success-rate has no effect", "add --success-rate RATE"))
     else:
         test = None
     most = repeat if test is None else test.limit

@@ -10,7 +10,9 @@ import typer
 
 from eidrive_scenario.cli.added_options import AllowTorchscript, Controllers, Keep, UserValues
 from eidrive_scenario.cli.error_output import print_warnings
+from eidrive_scenario.cli.interruption import interrupt_once
 from eidrive_scenario.cli.option_values import check_seconds, parse_assignments, parse_seeds, parse_shard
+from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.short_help import HelpAll, rare
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.exit_codes import ABORTED, PASSED
@@ -18,6 +20,7 @@ from eidrive_scenario.exit_codes import ABORTED, PASSED
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from eidrive_scenario.experiments.sweeps.axes import Axis
     from eidrive_scenario.experiments.sweeps.results import PointSummary
     from eidrive_scenario.experiments.sweeps.sweep import SweepProgress
 
@@ -77,7 +80,7 @@ def sweep(
         str | None,
         typer.Option(metavar="NAME=LOW:HIGH", help="Find the value at which the success rate crosses --bound."),
     ] = None,
-    bound: Annotated[float, rare(help="Success rate of --find-boundary.")] = 0.5,
+    bound: Annotated[float | None, rare(help="Success rate of --find-boundary.", show_default="0.5")] = None,
     tolerance: Annotated[
         float | None,
         rare(help="Accuracy of --find-boundary.", show_default="2 % of the range"),
@@ -104,9 +107,10 @@ def sweep(
         start_server()  # First, as it imports for as long as the imports below
 
     from eidrive_scenario.cli.sweep_progress import ProgressDisplay
-    from eidrive_scenario.cli.sweep_search import Search
+    from eidrive_scenario.cli.sweep_search import Search, check_search_options
     from eidrive_scenario.experiments.repetitions import cores
-    from eidrive_scenario.experiments.sweeps.axes import parse_axes
+    from eidrive_scenario.experiments.run_folder import check_writable
+    from eidrive_scenario.experiments.sweeps.axes import parse_axes, parse_axis
     from eidrive_scenario.experiments.sweeps.cluster import DaskWorkers
     from eidrive_scenario.experiments.sweeps.designs import points_of
     from eidrive_scenario.experiments.sweeps.execution import KeptFiles
@@ -114,6 +118,7 @@ def sweep(
     from eidrive_scenario.experiments.sweeps.searches import BATCH
     from eidrive_scenario.experiments.sweeps.store import ResultStore
     from eidrive_scenario.experiments.sweeps.sweep import run_sweep
+    from eidrive_scenario.experiments.sweeps.typed_axes import with_types
     from eidrive_scenario.experiments.sweeps.workers import LocalWorkers, Workers
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.simulation import RunSettings
@@ -136,10 +141,17 @@ def sweep(
         allow_torchscript=allow_torchscript,
     )
     chosen = None if seeds is None else parse_seeds("--seeds", seeds)
-    axes = parse_axes(vary or [])
+    kind = definition(path)
+
+    def typed(axes: Sequence[Axis]) -> tuple[Axis, ...]:
+        return with_types(axes, path, is_distribution=kind == "distribution")
+
+    axes = typed(parse_axes(vary or []))
     search = None
+    check_search_options(find_boundary is not None, falsify, bound, tolerance, objective)
     if falsify or find_boundary is not None:
-        search = Search.of(axes, find_boundary, bound, tolerance, falsify, objective, runs, chosen)
+        (boundary,) = (None,) if find_boundary is None else typed([parse_axis(find_boundary)])
+        search = Search.of(axes, boundary, bound, tolerance, falsify, objective, runs, chosen)
         axes, runs, chosen = search.fixed, None, chosen or [1]
         if shard is not None or design != "grid":
             raise SettingError(Diagnostic("a search has neither shards nor a design", "remove --shard and --design"))
@@ -151,7 +163,7 @@ def sweep(
         seeds=chosen,
         runs=runs,
         space=() if search is None else search.axes,
-        is_distribution=definition(path) == "distribution",
+        is_distribution=kind == "distribution",
     )
     jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
     if dry_run:
@@ -161,7 +173,9 @@ def sweep(
         if len(plan.points) > 10:
             typer.echo(f"  and {len(plan.points) - 10} more")
         raise typer.Exit
-    with ResultStore.open(store, versions()) as opened:
+    if out is not None:
+        check_writable(out)
+    with interrupt_once(), ResultStore.open(store, versions()) as opened:
         crew: Workers
         if scheduler is None:
             crew = LocalWorkers(min(workers or cores(), len(jobs) if search is None else BATCH))
@@ -209,15 +223,24 @@ def results(
     """
     import json as json_text
 
-    from eidrive_scenario.experiments.sweeps.results import indistinct, stored_runs, summaries, write_csv, write_parquet
+    from eidrive_scenario.experiments.sweeps.results import (
+        indistinct,
+        mixed_versions,
+        stored_runs,
+        summaries,
+        write_csv,
+        write_parquet,
+    )
     from eidrive_scenario.experiments.sweeps.store import PASSED as PASSED_RUN
 
     if not 0.0 < confidence < 1.0:
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
+    check_output_paths({"--csv": csv, "--parquet": parquet}, stores)
     found = list(stored_runs(stores))
     names = None if by is None else [name.strip() for name in by.split(",")]
     rows = summaries(found, by=names, interval=interval, confidence=confidence)
-    print_warnings([f"{warning}; a new store keeps them apart"] if (warning := indistinct(found)) else [])
+    warnings = (indistinct(found), mixed_versions(found))
+    print_warnings([f"{warning}; a new store keeps them apart" for warning in warnings if warning])
     if csv is not None:
         write_csv(found, csv)
     if parquet is not None:

@@ -10,7 +10,7 @@ from typing import Self
 import typer
 
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, check_different, parse_axis
+from eidrive_scenario.experiments.sweeps.axes import Axis, check_different
 from eidrive_scenario.experiments.sweeps.boundary import Boundary
 from eidrive_scenario.experiments.sweeps.execution import KeptFiles
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
@@ -21,6 +21,22 @@ from eidrive_scenario.experiments.sweeps.workers import Workers
 
 MOST_RUNS = 200
 """Default maximum number of runs of a search."""
+BOUND = 0.5
+"""Default success rate at the boundary."""
+
+
+def check_search_options(
+    finds_boundary: bool, falsifies: bool, bound: float | None, tolerance: float | None, objective: str | None
+) -> None:
+    """Raise SettingError for an option of a search that is not requested."""
+    options = (
+        ("--bound", bound, finds_boundary, "--find-boundary"),
+        ("--tolerance", tolerance, finds_boundary, "--find-boundary"),
+        ("--objective", objective, falsifies, "--falsify"),
+    )
+    for name, value, is_requested, search in options:
+        if value is not None and not is_requested:
+            raise SettingError(Diagnostic(f"{name} without {search} has no effect", f"add {search}, or remove {name}"))
 
 
 @dataclass(frozen=True)
@@ -44,8 +60,8 @@ class Search:
     def of(
         cls,
         axes: Sequence[Axis],
-        boundary: str | None,
-        bound: float,
+        boundary: Axis | None,
+        bound: float | None,
         tolerance: float | None,
         falsified: bool,
         objective: str | None,
@@ -60,12 +76,13 @@ class Search:
                 "remove it: each run has another seed" if boundary is not None else "give one seed, which all runs have"
             )
             raise SettingError(Diagnostic("--seeds does not fit to the search", hint))
+        bound = BOUND if bound is None else bound
         space = tuple(axis for axis in axes if axis.is_interval or len(axis.values) > 1)
         fixed = tuple(axis for axis in axes if axis not in space)
         most = runs or MOST_RUNS
         if boundary is None:
             return cls(None, bound, math.nan, space, fixed, objective, most)
-        axis = parse_axis(boundary)
+        axis = boundary
         check_different([*axes, axis])
         if not axis.is_interval:
             raise SettingError(Diagnostic(f"--find-boundary: {axis.name} is not an interval", "expected NAME=LOW:HIGH"))
@@ -74,7 +91,7 @@ class Search:
             raise SettingError(Diagnostic(f"--find-boundary: {space[0].name} varies, too", hint))
         if not 0.0 < bound < 1.0:
             raise SettingError(Diagnostic(f"--bound is {bound}", "give a success rate between 0 and 1"))
-        least = 0.02 * (axis.high - axis.low) if tolerance is None else tolerance
+        least = max(0.02 * (axis.high - axis.low), 0.5 * axis.is_whole) if tolerance is None else tolerance
         if not 0.0 < least < math.inf:
             raise SettingError(Diagnostic(f"--tolerance is {tolerance}", "give a positive number"))
         return cls(axis, bound, least, (), fixed, objective, most)

@@ -8,8 +8,9 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
-from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.errors import Diagnostic, InputError, OutputError
 from eidrive_scenario.files.atomic import partial_path
 from eidrive_scenario.files.lock import FileLock
 from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, read_result
@@ -98,7 +99,7 @@ def run_folder(parent: Path, settings: ResolvedSettings, *, own: bool) -> Iterat
     own  True: a folder below `parent`, named after the settings. A number is appended if another run with equal
          settings is in progress, or if the folder has other content. False: `parent` itself
 
-    Invalid input creates no files. Raise SettingError if the folder cannot be written, or if `parent` itself is in use
+    Invalid input creates no files. Raise OutputError if the folder cannot be written, or if `parent` itself is in use
     or contains the result of other settings.
     """
     folder = _claim_below(parent, settings) if own else _claim(parent, settings)
@@ -116,6 +117,18 @@ def run_folder(parent: Path, settings: ResolvedSettings, *, own: bool) -> Iterat
         folder.release()
 
 
+def check_writable(folder: Path) -> None:
+    """Create a folder, and raise OutputError if no file can be written there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(
+            Diagnostic(f"cannot write: {error.strerror}", "choose another folder", str(folder))
+        ) from error
+
+
 def _claim_below(parent: Path, settings: ResolvedSettings) -> RunFolder:
     name = folder_name(settings)
     for number in itertools.count(1):
@@ -128,17 +141,17 @@ def _claim_below(parent: Path, settings: ResolvedSettings) -> RunFolder:
         if number == _MAX_COPIES:
             break
     message = f"{_MAX_COPIES} folders of this name are in use"
-    raise SettingError(Diagnostic(message, "choose another folder", str(path)))
+    raise OutputError(Diagnostic(message, "choose another folder", str(path)))
 
 
 def _claim(path: Path, settings: ResolvedSettings) -> RunFolder:
     lock = _lock(path)
     if lock is None:
-        raise SettingError(Diagnostic("another run writes to this folder", "choose another folder", str(path)))
+        raise OutputError(Diagnostic("another run writes to this folder", "choose another folder", str(path)))
     if not _is_free(path, settings):
         lock.release()
         message = "the folder contains the result of a run with other settings"
-        raise SettingError(Diagnostic(message, "choose another folder", str(path)))
+        raise OutputError(Diagnostic(message, "choose another folder", str(path)))
     return RunFolder(path, lock)
 
 
@@ -149,7 +162,7 @@ def _lock(path: Path) -> FileLock | None:
             with suppress(FileNotFoundError):  # another process removed the empty folder
                 return FileLock.acquire(path / _LOCK)
     except OSError as error:
-        raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "choose another folder", str(path))) from error
+        raise OutputError(Diagnostic(f"cannot write: {error.strerror}", "choose another folder", str(path))) from error
 
 
 def _is_free(path: Path, settings: ResolvedSettings) -> bool:

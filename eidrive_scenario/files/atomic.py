@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.errors import Diagnostic, InputError, OutputError
 from eidrive_scenario.files.lock import FileLock
 
 PARTIAL = ".partial"
@@ -17,12 +17,12 @@ PARTIAL = ".partial"
 
 
 def create(path: str | Path) -> BinaryIO:
-    """Open a new file for writing and create its folders. Raise SettingError if it cannot be written."""
+    """Open a new file for writing and create its folders. Raise OutputError if it cannot be written."""
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         return Path(path).open("wb")
     except OSError as error:
-        raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
+        raise OutputError(Diagnostic(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
 
 
 def partial_path(path: Path) -> Path:
@@ -36,11 +36,11 @@ def atomic_output(path: Path) -> Iterator[Path]:
 
     After an error or an interruption the file keeps the partial name, so that it is not mistaken for a complete run;
     after invalid input it is removed. Two runs never write the same file at the same time. A path that is not a
-    regular file, such as /dev/stdout, is written directly. Raise SettingError if the path is a folder, or if another
+    regular file, such as /dev/stdout, is written directly. Raise OutputError if the path is a folder, or if another
     run writes there.
     """
     if os.path.isdir(path):
-        raise SettingError(Diagnostic("cannot write: Is a directory", "choose another place", str(path)))
+        raise OutputError(Diagnostic("cannot write: Is a directory", "choose another place", str(path)))
     if os.path.islink(path) or (os.path.exists(path) and not os.path.isfile(path)):
         yield path
         return
@@ -59,7 +59,7 @@ def atomic_output(path: Path) -> Iterator[Path]:
 def exclusive(path: Path) -> Iterator[None]:
     """Lock a file against other processes that use this function.
 
-    Paths that are not regular files, and folders in which no lock can be created, are not locked. Raise SettingError
+    Paths that are not regular files, and folders in which no lock can be created, are not locked. Raise OutputError
     if another process has the lock.
     """
     if os.path.exists(path) and not os.path.isfile(path):
@@ -71,7 +71,7 @@ def exclusive(path: Path) -> Iterator[None]:
         path.parent.mkdir(parents=True, exist_ok=True)
         lock = FileLock.acquire(path.parent / f".{name}.lock")
         if lock is None:
-            raise SettingError(Diagnostic("another run writes this file", "choose another file", str(path)))
+            raise OutputError(Diagnostic("another run writes this file", "choose another file", str(path)))
     try:
         yield
     finally:

@@ -55,6 +55,13 @@ class Rewards:
         """Whether a term depends on the route."""
         return self.settings.progress != 0.0
 
+    def check_criteria(self, names: Collection[str]) -> None:
+        """Raise SettingError if the criteria of the run do not have a weighted name."""
+        unknown = next((name for name in self.settings.criteria if name not in names), None)
+        if unknown is not None:
+            message = f"reward: the run has no criterion {unknown!r}"
+            raise SettingError(Diagnostic(message, suggestion(unknown, names)))
+
     def terms_of_tick(
         self,
         before: WorldView,
@@ -94,10 +101,7 @@ class Rewards:
     def terms_of_end(self, result: RunResult) -> dict[str, float]:
         """Return the terms of the end of a run. Raise SettingError if the run has no criterion of a weighted name."""
         verdicts = {verdict.name: verdict.passed for verdict in result.criteria}
-        unknown = next((name for name in self.settings.criteria if name not in verdicts), None)
-        if unknown is not None:
-            message = f"reward: the run has no criterion {unknown!r}"
-            raise SettingError(Diagnostic(message, suggestion(unknown, verdicts)))
+        self.check_criteria(verdicts)
         weights = self.settings
         terms = {f"criteria.{name}": weight * verdicts[name] for name, weight in weights.criteria.items()}
         terms["passed"] = weights.passed * result.passed

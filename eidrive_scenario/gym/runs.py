@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
+from eidrive_scenario.evaluation.criteria_parser import EXITS
 from eidrive_scenario.gym.episode import Episode
 from eidrive_scenario.gym.station_interface import InterfaceSettings, StationInterface
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
@@ -58,7 +59,8 @@ class Runs:
 
         drawn_seed  seed of the run, unless the options contain one
 
-        The steps are counted from that tick on. Raise SettingError for unknown options.
+        The steps are counted from that tick on. Raise SettingError for unknown options, and for the reward of a
+        criterion that the run does not have.
         """
         given = options or {}
         unknown = next((key for key in given if key not in OPTIONS), None)
@@ -71,6 +73,9 @@ class Runs:
             settings = replace(settings, parameters={**settings.parameters, **parameters})
         episode = self._episode(given.get("seed", drawn_seed), settings)
         try:
+            criteria = [*EXITS, *(criterion.name for criterion in episode.simulation.criteria)]
+            for interface in self.interfaces.values():
+                interface.rewards.check_criteria(criteria)
             episode.begin()
             while episode.result is None and not any(name in episode.perceived for name in self.interfaces):
                 episode.advance(lambda perceived: {})

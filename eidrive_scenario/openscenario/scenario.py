@@ -136,9 +136,10 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     assignments = as_assignments(parameters)
     read = read_root(document, collector, assignments)
     if read is None or read.root.catalog is not None or read.root.parameter_value_distribution is not None:
-        collector.raise_on_error()
+        if read is None or not assignments:
+            collector.raise_on_error()
         assert read is not None  # an unknown version is an error
-        raise ScenarioError(_other_kind(read.root, document.name))
+        raise ScenarioError(_other_kind(read.root, document.name))  # before errors of the assigned parameters
     root = read.root
     library = CatalogLibrary(root.catalog_locations, document.folder, read.parameters, collector)
     library.resolve(read.references)

@@ -31,6 +31,12 @@ if TYPE_CHECKING:
     from eidrive_scenario.simulation import RunResult
 
 _KEYWORDS = ("channel", "seeds", "success_rate", "drive", "criteria")
+_NAMES: Mapping[str, str] = {
+    "distribution": "a parameter value distribution, whose runs are tests by `pytest FILE`",
+    "catalog": "a catalog",
+    "roads": "an OpenDRIVE file",
+}
+"""Descriptions of files that are no scenarios, by definition."""
 
 
 @dataclass(frozen=True)
@@ -136,16 +142,24 @@ def _added(marker: pytest.Mark, folder: Path) -> MarkerSettings:
 def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
     """Return scenarios beside the test file, else below the root, else in the library.
 
-    A pattern without suffix is a name. Raise ValueError if no scenario matches.
+    A pattern without suffix is a name. Raise ValueError if no scenario matches, or only other files.
     """
+    others: list[Path] = []
     glob = str(pattern) if str(pattern).endswith(".xosc") else f"{pattern}.xosc"
     if not Path(glob).is_absolute():
         for folder in (metafunc.definition.path.parent, metafunc.config.rootpath, library_path()):
-            found = sorted(path for path in folder.glob(glob) if definition(path) in ("scenario", "unreadable"))
+            files = sorted(folder.glob(glob))
+            found = [path for path in files if definition(path) in ("scenario", "unreadable")]
             if found:
                 return found
+            others += files
     elif is_regular_file(glob):
-        return [Path(glob)]
+        if definition(Path(glob)) in ("scenario", "unreadable"):
+            return [Path(glob)]
+        others.append(Path(glob))
+    if others:
+        found_text = f"got {_NAMES.get(definition(others[0]), 'another file')}; expected a scenario"
+        raise ValueError(f"marker scenario: {str(pattern)!r} matches {others[0]} ({found_text})")
     raise ValueError(f"no scenario matches {str(pattern)!r} beside the test file, below the root or in the library")
 
 

@@ -21,7 +21,12 @@ def driving(frame: Any, car: Any) -> list[Any]:
 
 @pytest.mark.parametrize(
     ("settings", "passed", "nearest"),
-    [({"within": 3}, True, 3.0), ({"within": 2.9}, False, 3.0), ({"within": 3, "by": 1.5}, False, 34**0.5)],
+    [
+        ({"within": 3}, True, 3.0),
+        ({"within": 3, "by": 8}, True, 3.0),
+        ({"within": 2.9}, False, 3.0),
+        ({"within": 3, "by": 1.5}, False, 34**0.5),
+    ],
 )
 def test_reach_position_depends_on_tolerance_and_deadline(
     frame: Any, car: Any, settings: dict[str, Any], passed: bool, nearest: float
@@ -30,7 +35,9 @@ def test_reach_position_depends_on_tolerance_and_deadline(
     (verdict,) = evaluate_criteria(driving(frame, car), [criterion])
     assert verdict.passed is passed
     assert verdict.value == pytest.approx(nearest)
-    assert criterion.metrics() == ({"reach_position.time": 2.0} if passed else {})
+    by = settings.get("by")
+    margin = 1.0 if by is None else 1.0 - 2.0 / by
+    assert criterion.metrics() == ({"reach_position.time": 2.0, "reach_position.margin": margin} if passed else {})
 
 
 def test_reach_position_is_fatal_after_the_deadline_only(frame: Any, car: Any) -> None:

@@ -41,20 +41,37 @@ class Axis:
             channel profile, such as `channel.delay.seconds`
     values  values of a list or a range; () for an interval
     low, high  limits of an interval, for designs that sample
+    is_whole   whether an interval consists of its whole numbers, as for a parameter of an integer type
     """
 
     name: str
     values: tuple[Scalar, ...] = ()
     low: float = math.nan
     high: float = math.nan
+    is_whole: bool = False
 
     @property
     def is_interval(self) -> bool:
         """Whether the axis is an interval without single values."""
         return not self.values
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and greatest value of an interval."""
+        return (math.ceil(self.low), math.floor(self.high)) if self.is_whole else (self.low, self.high)
+
+    def nearest(self, value: float) -> float:
+        """Return the value of an interval that is nearest to a number in it."""
+        if not self.is_whole:
+            return value
+        low, high = self.ends
+        return int(min(max(round(value), low), high))
+
     def at(self, share: float) -> Scalar:
         """Return the value at a share in [0, 1): of the interval, or of the list."""
+        if self.is_whole:
+            low, high = self.ends
+            return int(low) + min(int(share * (high - low + 1)), int(high - low))
         if self.is_interval:
             return float(self.low + share * (self.high - self.low))
         return self.values[min(int(share * len(self.values)), len(self.values) - 1)]

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
+import uuid
 from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import ExitStack
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, suppress
 from typing import Any, TypeVar
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.sweeps.execution import end_with_hung_runs
+from eidrive_scenario.experiments.sweeps.cluster_calls import call_in_child, end_children
 from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.project import VARIABLE
-from eidrive_scenario.registry import use_project
 
 R = TypeVar("R")
 SLURM, KUBERNETES = "slurm", "kubernetes"
@@ -26,7 +27,9 @@ AHEAD = 3
 class DaskWorkers:
     """Workers of a Dask cluster with the interface of `concurrent.futures`.
 
-    A run whose worker is lost is repeated by Dask, up to its setting `distributed.scheduler.allowed-failures`.
+    A worker executes each run in a child process, whose end affects this run only. The children belong to one sweep, so
+    that they import extensions as they are when it starts. A run whose worker is lost is repeated by Dask, up to its
+    setting `distributed.scheduler.allowed-failures`.
     """
 
     def __init__(self, client: Any, resources: ExitStack) -> None:
@@ -34,6 +37,7 @@ class DaskWorkers:
         self._resources = resources
         self._executor = client.get_executor(pure=False)
         self._killed = optional_import("distributed", "cluster").KilledWorker
+        self._sweep = uuid.uuid4().hex
 
     @classmethod
     def connect(cls, scheduler: str, count: int | None) -> DaskWorkers:
@@ -70,27 +74,15 @@ class DaskWorkers:
     def submit(self, function: Callable[..., R], /, *arguments: Any) -> Future[R]:
         project = os.environ.get(VARIABLE)
         folder = None if project is None else os.path.abspath(project)
-        future: Future[R] = self._executor.submit(run_in_worker, folder, function, *arguments)
+        future: Future[R] = self._executor.submit(call_in_child, self._sweep, folder, function, *arguments)
         return future
 
     def is_crash(self, error: BaseException) -> bool:
-        return isinstance(error, self._killed)
+        return isinstance(error, self._killed | BrokenProcessPool)
 
     def close(self) -> None:
         self._executor.shutdown(wait=False)
+        if self._client.status == "running":  # else the scheduler has ended
+            with suppress(Exception):  # of workers that have left
+                self._client.run(end_children, self._sweep, on_error="ignore")
         self._resources.close()
-
-
-def run_in_worker(folder: str | None, function: Callable[..., R], /, *arguments: Any) -> R:
-    """Return the result of a call in a worker, which does not inherit the environment of the command.
-
-    folder  folder of the project whose extensions are used; None for none
-
-    A worker with a nanny, which replaces it, ends with code that does not return.
-    Raise SettingError for an invalid project, and RegistryError if another extension has one of the names.
-    """
-    if folder is not None:
-        use_project(folder)
-    if optional_import("distributed", "cluster").get_worker().nanny is not None:
-        end_with_hung_runs()
-    return function(*arguments)

@@ -11,7 +11,7 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.paired import PairedDifference, PairedVerdicts, paired_difference
 from eidrive_scenario.experiments.sweeps.results import Identity, identity, indistinct, stored_runs
-from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, StoredRun
+from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, FAILED, INVALID, PASSED, StoredRun
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Comparison:
 
     verdicts   pairs of runs by their verdicts
     unpaired   number of runs with a verdict in one sweep only
+    lost       number of runs with a verdict in the first sweep that were aborted, crashed or invalid in the second one
     identical  number of pairs with equal trace hashes
     interval   of the difference of the success rates, second minus first
     p_value    McNemar's exact test of equal rates, two-sided
@@ -30,6 +31,7 @@ class Comparison:
 
     verdicts: PairedVerdicts
     unpaired: int
+    lost: int
     identical: int
     interval: tuple[float, float]
     p_value: float
@@ -40,8 +42,8 @@ class Comparison:
 
     @property
     def is_not_worse(self) -> bool:
-        """Whether the runs show that the second sweep is not worse by the margin."""
-        return self.p_worse < 1.0 - self.confidence
+        """Whether the runs show that the second sweep is not worse by the margin, and it has lost no verdict."""
+        return not self.lost and self.p_worse < 1.0 - self.confidence
 
     @property
     def is_worse(self) -> bool:
@@ -74,6 +76,7 @@ def compare(
     return Comparison(
         verdicts,
         with_verdict - 2 * len(judged),
+        sum(a.status in (PASSED, FAILED) and b.status in (ABORTED, CRASHED, INVALID) for a, b in pairs),
         sum(a.result.get("trace_hash") == b.result.get("trace_hash") for a, b in judged),
         verdicts.interval(confidence),
         verdicts.p_value(),

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-import threading
+import signal
 import time
 import traceback
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 
-from eidrive_scenario.errors import ConstraintError, InputError, WallLimitError
-from eidrive_scenario.exit_codes import ABORTED as ABORTED_CODE
+from eidrive_scenario.errors import ConstraintError, InputError, OutputError, WallLimitError
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, source_of
@@ -30,25 +28,18 @@ from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import ConcreteRun
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.simulation.result_views import typed
-from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
+from eidrive_scenario.wall_limit import running_line
 
-_one_run = threading.Lock()
-"""A process executes one run at a time, as workers of a cluster may have several threads."""
+_is_worker = False
+"""Whether this process only executes runs, so that no user interrupts it."""
 
 
 def prepare_process() -> None:
-    """Prepare a worker process: equal images are processed once, and code that never returns ends the process."""
+    """Prepare a worker process: equal images are processed once, and an interruption ends the command, not the run."""
+    global _is_worker
     image_memory.activate(image_memory.ImageMemory())
-    end_with_hung_runs()
-
-
-def end_with_hung_runs() -> None:
-    """End this process at a wall limit if the code of the run does not return."""
-    set_last_resort(LastResort(_end_process))
-
-
-def _end_process(limit: Limit, frame: FrameType | None) -> None:
-    os._exit(ABORTED_CODE)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _is_worker = True
 
 
 @dataclass(frozen=True)
@@ -66,42 +57,45 @@ class KeptFiles:
 
 
 def execute(job: SweepJob, wall_limit: float | None, files: KeptFiles | None = None) -> StoredRun:
-    """Run a job and return its row; errors are rows, too.
+    """Run a job and return its row; errors are rows, too, also interruptions that an extension raises in a worker.
 
     wall_limit  limit of the wall time of loading and run [s]
     files       files that are kept; None for none
     """
-    with _one_run:
-        start = time.perf_counter()
-        try:
-            result = run_and_save(
-                source_of(job),
-                seed=job.seed,
-                settings=job.settings,
-                below=None if files is None else files.below,
-                record=False if files is None else files.record,
-                wall_limit=wall_limit,
-            )
-            return StoredRun(
-                key=job.key,
-                number=job.number,
-                scenario=result.scenario,
-                run=job.run,
-                seed=job.seed,
-                status=PASSED if result.passed else FAILED,
-                point=dict(job.point),
-                result={**result.to_dict(), **_folder(result.folder, files)},
-                error="",
-                command=result.command,
-                wall_s=round(time.perf_counter() - start, 4),
-                settings=result.settings.canonical,
-            )
-        except ConstraintError as error:
-            return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
-        except InputError as error:
-            return _without_result(job, INVALID, str(error), time.perf_counter() - start)
-        except Exception as error:
-            return _without_result(job, ABORTED, _message(error), time.perf_counter() - start)
+    start = time.perf_counter()
+    try:
+        result = run_and_save(
+            source_of(job),
+            seed=job.seed,
+            settings=job.settings,
+            below=None if files is None else files.below,
+            record=False if files is None else files.record,
+            wall_limit=wall_limit,
+        )
+        return StoredRun(
+            key=job.key,
+            number=job.number,
+            scenario=result.scenario,
+            run=job.run,
+            seed=job.seed,
+            status=PASSED if result.passed else FAILED,
+            point=dict(job.point),
+            result={**result.to_dict(), **_folder(result.folder, files)},
+            error="",
+            command=result.command,
+            wall_s=round(time.perf_counter() - start, 4),
+            settings=result.settings.canonical,
+        )
+    except ConstraintError as error:
+        return _without_result(job, EXCLUDED, str(error), time.perf_counter() - start)
+    except OutputError as error:  # not of the inputs, so that --retry repeats the run
+        return _without_result(job, ABORTED, str(error), time.perf_counter() - start)
+    except InputError as error:
+        return _without_result(job, INVALID, str(error), time.perf_counter() - start)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) and not _is_worker:
+            raise
+        return _without_result(job, ABORTED, _message(error), time.perf_counter() - start)
 
 
 def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
@@ -114,6 +108,11 @@ def _folder(folder: Path | None, files: KeptFiles | None) -> dict[str, str]:
 def crashed(job: SweepJob, message: str) -> StoredRun:
     """Return the row of a job whose worker process ended."""
     return _without_result(job, CRASHED, message, 0.0)
+
+
+def hung(job: SweepJob, message: str, wall_limit: float | None) -> StoredRun:
+    """Return the row of a job whose code did not return at the limit of its wall time [s]."""
+    return _without_result(job, ABORTED, message, wall_limit or 0.0)
 
 
 def _without_result(job: SweepJob, status: str, message: str, wall_s: float) -> StoredRun:
@@ -137,8 +136,10 @@ def _without_result(job: SweepJob, status: str, message: str, wall_s: float) -> 
     )
 
 
-def _message(error: Exception) -> str:
+def _message(error: BaseException) -> str:
     """Return the error of a run; with its traceback if it is none of a run."""
+    if isinstance(error, KeyboardInterrupt):
+        return f"{running_line(error.__traceback__)}: KeyboardInterrupt (an extension cannot interrupt a sweep)"
     if isinstance(error, WallLimitError) or type(error).__module__.startswith("eidrive_scenario"):
         return str(error)
     return "".join(traceback.format_exception(error)).rstrip()

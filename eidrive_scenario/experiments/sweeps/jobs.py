@@ -134,13 +134,13 @@ def plan_of(
     _check_names_of_runs(scenario, probes, settings, is_distribution)
     if is_distribution:
         numbers = range(len(load_distribution(scenario)))
+        _check_total(len(numbers) * len(points))  # before the list of them
         points, probes = (
             [{RUN: number, **point} for number in numbers for point in several] for several in (points, probes)
         )
     chosen = _seeds(len(points), None if seeds is None else list(seeds), runs)
     total = len(points) * len(chosen)
-    if not 0 < total <= MOST_RUNS:
-        raise SettingError(Diagnostic(f"the sweep has {total} runs", f"expected 1 to {MOST_RUNS}"))
+    _check_total(total)
     first = first_resolved(scenario, probes, settings)
     profile = first.channel_profile
     _check_names(probes, first.parameters)
@@ -154,12 +154,18 @@ def plan_of(
     return plan
 
 
+def _check_total(total: int) -> None:
+    """Raise SettingError for a number of runs that a sweep does not have."""
+    if not 0 < total <= MOST_RUNS:
+        raise SettingError(Diagnostic(f"the sweep has {total} runs", f"expected 1 to {MOST_RUNS}"))
+
+
 def _with_space(points: Sequence[Point], space: Sequence[Axis]) -> Sequence[Point]:
     """Return the points of a search that have each value of a list, and both ends of an interval, once."""
     if not space:
         return points
     start = {axis.name: axis.at(0.0) for axis in space}
-    ends = [(axis.name, value) for axis in space for value in axis.values or (axis.low, axis.high)]
+    ends = [(axis.name, value) for axis in space for value in axis.values or axis.ends]
     return [{**point, **start, name: value} for point in points for name, value in ends]
 
 

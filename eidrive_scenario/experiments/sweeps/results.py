@@ -12,7 +12,7 @@ import msgspec
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.experiments.statistics.proportions import Proportion, anytime_interval, clopper_pearson, wilson
-from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, STATUSES, ResultStore, StoredRun
+from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import atomic_output
 from eidrive_scenario.optional_imports import optional_import
 from eidrive_scenario.recording.text.csv_writer import neutralize_formula
@@ -45,12 +45,23 @@ class PointSummary:
 
 
 def stored_runs(paths: Sequence[Path]) -> Iterator[StoredRun]:
-    """Yield the runs of several stores; those of a later store replace equal ones. Raise SettingError as a store."""
-    found: dict[str, StoredRun] = {}
+    """Yield the runs of several stores; of equal runs, the last one with a verdict. Raise SettingError as a store."""
+    found = {run.key: run for run, _ in runs_with_stores(paths)}
+    return iter(sorted(found.values(), key=lambda run: (run.number, run.key)))
+
+
+def runs_with_stores(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
+    """Yield the runs of several stores with their store, in the order of the stores.
+
+    Of equal runs, the last one counts that was not aborted or crashed, as another try may have a verdict.
+    """
+    found: dict[str, tuple[StoredRun, Path]] = {}
     for path in paths:
         with ResultStore.read(path) as store:
-            found.update((run.key, run) for run in store.runs())
-    return iter(sorted(found.values(), key=lambda run: (run.number, run.key)))
+            for run in store.runs():
+                if run.key not in found or run.status not in REPEATABLE or found[run.key][0].status in REPEATABLE:
+                    found[run.key] = run, path
+    yield from found.values()
 
 
 def identity(run: StoredRun) -> Identity:
@@ -65,6 +76,25 @@ def indistinct(runs: Sequence[StoredRun]) -> str:
         return ""
     what = "1 run repeats another one" if count == 1 else f"{count} runs repeat other ones"
     return f"{what} with other options, or after a change of a file"
+
+
+def mixed_versions(runs: Iterable[StoredRun]) -> str:
+    """Return a warning of runs by different versions of a package; empty without such runs.
+
+    A store has runs of one version of the engine, but combined stores and packages of extensions may differ.
+    """
+    found: dict[str, dict[str, int]] = {}
+    for run in runs:
+        versions = msgspec.json.decode(run.settings, type=_Versions).versions if run.settings else {}
+        for name, version in versions.items():
+            counts = found.setdefault(name, {})
+            counts[version] = counts.get(version, 0) + 1
+    texts = [
+        f"{name} {', '.join(f'{version} ({count})' for version, count in sorted(counts.items()))}"
+        for name, counts in sorted(found.items())
+        if len(counts) > 1
+    ]
+    return f"the success rates mix runs of different versions: {'; '.join(texts)}" if texts else ""
 
 
 def summaries(
@@ -124,6 +154,12 @@ class _VariedNames(msgspec.Struct):
     varied: tuple[str, ...] = ()
 
 
+class _Versions(msgspec.Struct):
+    """Versions of packages among the settings of a run."""
+
+    versions: dict[str, str] = {}
+
+
 def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:
     """Return the sort key of points: along each axis numbers in ascending order, then texts in order of appearance."""
     places: dict[str, dict[Any, int]] = {}
@@ -166,7 +202,7 @@ def write_csv(runs: Iterable[StoredRun], path: Path) -> None:
     names, rows = as_table(runs)
     with atomic_output(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(names)
+        writer.writerow(map(neutralize_formula, names))
         writer.writerows([[_cell(row.get(name)) for name in names] for row in rows])
 
 

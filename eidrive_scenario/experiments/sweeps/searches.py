@@ -48,7 +48,7 @@ def find_boundary(
     search = BoundarySearch(axis.low, axis.high, bound)
     started = 0
     while started < runs:
-        values = search.proposals(min(BATCH, runs - started))
+        values = [axis.nearest(value) for value in search.proposals(min(BATCH, runs - started))]
         jobs = [
             plan.job(started + row, {**plan.points[0], axis.name: value}, started + row + 1)
             for row, value in enumerate(values)
@@ -177,19 +177,27 @@ def _objective(run: StoredRun, name: str | None) -> float | None:
     if name is not None:
         value: Any = run.result.get(name)
         return float(value) if _is_number(value) else None
-    margins = [_margin(run, key.removesuffix(".passed")) for key in run.result if key.endswith(".passed")]
-    return min(margins, default=None)
+    criteria = [key.removesuffix(".passed") for key in run.result if key.endswith(".passed")]
+    margins = [margin for criterion in criteria if (margin := _margin(run, criterion)) is not None]
+    return min(margins, default=1.0 if criteria else None)
 
 
-def _margin(run: StoredRun, criterion: str) -> float:
-    """Return the margin of a criterion: distance of its value from its limit over the limit, negative if it failed."""
+def _margin(run: StoredRun, criterion: str) -> float | None:
+    """Return the margin of a criterion: distance of its value from its limit over the limit, negative if it failed.
+
+    The metric `margin` of a criterion takes precedence if it passed. One that passed without value or limit has none:
+    it would hide the larger margins of others.
+    """
     passed = bool(run.result[f"{criterion}.passed"])
+    stated: Any = run.result.get(f"{criterion}.margin")
+    if passed and _is_number(stated):
+        return float(stated)
     value: Any = run.result.get(f"{criterion}.value")
     limit: Any = run.result.get(f"{criterion}.limit")
-    margin = 1.0
     if _is_number(value) and _is_number(limit) and limit != 0:
-        margin = abs((value - limit) / limit)
-    return margin if passed else -margin
+        margin = abs(float(value - limit) / float(limit))
+        return margin if passed else -margin
+    return None if passed else -1.0
 
 
 def _is_number(value: Any) -> bool:
@@ -198,12 +206,15 @@ def _is_number(value: Any) -> bool:
 
 def _distributions(optuna: Any, axes: Sequence[Axis]) -> dict[str, Any]:
     kinds = optuna.distributions
-    return {
-        axis.name: kinds.FloatDistribution(axis.low, axis.high)
-        if axis.is_interval
-        else kinds.CategoricalDistribution(axis.values)
-        for axis in axes
-    }
+    found = {}
+    for axis in axes:
+        if axis.is_whole:
+            found[axis.name] = kinds.IntDistribution(*axis.ends)
+        elif axis.is_interval:
+            found[axis.name] = kinds.FloatDistribution(*axis.ends)
+        else:
+            found[axis.name] = kinds.CategoricalDistribution(axis.values)
+    return found
 
 
 def _values(axes: Sequence[Axis], params: dict[str, Any]) -> dict[str, Scalar]:

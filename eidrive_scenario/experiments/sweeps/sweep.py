@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.experiments.sweeps.execution import KeptFiles, crashed, execute
+from eidrive_scenario.experiments.sweeps.execution import KeptFiles, crashed, execute, hung
+from eidrive_scenario.experiments.sweeps.hang_reports import HungRunError
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob
 from eidrive_scenario.experiments.sweeps.store import EXCLUDED, FAILED, PASSED, REPEATABLE, ResultStore, StoredRun
 from eidrive_scenario.experiments.sweeps.workers import Workers
@@ -126,31 +127,45 @@ def run_sweep(
         progress.count(run)
         shown(progress, run)
 
+    def end(future: Future[StoredRun]) -> None:
+        job, tries = running.pop(future)
+        error = _error_of(future)
+        if error is None:
+            writer.add(future.result())
+        elif isinstance(error, HungRunError):
+            writer.add(hung(job, error.describe(wall_limit), wall_limit))
+        elif not workers.is_crash(error):
+            raise error
+        elif tries < TRIES:
+            again.append((job, tries + 1))
+        else:
+            writer.add(crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}"))
+
     waiting = left()
+    again: deque[tuple[SweepJob, int]] = deque()
     shown(progress, None)
     with RunWriter(store, written) as writer:
-        while True:
-            while len(running) < workers.capacity and (job := next(waiting, None)) is not None:
-                start(job, 1)
-            events: list[Future[Any]] = [*running]
-            if writer.transaction is not None:
-                events.append(writer.transaction)
-            if not events:
-                break
-            ended = wait(events, return_when=FIRST_COMPLETED).done
-            if writer.transaction in ended:
-                writer.collect()
-            for future in [future for future in running if future in ended]:
-                job, tries = running.pop(future)
-                error = _error_of(future)
-                if error is None:
+        try:
+            while True:
+                while len(running) < workers.capacity and (job := next(waiting, None)) is not None:
+                    start(job, 1)
+                if again and not running:  # alone, so that the end of its worker has no other cause
+                    start(*again.popleft())
+                events: list[Future[Any]] = [*running]
+                if writer.transaction is not None:
+                    events.append(writer.transaction)
+                if not events:
+                    break
+                ended = wait(events, return_when=FIRST_COMPLETED).done
+                if writer.transaction in ended:
+                    writer.collect()
+                for future in [future for future in running if future in ended]:
+                    end(future)
+        except BaseException:
+            for future in [future for future in running if future.done() and not future.cancelled()]:
+                if future.exception() is None:
                     writer.add(future.result())
-                elif not workers.is_crash(error):
-                    raise error
-                elif tries < TRIES:
-                    start(job, tries + 1)
-                else:
-                    writer.add(crashed(job, f"the worker process ended in {tries} of {tries} tries: {error}"))
+            raise
     shown(progress, None)
     return progress
 

@@ -200,7 +200,7 @@ class LiveView:
         """Send the parts of the page around the frames."""
         values = self._values
         fragments = {name: render_page(f"replay/{name}.html.jinja", **values) for name in _FRAGMENTS}
-        decisive = decisive_instant(self._instants, values["result"])
+        decisive = decisive_instant(self._instants, values["result"], self._builder.actors if self._builder else ())
         self._feed.add("page", {**fragments, "decisive": decisive, "ended": self._ended.is_set()})
 
     def _render(self) -> bytes:

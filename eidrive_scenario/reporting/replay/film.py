@@ -79,7 +79,7 @@ class RecordedStation:
             raise SettingError(Diagnostic(f"--station: the run has no actor {name!r}", f"known: {known}"))
         self.name = name or next(iter([*driven, *stations, *actors]))
         self._entry = actors.get(self.name, (0.0, 0.0))
-        decisive = decisive_instant({"contact": series.contact, "decisive": series.decisive}, result)
+        decisive = decisive_instant({"contact": series.contact, "decisive": series.decisive}, result, actors)
         self.decisive: float = decisive["time"] if decisive is not None else self.times[0]
         """Decisive instant [s]."""
         self.damage = report.lines()

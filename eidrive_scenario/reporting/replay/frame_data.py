@@ -108,6 +108,11 @@ class ReplayBuilder:
             shown = f"the first {self._messages.count} are shown"
             self._report.add("the page does not show all messages", shown)
 
+    @property
+    def actors(self) -> frozenset[str]:
+        """Names of the actors of all frames."""
+        return frozenset(self._actors)
+
     def take(self) -> Data:
         """Return the data of the frames since the last call, in the format of `replay_data`.
 

@@ -67,7 +67,7 @@ def make_replay(
     if result is not None and result.get("trace_hash") != trace.hexdigest():
         report.add("the result in the folder has another trace hash: its verdicts may belong to another run")
     verdicts = None if result is None else parse_run(result, result_file)
-    data["decisive"] = decisive_instant(data, verdicts)
+    data["decisive"] = decisive_instant(data, verdicts, data["actors"])
     values = page_values(
         recording.scenario or recording.path.stem,
         recording.seed,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from eidrive_scenario.reporting.drawing.canvas import HOUSE
@@ -78,11 +78,14 @@ def page_values(
     }
 
 
-def decisive_instant(data: Data, result: ReportedRun | None) -> dict[str, Any] | None:
+def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[str]) -> dict[str, Any] | None:
     """Return the decisive instant of a run: its first contact, the smallest distance that a criterion measured, or the
-    smallest gap of a driven vehicle; None without any of them."""
+    smallest gap of a driven vehicle; None without any of them.
+
+    names  names of the actors
+    """
     if result is not None and data["contact"] is None:
-        approach = closest_approach(result.metrics, [verdict.value for verdict in result.criteria])
+        approach = closest_approach(result.metrics, [verdict.value for verdict in result.criteria], names)
         if approach is not None:
             return approach
     found: dict[str, Any] | None = data["decisive"]

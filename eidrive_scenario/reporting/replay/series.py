@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -122,9 +122,12 @@ class SeriesBuilder:
             self._least = gap, time, pair
 
 
-def closest_approach(metrics: Mapping[str, float | None], values: Sequence[float | None]) -> Values | None:
+def closest_approach(
+    metrics: Mapping[str, float | None], values: Sequence[float | None], names: Collection[str] = ()
+) -> Values | None:
     """Return the instant of the smallest distance that a criterion `min_distance` measured, or None.
 
+    names   names of the actors, which may contain dots
     values  those of the verdicts of the run: a criterion measures either the distance of the centers or that of the
             bodies, and the time among its metrics is that of the measured one
     """
@@ -138,11 +141,20 @@ def closest_approach(metrics: Mapping[str, float | None], values: Sequence[float
             measured = both[-1] if both else center
             if measured is not None and math.isfinite(measured):
                 ends = "centers" if measured == center else "bodies"
-                found.append((measured, time, pair.replace(".", " and "), ends))
+                found.append((measured, time, _pair_text(pair, names), ends))
     if not found:
         return None
     distance, time, pair, ends = min(found)
     return {"time": round(time, 4), "text": f"closest approach of {pair}: {distance:.2f} m between {ends}"}
+
+
+def _pair_text(pair: str, names: Collection[str]) -> str:
+    """Return the text of the two names in `A.B`; the same text if a dot in a name leaves them unknown."""
+    parts = pair.split(".")
+    splits = [(".".join(parts[:row]), ".".join(parts[row:])) for row in range(1, len(parts))]
+    known = [split for split in splits if split[0] in names and split[1] in names]
+    found = known or (splits if len(splits) == 1 else [])
+    return " and ".join(found[0]) if found else pair
 
 
 def _rounded(value: float, digits: int) -> float | None:

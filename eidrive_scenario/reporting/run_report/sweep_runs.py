@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
-from eidrive_scenario.experiments.sweeps.results import stored_runs
+from eidrive_scenario.experiments.sweeps.results import runs_with_stores
 from eidrive_scenario.experiments.sweeps.store import FAILED, FOLDER, PASSED, StoredRun
 from eidrive_scenario.recording.run_files import RESULT, read_result
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, parse_run
@@ -31,7 +31,7 @@ def read_sweeps(stores: Sequence[Path]) -> tuple[list[ReportedRun], list[str]]:
     runs: list[ReportedRun] = []
     without: Counter[tuple[str, str]] = Counter()
     commands: dict[tuple[str, str], str] = {}
-    for run, store in _rows(stores):
+    for run, store in runs_with_stores(stores):
         if run.status not in (PASSED, FAILED):
             reason = run.status, run.error.partition("\n")[0]
             without[reason] += 1
@@ -48,14 +48,6 @@ def read_sweeps(stores: Sequence[Path]) -> tuple[list[ReportedRun], list[str]]:
         for (status, message), count in without.most_common()
     ]
     return runs, lines
-
-
-def _rows(stores: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:
-    """Yield the runs of the stores, each with the last store that has it."""
-    found: dict[str, tuple[StoredRun, Path]] = {}
-    for store in stores:
-        found.update((run.key, (run, store)) for run in stored_runs([store]))
-    yield from found.values()
 
 
 def _reported(run: StoredRun, store: Path) -> ReportedRun:

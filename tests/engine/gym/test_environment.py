@@ -202,3 +202,11 @@ def test_actions_outside_of_the_space_are_errors(action: Any, given: Any, messag
     with pytest.raises(SettingError, match=message):
         env.step(given)
     env.close()
+
+
+@pytest.mark.parametrize("name", ["colision", "no such"])
+def test_reward_of_unknown_criterion_is_refused_by_reset(name: str) -> None:
+    env = EidriveEnv(lone_car(), reward={"criteria": {name: 1.0}})
+    with pytest.raises(SettingError, match=f"reward: the run has no criterion '{name}'.*collision"):
+        env.reset(seed=1)
+    env.close()

@@ -88,6 +88,16 @@ def test_marker_without_match_is_an_error(project: pytest.Pytester, marker: str,
     assert message in str(result.stdout) + str(result.stderr)
 
 
+def test_marker_with_distribution_names_its_kind(project: pytest.Pytester) -> None:
+    """Its runs are tests as those of a file; a marker names scenarios."""
+    (project.path / "d.xosc").write_text("<OpenSCENARIO><FileHeader/><ParameterValueDistribution/></OpenSCENARIO>")
+    result = run(project, '@pytest.mark.scenario("d")\ndef test_none(run_scenario):\n    pass')
+    assert result.ret != 0
+    text = str(result.stdout)
+    assert "'d' matches" in text
+    assert "got a parameter value distribution, whose runs are tests by `pytest FILE`; expected a scenario" in text
+
+
 def test_marker_with_unknown_argument_shows_no_traceback(project: pytest.Pytester) -> None:
     text = """
 @pytest.mark.scenario("drives/first", chanel="ideal")

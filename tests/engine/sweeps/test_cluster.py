@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import sys
@@ -9,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -86,27 +88,92 @@ def test_workers_use_project_of_command(
         workers.close()
 
 
-def test_run_that_does_not_return_ends_its_worker(
+def test_hung_run_on_cluster_is_one_row_and_waiting_runs_have_results(
     cluster: object, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A waiting system call in a thread of a worker cannot be interrupted; the other run has a result."""
+    """No worker of the cluster ends, and the hung run is executed once."""
+    calls = tmp_path / "calls"
 
     def hung_at_30(job: SweepJob, wall_limit: float | None, files: KeptFiles | None) -> StoredRun:
         if job.point["Speed"] == 30:
+            with calls.open("a") as stream:
+                stream.write("x")
+            importlib.import_module("eidrive_scenario.wall_limit").GRACE = 0.1  # type: ignore[attr-defined]
             with limit_wall_time(wall_limit):
-                time.sleep(60.0)
+                while True:
+                    with suppress(BaseException):
+                        time.sleep(0.01)
         return execute(job, None, files)
 
+    pids = {worker.pid for worker in cluster.workers.values()}  # type: ignore[attr-defined]
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)  # type: ignore[attr-defined]
-    plan = plan_of(scenario, points_of(parse_axes(["Speed=10,30"]), "grid", None, 1), RunSettings())
+    points = points_of(parse_axes(["Speed=10,30,11,12,13,14,15"]), "grid", None, 1)
+    plan = plan_of(scenario, points, RunSettings())
     monkeypatch.setattr("eidrive_scenario.experiments.sweeps.sweep.execute", hung_at_30)
     workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
     try:
         with ResultStore.open(tmp_path / "s.db", versions()) as store:
             run_sweep(Shard(plan), store, workers, wall_limit=0.2)
-            assert [run.status for run in store.runs()] == ["passed", "crashed"]
+            rows = {run.point["Speed"]: (run.status, run.error) for run in store.runs()}
     finally:
         workers.close()
+    status, error = rows.pop(30)
+    assert status == "aborted"
+    assert error.endswith("after 0.2 s of wall time (the wall limit)")
+    assert calls.read_text() == "x"
+    assert set(rows.values()) == {("passed", "")}
+    assert {worker.pid for worker in cluster.workers.values()} == pids  # type: ignore[attr-defined]
+
+
+def test_end_of_a_sweep_ends_its_runs_on_the_workers(cluster: object, tmp_path: Path) -> None:
+    """Runs of an interrupted sweep would occupy the workers until their wall limit."""
+
+    def sleep(path: Path) -> None:
+        path.touch()
+        time.sleep(600.0)
+
+    workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
+    later = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
+    try:
+        for number in range(4):
+            workers.submit(sleep, tmp_path / str(number))
+        while len(list(tmp_path.iterdir())) < 2:  # both workers are busy
+            time.sleep(0.01)
+        workers.close()
+        assert later.submit(os.path.basename, "a/b").result(timeout=60) == "b"
+    finally:
+        later.close()
+
+
+def test_later_sweep_on_same_workers_uses_changed_extension(
+    cluster: object, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each module names its metric; a worker that kept the first one would write its name again."""
+    (tmp_path / "pyproject.toml").write_text(
+        '[tool.eidrive]\npythonpath = ["."]\n'
+        '[project.entry-points."eidrive_scenario.criteria"]\ndated = "dated_criterion:Dated"\n'
+    )
+    module = tmp_path / "dated_criterion.py"
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setattr(registry("criteria"), "_points", dict(registry("criteria")._points))
+    scenario.write_text(scenario.read_text().replace("{max_speed:", "{dated:"))
+    found: list[list[set[str]]] = []
+    for body in ("    NAME = 'one'", "    NAME = 'other'"):
+        module.write_text(
+            "from eidrive_criteria.max_speed import MaxSpeed\n\nclass Dated(MaxSpeed):\n"
+            f"{body}\n    def metrics(self):\n        return {{self.NAME: 1.0}}\n"
+        )
+        sys.modules.pop("dated_criterion", None)
+        use_project(str(tmp_path))
+        workers = DaskWorkers.connect(cluster.scheduler_address, None)  # type: ignore[attr-defined]
+        try:
+            with ResultStore.open(tmp_path / f"{len(found)}.db", versions()) as store:
+                run_sweep(Shard(plan_of(scenario, [{}], RunSettings(), seeds=[1, 2, 3, 4])), store, workers)
+                found.append([run.result.keys() & {"one", "other"} for run in store.runs()])
+        finally:
+            workers.close()
+    assert found == [[{"one"}] * 4, [{"other"}] * 4]
 
 
 def test_end_of_scheduler_keeps_earlier_runs(scenario: Path, tmp_path: Path) -> None:

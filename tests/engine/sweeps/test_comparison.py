@@ -53,10 +53,11 @@ def test_compare_counts_pairs_by_identity_across_versions(tmp_path: Path) -> Non
         ([True] * 190 + [False] * 10, 0, "B is not worse than A by 5.0% or more"),
         ([True] * 150 + [False] * 50, 1, "B is worse than A"),
         ([False] * 12 + [True] * 184 + [False] * 4, 1, "undecided"),
+        ([True] * 180 + [None] * 10 + [False] * 10, 1, "undecided: B has no verdict of 10 runs with a verdict in A"),
     ],
 )
 def test_compare_command_decides_by_exit_code(
-    eidrive: Eidrive, tmp_path: Path, second: list[bool], code: int, expected: str
+    eidrive: Eidrive, tmp_path: Path, second: list[bool | None], code: int, expected: str
 ) -> None:
     first = store(tmp_path / "a.db", "1", [True] * 190 + [False] * 10)
     done = eidrive("compare", first, store(tmp_path / "b.db", "2", second))

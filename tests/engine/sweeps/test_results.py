@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive, eidrive
+from msgspec.structs import replace
 
 from eidrive_scenario.api.run import read_results
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.statistics.proportions import anytime_interval, wilson
-from eidrive_scenario.experiments.sweeps.results import summaries, write_parquet
+from eidrive_scenario.experiments.sweeps.results import stored_runs, summaries, write_parquet
 from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
 
 __all__ = ["eidrive"]
@@ -236,3 +237,37 @@ def test_find_boundary_command_prints_value(eidrive: Eidrive, scenario: Path, tm
     value = float(done.stdout.split(" at ")[1].split()[0])
     assert value == pytest.approx(20.0, abs=0.5)
     assert "falls through 0.5" in done.stdout
+
+
+def test_results_of_different_versions_are_named(eidrive: Eidrive, store: Path, tmp_path: Path) -> None:
+    """Shards of two releases, and one package of an extension with two versions in one store."""
+    with ResultStore.open(store, {"numpy": "2"}) as opened:
+        opened.add(replace(RUNS[0], settings='{"versions": {"engine": "1.0", "radar": "3"}}'))
+        opened.add(replace(RUNS[1], settings='{"versions": {"engine": "1.0", "radar": "4"}}'))
+    other = tmp_path / "other.db"
+    with ResultStore.open(other, {"numpy": "3"}) as opened:
+        opened.add(replace(run(9, "passed", Speed=5), settings='{"versions": {"engine": "1.1", "radar": "4"}}'))
+    text = "the success rates mix runs of different versions: "
+    assert f"{text}radar 3 (1), 4 (1); a new store" in eidrive("results", store).stderr
+    assert f"{text}engine 1.0 (2), 1.1 (1); radar 3 (1), 4 (2); a new" in eidrive("results", store, other).stderr
+    assert text not in eidrive("results", other).stderr
+
+
+def test_combined_stores_keep_the_verdict_of_a_run_that_was_aborted_elsewhere(tmp_path: Path) -> None:
+    """Overlapping shards: the order of the stores decides only between rows with a verdict."""
+    stores = [tmp_path / "a.db", tmp_path / "b.db"]
+    rows = ([run(1, "passed"), run(2, "aborted")], [run(1, "aborted"), run(2, "crashed")])
+    for path, held in zip(stores, rows, strict=True):
+        with ResultStore.open(path, {"numpy": "2"}) as opened:
+            opened.add(*held)
+    assert [one.status for one in stored_runs(stores)] == ["passed", "crashed"]
+    assert [one.status for one in stored_runs(stores[::-1])] == ["passed", "aborted"]
+
+
+@pytest.mark.parametrize("option", ["--csv", "--parquet"])
+def test_export_over_a_store_is_refused(eidrive: Eidrive, store: Path, option: str) -> None:
+    before = store.read_bytes()
+    result = eidrive("results", store, option, store.parent / "." / store.name)
+    assert result.exit_code == 2
+    assert f"{option} would overwrite an input file" in result.stderr
+    assert store.read_bytes() == before

@@ -145,3 +145,24 @@ def test_lists_of_one_value_are_no_space() -> None:
     search = Search.of(axes, None, 0.5, None, True, None, None)
     assert [axis.name for axis in search.space] == ["Speed"]
     assert [axis.name for axis in search.fixed] == ["kind"]
+
+
+@needs_optuna
+@pytest.mark.parametrize(
+    ("other", "size"),
+    [
+        ({"goal.passed": True, "goal.value": 1.99, "goal.limit": 2.0, "goal.margin": 1.0}, 0.02),
+        ({"collision.passed": True, "collision.value": 0.0, "collision.limit": 0.0}, 2.0),
+    ],
+    ids=["reached", "without limit"],
+)
+def test_falsify_follows_the_margin_that_varies(plan: SweepPlan, other: dict[str, Any], size: float) -> None:
+    """The gap is least at the speed 31, without a failure. A run that ends on arrival is near the tolerance."""
+
+    def result_of(job: SweepJob) -> dict[str, Any]:
+        gap = 1.01 + size * abs(float(job.point["Speed"]) - 31.0)
+        return {"passed": True, **other, "gap.passed": True, "gap.value": gap, "gap.limit": 1.0}
+
+    found = falsify(plan, SPACE[:1], executed(result_of), runs=40)
+    assert found.least is not None
+    assert float(found.least.point["Speed"]) == pytest.approx(31.0, abs=2.0)

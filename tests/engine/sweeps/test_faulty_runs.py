@@ -1,0 +1,141 @@
+"""Runs of a sweep that hang, raise interruptions, or are interrupted by the user."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import signal
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_fixtures import Eidrive, eidrive
+
+from eidrive_scenario.cli.interruption import interrupt_once
+from eidrive_scenario.experiments.sweeps.axes import parse_axes
+from eidrive_scenario.experiments.sweeps.designs import points_of
+from eidrive_scenario.experiments.sweeps.execution import KeptFiles, execute
+from eidrive_scenario.experiments.sweeps.jobs import Shard, plan_of, versions
+from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
+from eidrive_scenario.experiments.sweeps.sweep import run_sweep
+from eidrive_scenario.experiments.sweeps.workers import LocalWorkers
+from eidrive_scenario.registry import registry
+from eidrive_scenario.simulation import RunSettings
+
+__all__ = ["eidrive"]
+
+
+def run_with(
+    values: str, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, **options: Any
+) -> dict[Any, StoredRun]:
+    """Return the rows by speed of a sweep by two workers whose runs are those of `faulty_at_30`."""
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry("criteria"), "_points", dict(registry("criteria")._points))
+    registry("criteria").add("hangs", "sweep_tasks:Hangs")
+    task = importlib.import_module("sweep_tasks").faulty_at_30
+    monkeypatch.setattr("eidrive_scenario.experiments.sweeps.sweep.execute", task)
+    plan = plan_of(scenario, points_of(parse_axes([f"Speed={values}"]), "grid", None, 1), RunSettings())
+    workers = LocalWorkers(2)
+    try:
+        with ResultStore.open(tmp_path / "s.db", versions()) as store:
+            run_sweep(Shard(plan), store, workers, **options)
+            return {run.point["Speed"]: run for run in store.runs()}
+    finally:
+        workers.close()
+
+
+def test_hung_run_is_one_aborted_row_with_its_line(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is executed once: a second try would last as long."""
+    rows = run_with("8,30,10,12", scenario, tmp_path, monkeypatch, wall_limit=0.5)
+    assert {speed: run.status for speed, run in rows.items()} == dict.fromkeys((8, 10, 12), "passed") | {30: "aborted"}
+    line = r"sweep_tasks\.py:\d+: criterion 'hangs' .*: still running in observe after 0\.5 s of wall time"
+    assert re.search(line, rows[30].error)
+    assert (tmp_path / "calls").read_text() == "x"
+
+
+def test_interrupt_of_extension_is_a_row_and_others_have_results(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = run_with("8,30,10,12", scenario, tmp_path, monkeypatch)
+    assert {speed: run.status for speed, run in rows.items()} == dict.fromkeys((8, 10, 12), "passed") | {30: "aborted"}
+    assert re.search(r"sweep_tasks\.py:\d+ in observe: KeyboardInterrupt", rows[30].error)
+
+
+def test_interrupt_of_user_keeps_ended_runs(scenario: Path, tmp_path: Path) -> None:
+    """The first run has ended when the user interrupts the start of the second one."""
+
+    class InterruptedWorkers:
+        capacity = 2
+        calls = 0
+
+        def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+            self.calls += 1
+            if self.calls == 2:
+                raise KeyboardInterrupt
+            future: Future[Any] = Future()
+            future.set_result(function(*arguments))
+            return future
+
+        def is_crash(self, error: BaseException) -> bool:
+            return False
+
+        def close(self) -> None:
+            """Do nothing."""
+
+    plan = plan_of(scenario, points_of(parse_axes(["Speed=10,12"]), "grid", None, 1), RunSettings())
+    with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        with pytest.raises(KeyboardInterrupt):
+            run_sweep(Shard(plan), store, InterruptedWorkers())
+        assert [(run.point["Speed"], run.status) for run in store.runs()] == [(10, "passed")]
+
+
+def test_second_interrupt_does_not_interrupt_the_end() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    ended = []
+
+    def interrupted_twice() -> None:
+        with interrupt_once():
+            try:
+                signal.raise_signal(signal.SIGINT)
+            finally:
+                signal.raise_signal(signal.SIGINT)
+                ended.append(True)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_twice()
+    assert ended == [True]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_unwritable_folder_of_a_run_is_aborted_and_repeatable(scenario: Path, tmp_path: Path) -> None:
+    """The inputs are valid: the run is repeated once the folder can be written."""
+    (job,) = plan_of(scenario, [{}], RunSettings())
+    below = tmp_path / "out"
+    below.write_text("a file")
+    row = execute(job, None, KeptFiles(below, "always", tmp_path / "s.db"))
+    assert (row.status, row.error.partition(": ")[2]) == (
+        "aborted",
+        "cannot write: Not a directory; choose another folder",
+    )
+    with ResultStore.open(tmp_path / "s.db", versions()) as store:
+        store.add(row)
+        below.unlink()
+        workers = LocalWorkers(1)
+        try:
+            run_sweep(Shard(plan_of(scenario, [{}], RunSettings())), store, workers, retry=True)
+        finally:
+            workers.close()
+        assert [run.status for run in store.runs()] == ["passed"]
+
+
+def test_sweep_into_unwritable_folder_ends_before_its_runs(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    store = tmp_path / "s.db"
+    result = eidrive("sweep", scenario, "--store", store, "--out", scenario)
+    assert result.exit_code == 2
+    assert "car.xosc: cannot write: File exists; choose another folder" in result.stderr
+    assert not store.exists()

@@ -1,0 +1,43 @@
+"""Intervals of parameters with an integer type: designs and searches propose whole numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis
+from eidrive_scenario.experiments.sweeps.designs import points_of
+from eidrive_scenario.experiments.sweeps.typed_axes import with_types
+
+COUNT = Axis("Count", low=0.5, high=4.5)
+
+
+@pytest.fixture
+def counted(scenario: Path) -> Path:
+    declared = '<ParameterDeclaration name="Count" parameterType="unsignedShort" value="2"/>'
+    scenario.write_text(scenario.read_text().replace("<ParameterDeclarations>", f"<ParameterDeclarations>{declared}"))
+    return scenario
+
+
+def test_latin_hypercube_of_whole_numbers_has_each_equally_often(counted: Path) -> None:
+    """The strata of a Latin hypercube divide the four numbers evenly."""
+    axes = with_types([COUNT, Axis("Speed", low=1.0, high=9.0)], counted)
+    points = points_of(axes, "lhs", 40, 1)
+    assert Counter(point["Count"] for point in points) == dict.fromkeys((1, 2, 3, 4), 10)
+    assert {type(point["Count"]) for point in points} == {int}
+    assert all(isinstance(point["Speed"], float) for point in points)
+
+
+def test_values_of_a_distribution_have_the_types_of_its_scenario(counted: Path, distribution: Path) -> None:
+    distribution.with_name("car.xosc").write_text(counted.read_text())
+    (axis,) = with_types([parse_axis("param.Count=1:3")], distribution, is_distribution=True)
+    assert [axis.nearest(value) for value in (1.0, 1.4, 2.6, 3.0)] == [1, 1, 3, 3]
+    assert axis.ends == (1, 3)
+
+
+def test_interval_without_two_whole_numbers_raises(counted: Path) -> None:
+    with pytest.raises(SettingError, match=r"Count is a whole number, and 1\.2:2\.7 has fewer than two of them"):
+        with_types([Axis("Count", low=1.2, high=2.7)], counted)
