@@ -25,6 +25,7 @@ GEOMETRY_GAP = MapRule("geometry-gap", "a road whose geometries do not join")
 HEADING_DISCONTINUITY = MapRule("heading-discontinuity", "a road whose heading changes abruptly")
 LANE_WIDTH = MapRule("lane-width", "a lane with a missing, negative or implausible width")
 LANE_SIDE = MapRule("lane-side", "a lane on the wrong side of the center lane")
+LANE_LAYER = MapRule("lane-layer", "a temporary layer of lanes, which is not read")
 ROAD_LINK = MapRule("road-link", "a link to a missing junction, or to a point within a road")
 ROAD_SURFACE = MapRule("road-surface", "a cross section that is not read, or a superelevation that is too steep")
 ROAD_MARK = MapRule("road-mark", "an incomplete road mark")
@@ -37,6 +38,7 @@ MAP_RULES = (
     HEADING_DISCONTINUITY,
     LANE_WIDTH,
     LANE_SIDE,
+    LANE_LAYER,
     ROAD_LINK,
     ROAD_SURFACE,
     ROAD_MARK,

@@ -12,7 +12,13 @@ from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
 from eidrive_scenario.files.xml_lines import line_of
-from eidrive_scenario.roads.model.map_warnings import JUNCTION_CONNECTION, ROAD_LINK, ROAD_SURFACE, MapWarning
+from eidrive_scenario.roads.model.map_warnings import (
+    JUNCTION_CONNECTION,
+    LANE_LAYER,
+    ROAD_LINK,
+    ROAD_SURFACE,
+    MapWarning,
+)
 from eidrive_scenario.roads.model.polynomials import Polynomials
 from eidrive_scenario.roads.model.road_map import (
     Connection,
@@ -125,7 +131,7 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
         collector.report_error(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))
     reference = read_reference_line(element, length, collector)
     length = reference.length
-    lanes = element.find("lanes")
+    lanes = _permanent_lanes(number, element, collector)
     lane_offset = Polynomials()
     sections: tuple[LaneSection, ...] = ()
     if lanes is None:
@@ -157,6 +163,18 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
         line=line_of(element),
         section_starts=tuple(section.s for section in sections),
     )
+
+
+def _permanent_lanes(number: str, road: etree._Element, collector: AttributeReader) -> etree._Element | None:
+    """Return the permanent lanes of a road, the only ones before OpenDRIVE 1.9; None for a road without lanes."""
+    layers = road.findall("lanes")
+    permanent = next((lanes for lanes in layers if lanes.get("layer") != "temporary"), layers[0] if layers else None)
+    for lanes in layers:
+        if lanes is not permanent and lanes.get("layer") == "temporary":
+            message = f"road {number!r} has a temporary layer of lanes, which is ignored"
+            hint = "give a road file with the temporary lanes as its only ones"
+            collector.report_warning(lanes, LANE_LAYER, "ignored layers of lanes", message, hint)
+    return permanent
 
 
 def _profile(road: etree._Element, path: str, collector: AttributeReader) -> Polynomials:

@@ -159,6 +159,21 @@ def test_ignored_lateral_profiles_are_warnings() -> None:
     ]
 
 
+@pytest.mark.parametrize("temporary_first", [False, True])
+def test_temporary_lanes_are_ignored_with_a_warning(temporary_first: bool) -> None:
+    """OpenDRIVE 1.9: a road may have a permanent and a temporary layer of lanes, in any order."""
+    permanent = map_xml(road_xml("1", lanes=section(0, lane(-1), lane(-2))))
+    whole = permanent.partition("<lanes>")[2].partition("</lanes>")[0]
+    part = section(20, lane(-1)).replace("<laneSection ", '<laneSection length="30" ')
+    layers = [f'<lanes layer="permanent">{whole}</lanes>', f'<lanes layer="temporary">{part}</lanes>']
+    text = permanent.replace(f"<lanes>{whole}</lanes>", "".join(reversed(layers) if temporary_first else layers))
+    assert text != permanent
+    assert map_warnings(text) == [("lane-layer", "road '1' has a temporary layer of lanes, which is ignored")]
+    roads = RoadNetwork.parse(text.encode())
+    assert [one.s for one in roads.road("1").sections] == [0.0]
+    assert map_warnings(text.replace(layers[0], "")) == []
+
+
 def test_invalid_connections_are_warnings() -> None:
     into = '<successor elementType="junction" elementId="9"/>'
     through = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
