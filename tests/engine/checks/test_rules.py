@@ -119,6 +119,8 @@ def put_on_road(folder: Path, element: etree._Element) -> None:
     old = root.find(f".//{element.tag}")
     if old is None:
         (root if element.tag == "junction" else descendant(root, "road")).append(element)
+    elif element.get("layer") == "temporary":
+        old.addnext(element)
     else:
         replace(old, element)
     (folder / "street.xodr").write_bytes(etree.tostring(root, pretty_print=True))
