@@ -174,7 +174,6 @@ WITHOUT_EFFECT = {
     "Motion.speed_longitudinal": MOTION,
     "OverrideSteeringWheelAction.maxTorque": "the steering wheel angle is set without a torque",
     "Pedestrian.pedestrianCategory": "wheelchairs and animals move and are detected as pedestrians",
-    "Phase.semantics": "the states of the signals determine what road users do",
     "Properties.CustomContent": "the meaning is undefined",
     "RoadNetwork.SceneGraphFile": "images are rendered from the road file",
     "RoadNetwork.UsedArea": "the complete map is loaded",

@@ -12,6 +12,15 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.signal_states import DEFAULT_LAMPS, lamp_colors, must_stop
 from eidrive_scenario.storyboard.state.signal_cycles import SignalCycle, cycle_errors, cycle_warnings, signal_cycles
 
+SEMANTICS = {
+    model.TrafficSignalSemantics.STOP: "red",
+    model.TrafficSignalSemantics.ATTENTION_GO: "red;yellow",
+    model.TrafficSignalSemantics.GO: "green",
+    model.TrafficSignalSemantics.ATTENTION_STOP: "yellow",
+    model.TrafficSignalSemantics.CAUTION: "flashing yellow",
+    model.TrafficSignalSemantics.FALLBACK: "off",
+}
+"""State of the signals in a phase of OpenSCENARIO 1.4 that states their meaning alone."""
 SAME_PLACE = 2.0
 """Maximum distance between a signal and the point of ScenarioRunner's `pos=x,y` [m]."""
 
@@ -97,10 +106,14 @@ class Signals:
     def _phase_states(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
         """Return the states of a phase by signal. A group state holds for each signal of the group.
 
-        Without signals it holds for the name of the controller.
+        Without signals it holds for the name of the controller. The semantics of a phase without states determine the
+        state of the group.
         """
         group = phase.traffic_signal_group_state or phase.traffice_signal_group_state
-        states = dict.fromkeys(cycle.signals or (cycle.name,), group.state) if group is not None else {}
+        state = group.state if group is not None else None
+        if state is None and not phase.traffic_signal_state and phase.semantics is not None:
+            state = SEMANTICS[phase.semantics]
+        states = dict.fromkeys(cycle.signals or (cycle.name,), state) if state is not None else {}
         return states | {self.identify(one.traffic_signal_id): one.state for one in phase.traffic_signal_state}
 
     def _set_states(self, states: Mapping[str, str]) -> None:

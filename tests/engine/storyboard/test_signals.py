@@ -196,3 +196,34 @@ def test_questionable_controller_declaration_is_a_warning(
     found = signals(*controllers)
     assert found.errors == ()
     assert any(expected in str(diagnostic) for diagnostic in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("semantics", "stops"),
+    [
+        ("stop", True),
+        ("attention_go", True),
+        ("go", False),
+        ("attention_stop", True),
+        ("caution", False),
+        ("fallback", False),
+    ],
+)
+def test_phase_without_states_has_the_meaning_of_its_semantics(semantics: str, stops: bool) -> None:
+    """Version 1.4: red, red with yellow and steady yellow require a stop; green, flashing and dark lights do not."""
+    part = model.Phase(name="p", duration=5.0, semantics=model.TrafficSignalSemantics(semantics))
+    found = signals(controller(part), roads=RoadNetwork.parse(ROAD))
+    found.advance(0.0)
+    assert [found.must_stop(name) for name in ("7", "8")] == [stops, stops and semantics != "attention_stop"]
+
+
+def test_states_of_a_phase_precede_its_semantics() -> None:
+    stated = model.Phase(
+        name="p",
+        duration=5.0,
+        semantics=model.TrafficSignalSemantics.GO,
+        traffic_signal_state=(model.TrafficSignalState(traffic_signal_id="7", state="red"),),
+    )
+    found = signals(controller(stated), roads=RoadNetwork.parse(ROAD))
+    found.advance(0.0)
+    assert (found.state("7"), found.state("8")) == ("red", None)
