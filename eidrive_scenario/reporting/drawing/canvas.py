@@ -128,10 +128,14 @@ class Canvas:
         height, width = self.image.shape[:2]
         if not (-width < left < width and 0 <= base < 2 * height):
             return  # OpenCV crashes far away
-        # The fonts of OpenCV have no other characters.
-        text = "".join([letter if " " <= letter <= "~" else "?" for letter in text[:_LONGEST]])
+        text = _drawable(text)
         cv2.putText(self.image, text, (left, base), FONT, size, _bgr(WHITE), 3, cv2.LINE_AA)
         cv2.putText(self.image, text, (left, base), FONT, size, _bgr(color), 1, cv2.LINE_AA)
+
+    def label_size(self, text: str, size: float = 0.45) -> tuple[int, int]:
+        """Return width and height of a text [pixels]."""
+        (width, height), _ = cv2.getTextSize(_drawable(text), FONT, size, 1)
+        return width, height
 
     def pixel(self, point: Sequence[float]) -> tuple[int, int]:
         """Return the position of a point [pixels]."""
@@ -153,3 +157,8 @@ class Canvas:
 
 def _bgr(color: str) -> tuple[int, int, int]:
     return int(color[5:7], 16), int(color[3:5], 16), int(color[1:3], 16)
+
+
+def _drawable(text: str) -> str:
+    """Return the text with the characters that the fonts of OpenCV have."""
+    return "".join([letter if " " <= letter <= "~" else "?" for letter in text[:_LONGEST]])

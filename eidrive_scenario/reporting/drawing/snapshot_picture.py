@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -27,6 +28,12 @@ EXTENT = 90.0
 """Default width of the section that is shown [m]."""
 STROKE = 1.0
 """Length of the strokes of the line of a lost message [m]."""
+GAP = 6
+"""Distance of a label from its actor [pixels]."""
+MOST_PLACED = 100
+"""Maximum number of actors in a picture whose labels avoid each other."""
+Rectangle: TypeAlias = tuple[int, int, int, int]
+"""Left, top, right and bottom [pixels]."""
 
 
 def snapshot_picture(
@@ -95,14 +102,45 @@ def _draw_boxes(canvas: Canvas, detections: Detections, color: str, width: float
 
 
 def _write_labels(canvas: Canvas, snapshot: StationSnapshot) -> None:
-    view = snapshot.view
-    for name, box, speed in zip(view.names, view.boxes, view.speed.tolist(), strict=True):
-        if not np.isfinite(box).all():
-            continue
-        left, base = canvas.pixel(footprint(box).max(axis=0))
-        moving = f"  {3.6 * speed:.0f} km/h" if abs(speed) > 0.05 else ""
-        canvas.label(name + moving, left + 6, base + 4)
+    """Write the title, and a label beside each actor where it covers least of other actors and labels."""
     plan = snapshot.step.plan if snapshot.step else None
-    canvas.label(f"t = {snapshot.time:.2f} s", 16, 32, 0.8, STATION)
+    lines = [(f"t = {snapshot.time:.2f} s", 32, 0.8)]
     if plan is not None:
-        canvas.label(f"{snapshot.station}: {plan.reason}", 16, 60, 0.6, STATION)
+        lines.append((f"{snapshot.station}: {plan.reason}", 60, 0.6))
+    labels = []
+    for text, base, size in lines:
+        width, height = canvas.label_size(text, size)
+        labels.append((16, base - height, 16 + width, base))
+        canvas.label(text, 16, base, size, STATION)
+    view = snapshot.view
+    outlines: dict[str, Rectangle] = {}
+    for name, box in zip(view.names, view.boxes, strict=True):
+        if np.isfinite(box).all():
+            corners = footprint(box)
+            left, bottom = canvas.pixel(corners.min(axis=0))
+            right, top = canvas.pixel(corners.max(axis=0))
+            if _overlap((left, top, right + 1, bottom + 1), (0, 0, *canvas.image.shape[1::-1])):
+                outlines[name] = left, top, right, bottom
+    for name, outline in outlines.items():
+        speed = float(view.speed[view.row(name)])
+        text = f"{name}  {3.6 * speed:.0f} km/h" if abs(speed) > 0.05 else name
+        others = [*(other for named, other in outlines.items() if named != name), *labels]
+        place = _place(canvas.label_size(text), outline, others if len(outlines) <= MOST_PLACED else [])
+        labels.append(place)
+        canvas.label(text, place[0], place[3])
+
+
+def _place(size: tuple[int, int], outline: Rectangle, others: list[Rectangle]) -> Rectangle:
+    """Return the place of a label of this size right, left, above or below an outline with the least overlap."""
+    (width, height), (left, top, right, bottom) = size, outline
+    middle, base = (left + right - width) // 2, (top + bottom + height) // 2
+    starts = [(right + GAP, base), (left - GAP - width, base), (middle, top - GAP), (middle, bottom + GAP + height)]
+    places = [(x, y - height, x + width, y) for x, y in starts]
+    return min(places, key=lambda place: sum(_overlap(place, other) for other in others))
+
+
+def _overlap(first: Rectangle, second: Rectangle) -> int:
+    """Return the common area of two rectangles."""
+    width = min(first[2], second[2]) - max(first[0], second[0])
+    height = min(first[3], second[3]) - max(first[1], second[1])
+    return max(width, 0) * max(height, 0)

@@ -15,6 +15,7 @@ from eidrive_scenario.recording import Recorder
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.reporting.drawing.canvas import Canvas, Image
+from eidrive_scenario.reporting.drawing.snapshot_picture import _place
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.reporting.replay import film
 from eidrive_scenario.reporting.replay.film import RecordedStation, write_gif, write_mp4, write_png
@@ -150,3 +151,14 @@ def test_canvas_writes_labels_at_any_place(place: tuple[int, int]) -> None:
     for text in ("name " * 1000, "\x00\n\ud800", "車\U0001f697é"):
         canvas.label(text, *place)
     assert (canvas.image != before).any() == (place == (50, 50))
+
+
+def test_labels_avoid_actors_and_each_other() -> None:
+    """Of right, left, above and below, the first place without an overlap, or that with the smallest."""
+    outline = (100, 100, 140, 120)
+    assert _place((50, 10), outline, []) == (146, 105, 196, 115)
+    assert _place((50, 10), outline, [(140, 100, 160, 120)]) == (44, 105, 94, 115)
+    beside = [(140, 100, 160, 120), (80, 100, 100, 120)]
+    assert _place((50, 10), outline, beside) == (95, 84, 145, 94)
+    assert _place((50, 10), outline, [*beside, (90, 90, 150, 95)]) == (95, 126, 145, 136)
+    assert _place((50, 10), outline, [(0, 0, 143, 300), (150, 0, 300, 300)]) == (146, 105, 196, 115)
