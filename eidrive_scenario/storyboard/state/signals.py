@@ -9,7 +9,7 @@ from types import MappingProxyType
 from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.model.signal_states import DEFAULT_LAMPS, lamp_colors, must_stop
+from eidrive_scenario.roads.model.signal_states import DEFAULT_LAMPS, YELLOW, lamp_colors, must_stop
 from eidrive_scenario.storyboard.state.signal_cycles import SignalCycle, cycle_errors, cycle_warnings, signal_cycles
 
 SEMANTICS = {
@@ -21,6 +21,8 @@ SEMANTICS = {
     model.TrafficSignalSemantics.FALLBACK: "off",
 }
 """State of the signals in a phase of OpenSCENARIO 1.4 that states their meaning alone."""
+WITHOUT_YELLOW = {**SEMANTICS, model.TrafficSignalSemantics.ATTENTION_STOP: "red"}
+"""The same for signals without a yellow lamp: both yellow and red mean stop."""
 SAME_PLACE = 2.0
 """Maximum distance between a signal and the point of ScenarioRunner's `pos=x,y` [m]."""
 
@@ -110,10 +112,14 @@ class Signals:
         state of the group.
         """
         group = phase.traffic_signal_group_state or phase.traffice_signal_group_state
-        state = group.state if group is not None else None
-        if state is None and not phase.traffic_signal_state and phase.semantics is not None:
-            state = SEMANTICS[phase.semantics]
-        states = dict.fromkeys(cycle.signals or (cycle.name,), state) if state is not None else {}
+        signals = cycle.signals or (cycle.name,)
+        states: dict[str, str] = {}
+        if group is not None:
+            states = dict.fromkeys(signals, group.state)
+        elif phase.semantics is not None and not phase.traffic_signal_state:
+            for name in signals:
+                has_yellow = YELLOW in (self._colors.get(name) or DEFAULT_LAMPS)
+                states[name] = (SEMANTICS if has_yellow else WITHOUT_YELLOW)[phase.semantics]
         return states | {self.identify(one.traffic_signal_id): one.state for one in phase.traffic_signal_state}
 
     def _set_states(self, states: Mapping[str, str]) -> None:

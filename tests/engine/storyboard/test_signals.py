@@ -210,11 +210,11 @@ def test_questionable_controller_declaration_is_a_warning(
     ],
 )
 def test_phase_without_states_has_the_meaning_of_its_semantics(semantics: str, stops: bool) -> None:
-    """Version 1.4: red, red with yellow and steady yellow require a stop; green, flashing and dark lights do not."""
+    """Version 1.4: stop, and attention before and after it, require a stop. Signal 8 has no yellow lamp."""
     part = model.Phase(name="p", duration=5.0, semantics=model.TrafficSignalSemantics(semantics))
     found = signals(controller(part), roads=RoadNetwork.parse(ROAD))
     found.advance(0.0)
-    assert [found.must_stop(name) for name in ("7", "8")] == [stops, stops and semantics != "attention_stop"]
+    assert [found.must_stop(name) for name in ("7", "8")] == [stops, stops]
 
 
 def test_states_of_a_phase_precede_its_semantics() -> None:
