@@ -16,6 +16,7 @@ from eidrive_scenario.openscenario import Scenario, load_scenario, model
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.traffic import TrafficMix
+from eidrive_scenario.world.specs import _VEHICLES, actor_spec
 
 Kind = TypeVar("Kind")
 
@@ -77,8 +78,6 @@ def rejected(minor: int, **parts: str) -> str:
     ],
 )
 def test_categories_and_roles_of_vehicles(category: str, role: str, body: str) -> None:
-    from eidrive_scenario.world.specs import actor_spec
-
     entity = object_xml("Ego").replace('vehicleCategory="car"', f'vehicleCategory="{category}" role="{role}"')
     scenario = load(entities=entity)
     assert scenario.warnings == ()
@@ -89,8 +88,6 @@ def test_categories_and_roles_of_vehicles(category: str, role: str, body: str) -
 
 
 def test_every_category_has_a_body() -> None:
-    from eidrive_scenario.world.specs import _VEHICLES
-
     assert set(_VEHICLES) == {category.value for category in model.VehicleCategory}
 
 

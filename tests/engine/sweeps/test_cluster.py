@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sweep_workers import InProcess
 
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.experiments.sweeps.axes import parse_axes
@@ -179,25 +180,16 @@ def test_later_sweep_on_same_workers_uses_changed_extension(
 def test_end_of_scheduler_keeps_earlier_runs(scenario: Path, tmp_path: Path) -> None:
     """Dask cancels all calls if its scheduler ends."""
 
-    class EndingWorkers:
+    class EndingWorkers(InProcess):
         capacity = 2
-        calls = 0
 
         def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
+            if self.calls == 0:
+                return super().submit(function, *arguments)
             future: Future[Any] = Future()
-            self.calls += 1
-            if self.calls == 1:
-                future.set_result(function(*arguments))
-            else:
-                future.cancel()
-                future.set_running_or_notify_cancel()
+            future.cancel()
+            future.set_running_or_notify_cancel()
             return future
-
-        def is_crash(self, error: BaseException) -> bool:
-            return False
-
-        def close(self) -> None:
-            """Do nothing."""
 
     plan = plan_of(scenario, points_of(parse_axes(["Speed=10,12"]), "grid", None, 1), RunSettings())
     with ResultStore.open(tmp_path / "s.db", versions()) as store:

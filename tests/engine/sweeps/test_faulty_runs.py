@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from command_fixtures import Eidrive, eidrive
+from sweep_workers import InProcess
 
 from eidrive_scenario.cli.interruption import interrupt_once
 from eidrive_scenario.experiments.sweeps.axes import parse_axes
@@ -69,23 +70,13 @@ def test_interrupt_of_extension_is_a_row_and_others_have_results(
 def test_interrupt_of_user_keeps_ended_runs(scenario: Path, tmp_path: Path) -> None:
     """The first run has ended when the user interrupts the start of the second one."""
 
-    class InterruptedWorkers:
+    class InterruptedWorkers(InProcess):
         capacity = 2
-        calls = 0
 
         def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
-            self.calls += 1
-            if self.calls == 2:
+            if self.calls == 1:
                 raise KeyboardInterrupt
-            future: Future[Any] = Future()
-            future.set_result(function(*arguments))
-            return future
-
-        def is_crash(self, error: BaseException) -> bool:
-            return False
-
-        def close(self) -> None:
-            """Do nothing."""
+            return super().submit(function, *arguments)
 
     plan = plan_of(scenario, points_of(parse_axes(["Speed=10,12"]), "grid", None, 1), RunSettings())
     with ResultStore.open(tmp_path / "s.db", versions()) as store:

@@ -7,13 +7,12 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from concurrent.futures import Future
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sweep_workers import InProcess
 
 from eidrive_scenario.errors import ConstraintError, InputError, SettingError
 from eidrive_scenario.experiments.sweeps.axes import Point, parse_axes
@@ -27,23 +26,6 @@ from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings, Simulation
 
 SPEEDS: list[Point] = points_of(parse_axes(["Speed=10,30,50"]), "grid", None, 1)
-
-
-class InProcess:
-    """Workers that execute a call at once in this process."""
-
-    capacity = 1
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        future.set_result(function(*arguments))
-        return future
-
-    def is_crash(self, error: BaseException) -> bool:
-        return False
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 def swept(plan: SweepPlan, store: Path, **options: Any) -> tuple[SweepProgress, list[StoredRun]]:
