@@ -16,6 +16,7 @@ from eidrive_scenario.world.physics.vehicle_parameters import PROPERTIES, Vehicl
 from eidrive_scenario.world.specs import COLOR_PROPERTY, SHAPE_PROPERTY, SHAPES, actor_spec
 
 CATALOGS = Path(__file__).parents[3] / "xosc" / "catalogs"
+BODIES_OF_CATEGORIES = "Without it the body follows from category"
 
 
 def bounding_box(length: float, width: float, height: float, x: float = 0.0) -> model.BoundingBox:
@@ -144,9 +145,22 @@ def test_catalog_vehicles_are_consistent() -> None:
 
 
 def test_documented_properties_of_a_vehicle_are_complete() -> None:
-    page = (CATALOGS.parents[1] / "docs" / "scenario_files.md").read_text(encoding="utf-8")
-    section = page.split("\n## Dynamics and appearance: properties of a vehicle\n")[1].split("\n## ")[0]
-    documented = set(re.findall(r"`([a-z_.]+)`", section))
+    section = vehicle_section()
+    documented = set(re.findall(r"`([a-z_.]+)`", section.split(BODIES_OF_CATEGORIES)[0]))
     assert documented == {*PROPERTIES, SHAPE_PROPERTY, COLOR_PROPERTY, *SHAPES}
     rows = [line.split("|")[1].strip().strip("`") for line in section.splitlines() if line.startswith("| `")]
     assert sorted(rows) == sorted(PROPERTIES)
+
+
+def test_documented_bodies_of_categories_are_those_of_vehicles() -> None:
+    text = " ".join(vehicle_section().split(BODIES_OF_CATEGORIES)[1].split(". Other properties")[0].split())
+    clauses = re.findall(r"((?:`\w+`(?:, | and )?)+) (?:have )?that of a (\w+)", text)
+    documented = {name: body for names, body in clauses for name in re.findall(r"`(\w+)`", names)}
+    of_their_own = {name: name for name in ("bicycle", "bus", "car", "motorbike", "truck", "van")}
+    bodies = {category.value: actor_spec("A", vehicle("x", category.value)).shape for category in model.VehicleCategory}
+    assert documented | of_their_own == bodies
+
+
+def vehicle_section() -> str:
+    page = (CATALOGS.parents[1] / "docs" / "scenario_files.md").read_text(encoding="utf-8")
+    return page.split("\n## Dynamics and appearance: properties of a vehicle\n")[1].split("\n## ")[0]
