@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -49,3 +52,41 @@ def test_nearest_points_with_pivots_equal_comparison_with_all(dimensions: int) -
     distance, index = NearestPoints(points).nearest(to)
     np.testing.assert_array_equal(index, square.argmin(axis=1))
     np.testing.assert_array_equal(distance, np.sqrt(square.min(axis=1)))
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_tree_of_often_used_set_gives_the_same_points_as_comparisons(dimensions: int) -> None:
+    generator = np.random.default_rng(dimensions)
+    grid = np.round(generator.uniform(-100.0, 100.0, (3 * FEW, dimensions)) / 4.0) * 4.0
+    points = np.concatenate(
+        [grid, generator.uniform(-100.0, 100.0, (FEW, dimensions)), np.repeat(grid[:3], 40, axis=0)]
+    )
+    to = np.concatenate([np.round(generator.uniform(-100.0, 100.0, (200, dimensions))), points[-130:], grid[:100]])
+    order = ((to[:, None] - points) ** 2).sum(axis=2).argsort(axis=1, kind="stable")
+    assert np.any(order[:, 0] > order[:, 1])
+    used = NearestPoints(points)
+    for _ in range(3):
+        used.nearest(to)
+    assert "_tree" in vars(used)
+    for within in (np.inf, 3.0):
+        one_by_one = [NearestPoints(points).nearest(position[None], within) for position in to]
+        for part, expected in zip(used.nearest(to, within), zip(*one_by_one, strict=True), strict=True):
+            np.testing.assert_array_equal(part, np.concatenate(expected))
+    np.testing.assert_array_equal(used.nearest(to)[1], order[:, 0])
+    for count in (1, 2, 12, 30):
+        distance, index = used.several(to, count)
+        np.testing.assert_array_equal(index, order[:, :count])
+        np.testing.assert_array_equal(
+            distance, np.concatenate([NearestPoints(points).several(p[None], count)[0] for p in to])
+        )
+
+
+def test_few_searches_in_large_set_import_no_tree() -> None:
+    program = (
+        "import sys, numpy as np; from eidrive_scenario.roads.geometry.nearest import NearestPoints; "
+        "points = NearestPoints(np.random.default_rng(1).uniform(0.0, 1e3, (40_000, 2))); "
+        "points.nearest(np.zeros((100, 2))), points.several(np.zeros((100, 2)), 12); few = 'scipy' in sys.modules; "
+        "points.nearest(np.zeros((2000, 2))); print(few, 'scipy' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True"]
