@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class ActorTable:
     ) -> WorldView:
         """Return the view of the current poses and motion."""
         states = [body.state for body in self.bodies]
-        table = np.array(states, dtype=float).reshape(-1, 14)
+        table = np.fromiter(chain.from_iterable(states), float, 14 * len(states)).reshape(-1, 14)
         table.flags.writeable = False
         view = WorldView(
             time=time,
