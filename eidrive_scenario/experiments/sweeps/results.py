@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import csv
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import msgspec
 
@@ -85,8 +86,7 @@ def mixed_versions(runs: Iterable[StoredRun]) -> str:
     """
     found: dict[str, dict[str, int]] = {}
     for run in runs:
-        versions = msgspec.json.decode(run.settings, type=_Versions).versions if run.settings else {}
-        for name, version in versions.items():
+        for name, version in _part_of_settings(run, _Versions).versions.items():
             counts = found.setdefault(name, {})
             counts[version] = counts.get(version, 0) + 1
     texts = [
@@ -144,8 +144,11 @@ def _varied_parameters(run: StoredRun) -> dict[str, Any]:
     if not run.settings:  # a run that did not start has these parameters only
         prefix = "parameter."
         return {name.removeprefix(prefix): value for name, value in run.result.items() if name.startswith(prefix)}
-    names = msgspec.json.decode(run.settings, type=_VariedNames).varied
+    names = _part_of_settings(run, _VariedNames).varied
     return {name: run.result[column] for name in names if (column := f"parameter.{name}") in run.result}
+
+
+_Part = TypeVar("_Part", bound=msgspec.Struct)
 
 
 class _VariedNames(msgspec.Struct):
@@ -158,6 +161,14 @@ class _Versions(msgspec.Struct):
     """Versions of packages among the settings of a run."""
 
     versions: dict[str, str] = {}
+
+
+def _part_of_settings(run: StoredRun, kind: type[_Part]) -> _Part:
+    """Return a part of the settings of a run; its default if the run did not start, or has settings of another form."""
+    try:
+        return msgspec.convert(json.loads(run.settings or "{}"), kind)
+    except (ValueError, RecursionError):
+        return kind()
 
 
 def _ranks(points: Iterable[Mapping[str, Any]]) -> Callable[[Mapping[str, Any]], list[tuple[int, float]]]:

@@ -66,8 +66,8 @@ class StoredRun(msgspec.Struct, frozen=True):
     run: int | None
     seed: int
     status: str
-    point: dict[str, Any]
-    result: dict[str, Any]
+    point: dict[str, str | int | float]
+    result: dict[str, str | int | float | bool | None]
     error: str
     command: str
     wall_s: float
@@ -145,11 +145,12 @@ class ResultStore:
 
     def _check_versions(self, versions: Mapping[str, str]) -> None:
         """Store the versions, or compare them with the stored ones."""
-        rows = dict(self._connection.execute("SELECT name, value FROM meta"))
-        held = json.loads(rows["versions"]) if "versions" in rows else None
-        if held is None:
+        held = self.versions
+        if not held:
             with self._connection:
-                self._connection.execute("INSERT INTO meta VALUES ('versions', ?)", (json.dumps(dict(versions)),))
+                self._connection.execute(
+                    "INSERT OR REPLACE INTO meta VALUES ('versions', ?)", (json.dumps(dict(versions)),)
+                )
         elif held != dict(versions):
             different = sorted(name for name in {*held, *versions} if held.get(name) != versions.get(name))
             texts = [f"{name} {held.get(name, 'none')} (now {versions.get(name, 'none')})" for name in different]
@@ -158,8 +159,12 @@ class ResultStore:
     @property
     def versions(self) -> dict[str, str]:
         """Versions of the packages that computed the results."""
-        rows = dict(self._connection.execute("SELECT name, value FROM meta WHERE name = 'versions'"))
-        return dict(json.loads(rows["versions"])) if rows else {}
+        for (text,) in self._select("SELECT value FROM meta WHERE name = 'versions'"):
+            try:
+                return msgspec.json.decode(text, type=dict[str, str])
+            except (msgspec.MsgspecError, TypeError) as error:
+                raise _damaged(f"the versions are invalid: {error}", self.path) from error
+        return {}
 
     def add(self, *runs: StoredRun) -> None:
         """Add runs in one transaction, or replace those with their keys.
@@ -178,22 +183,36 @@ class ResultStore:
 
     def statuses(self) -> dict[str, str]:
         """Return the status of each run by its key."""
-        return dict(self._connection.execute("SELECT key, status FROM runs"))
+        return dict(self._select("SELECT key, status FROM runs"))
 
     def runs(self) -> Iterator[StoredRun]:
         """Yield all runs in the order of their sweep."""
-        for row in self._connection.execute("SELECT * FROM runs ORDER BY number, key"):
-            yield _stored_run(row)
+        for row in self._select("SELECT * FROM runs ORDER BY number, key"):
+            yield self._run(row)
 
     def rows(self, keys: Sequence[str]) -> list[StoredRun]:
         """Return the runs with these keys in their order. Raise KeyError if one is missing."""
         found = []
         for key in keys:
-            row = self._connection.execute("SELECT * FROM runs WHERE key = ?", (key,)).fetchone()
-            if row is None:
+            rows = [*self._select("SELECT * FROM runs WHERE key = ?", key)]
+            if not rows:
                 raise KeyError(key)
-            found.append(_stored_run(row))
+            found.append(self._run(rows[0]))
         return found
+
+    def _select(self, statement: str, *values: str) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of a query. Raise SettingError if the file is damaged."""
+        try:
+            yield from self._connection.execute(statement, values)
+        except sqlite3.Error as error:
+            raise _damaged(encodable(str(error)), self.path) from error
+
+    def _run(self, row: Sequence[Any]) -> StoredRun:
+        """Return the run of a row. Raise SettingError if the row is damaged."""
+        try:
+            return _stored_run(row)
+        except (ValueError, TypeError, RecursionError, zlib.error, msgspec.MsgspecError) as error:
+            raise _damaged(f"the row of run {encodable(str(row[1]))}: {encodable(str(error))}", self.path) from error
 
 
 def is_store(path: Path) -> bool:
@@ -222,9 +241,12 @@ def _row(run: StoredRun) -> tuple[Any, ...]:
 
 
 def _stored_run(row: Sequence[Any]) -> StoredRun:
-    key, number, scenario, run, seed, status, point, result, error, command, wall_s, settings = row
+    *head, point, result, error, command, wall_s, settings = row
     texts = json.loads(point), json.loads(result), error, command, wall_s, zlib.decompress(settings).decode()
-    return StoredRun(key, number, scenario, run, seed, status, *texts)
+    run = msgspec.convert(dict(zip(StoredRun.__struct_fields__, (*head, *texts), strict=True)), StoredRun)
+    if run.status not in STATUSES:
+        raise ValueError(f"unknown status {run.status!r}")
+    return run
 
 
 def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:
@@ -254,6 +276,10 @@ def _checked(path: Path, action: Callable[[], T]) -> T:
         raise
     except sqlite3.Error as error:
         raise _error(f"cannot use the store: {error}", "give a new file", path) from error
+
+
+def _damaged(what: str, path: Path) -> SettingError:
+    return _error(f"the store is damaged: {what}", "restore it, or repeat the sweep with a new file", path)
 
 
 def _error(message: str, hint: str, path: Path) -> SettingError:

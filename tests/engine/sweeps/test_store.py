@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+import zlib
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from msgspec.structs import replace
 from sweep_runs import RUN, VERSIONS, opened
 
 from eidrive_scenario.errors import Diagnostic, EidriveError, SettingError, SimulationError
-from eidrive_scenario.experiments.sweeps.store import ResultStore
+from eidrive_scenario.experiments.sweeps.store import ResultStore, StoredRun
+
+UNREADABLE = r"the store is damaged|cannot use the store"
 
 
 def test_store_returns_added_runs_in_order(tmp_path: Path) -> None:
@@ -174,3 +177,62 @@ def test_full_disk_raises_and_keeps_earlier_rows(tmp_path: Path) -> None:
             store.add(long)
     with ResultStore.read(path) as store:
         assert RUN in list(store.runs())
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "reason"),
+    [
+        ("result", '{"a": 1', "Expecting"),
+        ("result", '{"a": [1]}', "result"),
+        ("result", b"\xff", "UTF-8"),
+        ("point", '{"a": {}}', "point"),
+        ("settings", b"no zlib", "decompressing"),
+        ("settings", zlib.compress(b"{}")[:-1], "incomplete"),
+        ("status", "unknown", "unknown status 'unknown'"),
+        ("seed", "one", "seed"),
+    ],
+)
+def test_damaged_row_raises(tmp_path: Path, column: str, value: str | bytes, reason: str) -> None:
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(*numbered_runs(3))
+    with sqlite3.connect(path) as connection:
+        text = "CAST(? AS TEXT)" if value == b"\xff" else "?"
+        connection.execute(f"UPDATE runs SET {column} = {text} WHERE number = 1", (value,))
+    connection.close()
+    with ResultStore.read(path) as store, pytest.raises(SettingError, match="the store is damaged") as raised:
+        list(store.runs())
+    assert reason in str(raised.value)
+    assert str(path) in str(raised.value)
+
+
+def test_damaged_versions_raise(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(RUN)
+    with sqlite3.connect(path) as connection:
+        connection.execute("UPDATE meta SET value = '99'")
+    connection.close()
+    with pytest.raises(SettingError, match="the store is damaged: the versions are invalid"), opened(path):
+        pass
+    with ResultStore.read(path) as store:
+        assert list(store.runs()) == [RUN]
+
+
+def test_store_with_overwritten_pages_raises(tmp_path: Path) -> None:
+    path = tmp_path / "s.db"
+    with opened(path) as store:
+        store.add(*numbered_runs(200))
+    content = path.read_bytes()
+    path.write_bytes(content[:4096] + b"\x5a" * (len(content) - 4096))
+    with (
+        pytest.raises(SettingError, match=UNREADABLE),
+        ResultStore.read(path) as store,
+    ):
+        list(store.runs())
+    with pytest.raises(SettingError, match=UNREADABLE), opened(path) as store:
+        store.statuses()
+
+
+def numbered_runs(count: int) -> list[StoredRun]:
+    return [replace(RUN, key=f"{number:064d}", number=number) for number in range(count)]
