@@ -50,8 +50,8 @@ def test_report_overview_has_one_row_per_scenario_and_channel(tmp_path: Path) ->
     page = write_report(results, tmp_path)
     assert page == tmp_path / "report.html"
     overview = rows(page)[:2]
-    assert overview[0] == ["coop/scenario_1", "ideal", "2/2", "0.34 … 1.00", "2.50 · 2.00"]
-    assert overview[1] == ["coop/scenario_1", "none", "0/1", "0.00 … 0.79", "2.00 · 2.00"]
+    assert overview[0] == ["coop/scenario_1", "ideal", "2/2", "0.34 … 1.00", "2.50 (2.00 … 3.00)"]
+    assert overview[1] == ["coop/scenario_1", "none", "0/1", "0.00 … 0.79", "2.00"]
 
 
 def test_report_shows_verdict_and_reason_of_each_run(tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_report_counts_run_at_time_limit_as_unfinished(tmp_path: Path) -> None:
 
 def test_report_omits_null_metrics(tmp_path: Path) -> None:
     results = [result(1, "ideal", True, metrics={"ttc": None}), result(2, "ideal", True, metrics={"ttc": 1.5})]
-    assert rows(write_report(results, tmp_path))[0][-1] == "1.50 · 1.50"
+    assert rows(write_report(results, tmp_path))[0][-1] == "1.50"
 
 
 def test_report_of_invalid_or_no_result_raises_input_error(tmp_path: Path) -> None:
