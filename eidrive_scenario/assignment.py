@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -48,12 +49,14 @@ def assign_matrix(cost: Array, inside: Bools) -> list[tuple[int, int]]:
 
     Costs are smaller than OUTSIDE by more than their sum. Each row and column is used at most once.
     """
-    rows, columns = np.nonzero(inside)
-    if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
-        from scipy.optimize import linear_sum_assignment
+    rows, columns = (side.tolist() for side in np.nonzero(inside))
+    found = _assign_stars(rows, columns, cost[inside].tolist())
+    if found is not None:
+        return found
+    from scipy.optimize import linear_sum_assignment
 
-        rows, columns = linear_sum_assignment(np.where(inside, cost, OUTSIDE))
-    return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
+    rows, columns = (side.tolist() for side in linear_sum_assignment(np.where(inside, cost, OUTSIDE)))
+    return [(row, column) for row, column in zip(rows, columns, strict=True) if inside[row, column]]
 
 
 def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
@@ -61,8 +64,9 @@ def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) 
 
     Each row and column is used at most once. The order of the indices resolves ties.
     """
-    if len(set(rows)) == len(rows) and len(set(columns)) == len(columns):
-        return list(zip(rows, columns, strict=True))
+    found = _assign_stars(rows, columns, costs)
+    if found is not None:
+        return found
     from scipy.optimize import linear_sum_assignment
 
     row_of = {row: place for place, row in enumerate(sorted(set(rows)))}
@@ -76,3 +80,23 @@ def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) 
     return [
         (row, column) for row, column in zip(rows, columns, strict=True) if (row_of[row], column_of[column]) in assigned
     ]
+
+
+def _assign_stars(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]] | None:
+    """Return the result of `assign` if no pair competes by its row and by its column with other pairs, or else None.
+
+    A row with several columns that have no other row, and the reverse, gets the pair with the least cost. The package
+    with the general method takes longer to import than a short run.
+    """
+    pairs = list(zip(rows, columns, strict=True))
+    of_row, of_column = Counter(rows), Counter(columns)
+    if len(of_row) == len(pairs) == len(of_column):
+        return pairs
+    best: dict[tuple[int, int], tuple[float, int, int]] = {}
+    for (row, column), cost in zip(pairs, costs, strict=True):
+        if of_row[row] > 1 and of_column[column] > 1:
+            return None
+        star = (0, row) if of_row[row] > 1 else (1, column)
+        best[star] = min(best.get(star, (math.inf, 0, 0)), (cost, row, column))
+    chosen = {(row, column) for _, row, column in best.values()}
+    return [pair for pair in pairs if pair in chosen]

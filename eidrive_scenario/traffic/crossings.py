@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.roads.geometry.nearest import NearestPoints
 from eidrive_scenario.traffic.lanes import TrafficLanes
 
 CLEARANCE = 3.2
@@ -49,16 +50,13 @@ class Crossings:
 
     def meeting(self, row: int) -> dict[int, bool]:
         """Return the lanes in conflict with a lane of a junction. The value is True if they only diverge."""
-
-        from scipy.spatial import cKDTree
-
         known = self._meeting.get(row)
         if known is not None:
             return known
         lines, low, high = self._lines
         found: dict[int, bool] = {}
         mine = lines[row]
-        tree = cKDTree(mine)
+        points = NearestPoints(mine)
         for other in self.junction_lanes(row):
             reach = CLEARANCE + max(self._swings[row], self._swings[other])
             near_by = np.all(low[other] <= high[row] + reach) and np.all(low[row] <= high[other] + reach)
@@ -66,7 +64,7 @@ class Crossings:
                 continue
             line = lines[other]
             together = np.hypot(*(line[0] - mine[0])) < 1.0
-            near = np.flatnonzero(tree.query(line)[0] < (CLEARANCE if together else reach))
+            near = np.flatnonzero(points.nearest(line)[0] < (CLEARANCE if together else reach))
             if near.size:
                 found[other] = bool(together and near.max() * SAMPLE < 2.0 * FORK)
         self._meeting[row] = found
