@@ -50,7 +50,10 @@ class NearestPoints:
         self._searches = 0
 
     def nearest(self, to: Array, within: float = np.inf) -> tuple[Array, Integers]:
-        """Return distance [m] and index (M,) of the nearest point of points (M, D); inf and N if none is `within`."""
+        """Return distance [m] and index (M,) of the nearest point of points (M, D); inf and N if none is `within`.
+
+        None is near a position that is not finite.
+        """
         if self._pays_tree(len(to)):
             distance, index = self._by_tree(to, 1, within)
             return distance[:, 0], index[:, 0]
@@ -67,7 +70,7 @@ class NearestPoints:
                 nearest = candidates[chosen]
             index[start : start + _GROUP_SIZE] = nearest
             distance[start : start + _GROUP_SIZE] = np.sqrt(squares[np.arange(len(group)), chosen])
-        far = distance >= within
+        far = ~(distance < within)
         distance[far], index[far] = np.inf, len(self.points)
         return distance, index
 
@@ -95,7 +98,12 @@ class NearestPoints:
         return distance, index
 
     def _by_tree(self, to: Array, count: int, within: float) -> tuple[Array, Integers]:
-        found = self._tree.query(to, count + 1, distance_upper_bound=within)
+        try:
+            found = self._tree.query(to, count + 1, distance_upper_bound=within)
+        except ValueError:  # Some positions are not finite
+            finite = np.isfinite(to).all(axis=1, keepdims=True)
+            found = self._tree.query(np.where(finite, to, 0.0), count + 1, distance_upper_bound=within)
+            found = np.where(finite, found[0], np.inf), np.where(finite, found[1], len(self.points))
         distance, index = (np.asarray(part) for part in found)
         squares = distance * distance
         near, next_ = squares[:, :-1], squares[:, 1:]

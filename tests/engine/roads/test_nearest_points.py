@@ -81,6 +81,15 @@ def test_tree_of_often_used_set_gives_the_same_points_as_comparisons(dimensions:
         )
 
 
+@pytest.mark.parametrize("searches", [0, FEW])
+def test_no_point_is_near_a_position_that_is_not_finite(searches: int) -> None:
+    points = NearestPoints(np.random.default_rng(1).uniform(0.0, 10.0, (2 * FEW, 2)))
+    points.nearest(np.zeros((searches, 2)))
+    distance, index = points.nearest(np.array([[np.nan, 1.0], [5.0, 5.0], [np.inf, np.nan], [1.0, -np.inf]]))
+    assert np.isinf(distance).tolist() == [True, False, True, True]
+    assert (index == len(points.points)).tolist() == [True, False, True, True]
+
+
 def test_few_searches_in_large_set_import_no_tree() -> None:
     program = (
         "import sys, numpy as np; from eidrive_scenario.roads.geometry.nearest import NearestPoints; "
