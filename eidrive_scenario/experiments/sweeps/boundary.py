@@ -16,7 +16,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit, logit, xlogy
 
 from eidrive_scenario.arrays import Array
 
@@ -58,6 +57,8 @@ class BoundarySearch:
     """
 
     def __init__(self, low: float, high: float, bound: float = 0.5) -> None:
+        from scipy.special import logit
+
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ValueError(f"range: not low < high (got {low} and {high})")
         if not 0.0 < bound < 1.0:
@@ -76,6 +77,8 @@ class BoundarySearch:
         self.runs = 0
 
     def _rate(self, x: float) -> Array:
+        from scipy.special import expit
+
         place, width, sign, lapse, level = self._shape
         return np.asarray(lapse / 2.0 + (1.0 - lapse) * expit(sign * (x - place) / width + level))
 
@@ -133,6 +136,8 @@ def _normalized(log: Array) -> Array:
 
 def _entropy(joint: Array) -> Array:
     """Return the entropy of each row (R, N) after normalization, weighted by the sum of the row."""
+    from scipy.special import xlogy
+
     total = joint.sum(axis=1)
     return np.asarray(xlogy(total, total) - xlogy(joint, np.maximum(joint, 1e-300)).sum(axis=1))
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 
 import numpy as np
-from scipy.stats import qmc
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import Diagnostic, SettingError
@@ -19,10 +18,14 @@ MOST_POINTS = 1_000_000
 
 
 def _latin_hypercube(axes: int, count: int, rng: np.random.Generator) -> Array:
+    from scipy.stats import qmc
+
     return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(count))
 
 
 def _sobol(axes: int, count: int, rng: np.random.Generator) -> Array:
+    from scipy.stats import qmc
+
     # The first points of a longer sequence are those of a shorter one, so that more samples add points.
     complete = 1 << max(count - 1, 0).bit_length()
     return np.asarray(qmc.Sobol(axes, rng=rng).random(complete)[:count])

@@ -66,8 +66,8 @@ class StoredRun(msgspec.Struct, frozen=True):
     run: int | None
     seed: int
     status: str
-    point: dict[str, str | int | float]
-    result: dict[str, str | int | float | bool | None]
+    point: dict[str, Any]
+    result: dict[str, Any]
     error: str
     command: str
     wall_s: float
@@ -242,11 +242,20 @@ def _row(run: StoredRun) -> tuple[Any, ...]:
 
 def _stored_run(row: Sequence[Any]) -> StoredRun:
     *head, point, result, error, command, wall_s, settings = row
-    texts = json.loads(point), json.loads(result), error, command, wall_s, zlib.decompress(settings).decode()
-    run = msgspec.convert(dict(zip(StoredRun.__struct_fields__, (*head, *texts), strict=True)), StoredRun)
+    columns = _scalars("point", point), _scalars("result", result)
+    values = (*head, *columns, error, command, wall_s, zlib.decompress(settings).decode())
+    run = msgspec.convert(dict(zip(StoredRun.__struct_fields__, values, strict=True)), StoredRun)
     if run.status not in STATUSES:
         raise ValueError(f"unknown status {run.status!r}")
     return run
+
+
+def _scalars(column: str, text: str) -> dict[str, Any]:
+    """Return the entries of a JSON object. Raise ValueError for other texts, and for nested values."""
+    try:
+        return msgspec.convert(json.loads(text), dict[str, str | int | float | bool | None])
+    except ValueError as error:
+        raise ValueError(f"{column}: {error}") from error
 
 
 def _connect(path: Path, *, read_only: bool = False) -> sqlite3.Connection:

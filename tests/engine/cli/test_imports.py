@@ -41,6 +41,10 @@ print("imported:", *sys.modules)
         (["list"], (*SHORT, *OTHER_COMMANDS)),
         (["list", "detectors"], (*SHORT, *OTHER_COMMANDS)),
         (["run", "coop/scenario_1"], (*HEAVY, *OTHER_COMMANDS, *UNUSED)),
+        (
+            ["sweep", "coop/scenario_1", "--vary", "EgoSpeed=6:8:1", "--store", "unused.db", "--dry-run"],
+            ("cv2", "dask", "jinja2", "matplotlib", "optuna", "pandas", "scipy", "torch"),
+        ),
         (["run", "coop/scenario_1", "--seed", "2", "--json"], (*HEAVY, *OTHER_COMMANDS, *UNUSED, "rich")),
     ],
     ids=" ".join,

@@ -182,14 +182,14 @@ def test_full_disk_raises_and_keeps_earlier_rows(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("column", "value", "reason"),
     [
-        ("result", '{"a": 1', "Expecting"),
-        ("result", '{"a": [1]}', "result"),
+        ("result", '{"a": 1', "result: Expecting"),
+        ("result", '{"a": [1]}', "result: Expected"),
         ("result", b"\xff", "UTF-8"),
-        ("point", '{"a": {}}', "point"),
+        ("point", '{"a": {}}', "point: Expected"),
         ("settings", b"no zlib", "decompressing"),
         ("settings", zlib.compress(b"{}")[:-1], "incomplete"),
         ("status", "unknown", "unknown status 'unknown'"),
-        ("seed", "one", "seed"),
+        ("seed", "one", "$.seed"),
     ],
 )
 def test_damaged_row_raises(tmp_path: Path, column: str, value: str | bytes, reason: str) -> None:
