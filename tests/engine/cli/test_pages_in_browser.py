@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ import pytest
 from command_fixtures import Eidrive
 
 from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.live.live_view import LiveView
 
@@ -179,6 +181,52 @@ def test_views_of_replay_show_different_pictures(browser: Any, report: Path) -> 
         pictures.add(page.page.evaluate("document.getElementById('street').toDataURL()"))
     assert len(pictures) == 4
     page.close("replay-third-person", full=False)
+
+
+SCRUB = """async () => {
+  const slider = document.getElementById("slider"), times = [];
+  for (let step = 0; step < 200; step += 1) {
+    const start = performance.now();
+    slider.value = Math.round(slider.max * ((37 * step) % 200) / 200);
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+    times.push(performance.now() - start);
+    await new Promise(requestAnimationFrame);
+  }
+  return times.sort((one, other) => one - other);
+}"""
+
+
+def test_replay_of_forty_actors_is_small_and_prints_its_frame_times(
+    browser: Any,
+    eidrive: Eidrive,
+    tmp_path: Path,
+    record_property: Callable[[str, object], None],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """20 s with at least forty actors: the page has less than 3 MB; times are those of drawing at 200 instants."""
+    library = Path(__file__).parents[3] / "xosc"
+    text = (library / "coop" / "scenario_5.xosc").read_text(encoding="utf-8").replace("../", f"{library}/")
+    text = text.replace('semiMajorAxis="95" semiMinorAxis="8"', 'semiMajorAxis="200" semiMinorAxis="200"')
+    (tmp_path / "crowd.xosc").write_text(text, encoding="utf-8")
+    arguments = ("--param", "Traffic=70", "--time-limit", "20", "--out", f"{tmp_path}/runs")
+    done = eidrive("run", f"{tmp_path}/crowd.xosc", *arguments)
+    (recording,) = (tmp_path / "runs").glob("*/recording.mcap")
+    frames = list(read_recording(recording).frames())
+    assert frames[-1].view.time == pytest.approx(20.0), done.output
+    assert max(len(frame.view.names) for frame in frames) >= 40
+    done = eidrive("view", recording, "--out", tmp_path / "crowd.html")
+    assert done.exit_code == 0, done.output
+    size = (tmp_path / "crowd.html").stat().st_size
+    page = Page(browser, tmp_path / "crowd.html", 1440)
+    times = page.page.evaluate(SCRUB)
+    page.close("replay-of-forty-actors")
+    assert len(times) == 200
+    found = {"bytes": size, "median_ms": round(times[100], 1), "longest_of_20_ms": round(times[190], 1)}
+    with capsys.disabled():
+        sys.stdout.write(f"\nreplay of forty actors: {found}\n")
+    for name, value in found.items():
+        record_property(name, value)
+    assert size < 3_000_000
 
 
 def test_report_links_to_replay_of_a_run(browser: Any, report: Path) -> None:

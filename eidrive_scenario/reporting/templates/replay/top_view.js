@@ -126,13 +126,16 @@ function outline(name, [x, y, yaw], at) {
   return [...at(x - across, y + up), ...at(x + across, y - up)];
 }
 
-/* Return the label position (right, left, above or below) with the smallest overlap with other labels. */
+/* Return the area of a rectangle that others cover. */
+const covered = ([left, top, right, bottom], others) => others.reduce((sum, [l, t, r, b]) =>
+  sum + Math.max(0, Math.min(right, r) - Math.max(left, l)) * Math.max(0, Math.min(bottom, b) - Math.max(top, t)), 0);
+
+/* Return the rectangle of a label (right, left, above or below) that others cover least. */
 function place(width, [left, top, right, bottom], others) {
-  const middle = (left + right) / 2 - width / 2 - 7;
-  const spots = [[right, (top + bottom) / 2], [left - width - 14, (top + bottom) / 2], [middle, top - 11], [middle, bottom + 11]];
-  const covered = ([x, y]) => others.reduce((sum, [, l, t, r, b]) =>
-    sum + Math.max(0, Math.min(x + 7 + width, r) - Math.max(x + 7, l)) * Math.max(0, Math.min(y + 8, b) - Math.max(y - 8, t)), 0);
-  return spots.reduce((best, spot) => covered(spot) < covered(best) ? spot : best);
+  const middle = (left + right) / 2 - width / 2;
+  const spots = [[right + 7, (top + bottom) / 2], [left - width - 7, (top + bottom) / 2], [middle, top - 11], [middle, bottom + 11]];
+  return spots.map(([x, y]) => [x, y - 8, x + width, y + 8])
+    .reduce((best, spot) => covered(spot, others) < covered(best, others) ? spot : best);
 }
 
 function writeLabel(text, left, middle) {
@@ -147,12 +150,15 @@ function drawLabels(poses, at, area) {
   pen.textBaseline = "middle";
   const boxes = poses.map(([name, pose]) => [name, ...outline(name, pose, at)])
     .filter(([, l, t, r, b]) => r > 0 && l < area.width && b > 0 && t < area.height);
-  const taken = boxes.slice();
-  for (const [name, ...box] of boxes) {
+  const rank = (name) => name === shown.station ? 0 : name in data.stations ? 1 : 2, labels = [];
+  for (const [name, ...box] of boxes.sort(([one], [other]) => rank(one) - rank(other))) {
     const text = labelOf(name, poseOf(name)[3]), width = pen.measureText(text).width;
-    const [left, middle] = place(width, box, taken.filter(([other]) => other !== name));
-    taken.push(["", left + 7, middle - 8, left + 7 + width, middle + 8]);
-    writeLabel(text, left + 7, middle);
+    const others = boxes.filter(([other]) => other !== name).map(([, ...outlined]) => outlined);
+    const spot = place(width, box, [...others, ...labels]);
+    // In dense traffic a name would cover others; it is shown after zooming in
+    if (rank(name) === 2 && covered(spot, labels) > 1.6 * width) continue;
+    labels.push(spot);
+    writeLabel(text, spot[0], spot[1] + 8);
   }
 }
 
