@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -85,6 +85,15 @@ def test_interrupt_of_user_keeps_ended_runs(scenario: Path, tmp_path: Path) -> N
         assert [(run.point["Speed"], run.status) for run in store.runs()] == [(10, "passed")]
 
 
+@pytest.fixture
+def default_interrupt() -> Iterator[None]:
+    """Handler of SIGINT that raises KeyboardInterrupt; shells ignore the signal in processes of the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("default_interrupt")
 def test_second_interrupt_does_not_interrupt_the_end() -> None:
     before = signal.getsignal(signal.SIGINT)
     ended = []
