@@ -89,9 +89,9 @@ def _assign_stars(rows: Sequence[int], columns: Sequence[int], costs: Sequence[f
     with the general method takes longer to import than a short run.
     """
     pairs = list(zip(rows, columns, strict=True))
-    of_row, of_column = Counter(rows), Counter(columns)
-    if len(of_row) == len(pairs) == len(of_column):
+    if len(set(rows)) == len(pairs) == len(set(columns)):
         return pairs
+    of_row, of_column = Counter(rows), Counter(columns)
     best: dict[tuple[int, int], tuple[float, int, int]] = {}
     for (row, column), cost in zip(pairs, costs, strict=True):
         if of_row[row] > 1 and of_column[column] > 1:

@@ -243,7 +243,10 @@ def _row(run: StoredRun) -> tuple[Any, ...]:
 def _stored_run(row: Sequence[Any]) -> StoredRun:
     *head, point, result, error, command, wall_s, settings = row
     columns = _scalars("point", point), _scalars("result", result)
-    values = (*head, *columns, error, command, wall_s, zlib.decompress(settings).decode())
+    text = zlib.decompress(settings).decode()
+    if text and not isinstance(json.loads(text), dict):
+        raise ValueError("settings: not an object")
+    values = (*head, *columns, error, command, wall_s, text)
     run = msgspec.convert(dict(zip(StoredRun.__struct_fields__, values, strict=True)), StoredRun)
     if run.status not in STATUSES:
         raise ValueError(f"unknown status {run.status!r}")

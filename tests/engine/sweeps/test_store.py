@@ -188,6 +188,8 @@ def test_full_disk_raises_and_keeps_earlier_rows(tmp_path: Path) -> None:
         ("point", '{"a": {}}', "point: Expected"),
         ("settings", b"no zlib", "decompressing"),
         ("settings", zlib.compress(b"{}")[:-1], "incomplete"),
+        ("settings", zlib.compress(b"{"), "Expecting"),
+        ("settings", zlib.compress(b"[1]"), "settings: not an object"),
         ("status", "unknown", "unknown status 'unknown'"),
         ("seed", "one", "$.seed"),
     ],
