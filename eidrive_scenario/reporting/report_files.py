@@ -41,12 +41,20 @@ def report_files(
     for line in (*unjudged, *(f"{line}, the report omits it" for line in omitted)):
         warn(line)
     if invalid:
-        folders = ", ".join(map(str, locations))
         hint = "give folders written by eidrive run --out, or stores of sweeps"
-        missing = "no run has a verdict" if unjudged else f"no {RESULT} in {folders}"
-        raise SettingError(errors or Diagnostic(missing, hint))
+        raise SettingError(errors or Diagnostic(_missing(locations, stores, unjudged), hint))
     if replays:
         results, without = write_replays(results, out.parent if out.suffix == ".html" else out)
         for line in without:
             warn(line)
     return write_report(results, out, omitted=omitted, unjudged=unjudged)
+
+
+def _missing(locations: Sequence[Path], stores: Sequence[Path], unjudged: Sequence[str]) -> str:
+    """Return the error of files without any result."""
+    if unjudged:
+        return "no run has a verdict"
+    folders = [path for path in locations if path not in stores]
+    parts = [f"no run in {', '.join(map(str, stores))}"] if stores else []
+    parts += [f"no {RESULT} in {', '.join(map(str, folders))}"] if folders else []
+    return ", and ".join(parts)

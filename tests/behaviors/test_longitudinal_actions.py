@@ -284,3 +284,16 @@ def test_synchronize_of_much_too_fast_actor_arrives_with_the_master(scene: RunSc
     assert played.at(20.0).x == pytest.approx(200.0, abs=0.5)
     assert min(row["Ego"].speed for row in played.rows) >= 0.0
     assert played.at(20.0).speed == pytest.approx(100.0 / 20.0, abs=0.1), "the mean speed"
+
+
+@pytest.mark.parametrize("final", ["", '<FinalSpeed><AbsoluteSpeed value="80"/></FinalSpeed>'])
+def test_synchronize_does_not_exceed_the_maximum_speed_of_the_vehicle(scene: RunScene, final: str) -> None:
+    """Other needs (250 - 150) / 10 = 10 s; in that time Ego covers less than 10 s * 70 m/s, its maximum, of 800 m."""
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="250"/></TargetPositionMaster>
+      <TargetPosition><LanePosition roadId="1" laneId="-1" s="900"/></TargetPosition>{final}
+      </SynchronizeAction></PrivateAction>"""
+    played = scene(12, ("Ego", action), dt=0.05)
+    assert max(row["Ego"].speed for row in played.rows) == 70.0
+    assert played.when("action 0", "completeState") == pytest.approx(10.0, abs=0.1), "the arrival of the master"
+    assert 100.0 + 20.0 * 10.0 < played.at(10.0).x < 100.0 + 70.0 * 10.0

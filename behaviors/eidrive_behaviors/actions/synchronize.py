@@ -55,7 +55,8 @@ class SynchronizeAction(ActionBehaviour):
     uses the mean speed of that instant as its final speed. A steady state at the end shortens distance and time.
     Distances are measured along the trajectory that an entity follows, else along the roads. An entity with a negative
     speed arrives backwards. A final speed opposite to the direction of motion cannot be reached on the way to the
-    target: the actor arrives at standstill and changes to the final speed at once, which is a warning.
+    target: the actor arrives at standstill and changes to the final speed at once, which is a warning. The maximum
+    speed of a vehicle limits its speed, so that it can arrive late, which is a warning as well.
     """
 
     domains = Domain.LONGITUDINAL
@@ -113,10 +114,19 @@ class SynchronizeAction(ActionBehaviour):
             self._mean = way / time
         final = self._mean if final is None else max(0.0, sense * final)
         if final is not None:
-            motion.set_speed(sense * self._next(present, way, time, final, dt))
+            motion.set_speed(sense * self._limited(self._next(present, way, time, final, dt)))
         elif math.isfinite(time):
-            motion.set_speed(sense * (present + 2.0 * (way / time - present) / time * dt))
+            motion.set_speed(sense * self._limited(present + 2.0 * (way / time - present) / time * dt))
         return Status.RUNNING
+
+    def _limited(self, speed: float) -> float:
+        """Return a speed within the maximum of the vehicle [m/s], with a warning for one above it."""
+        top = self.actor.limits()[0]
+        if speed <= top:
+            return speed
+        message = f"{self.actor.name} cannot arrive in time: this takes more than its maximum speed, {top:g} m/s"
+        self.context.warn(*self.error(message, "give it a shorter distance or more time").diagnostics)
+        return top
 
     def _check_direction(self, final: float, sense: float) -> None:
         """Add a warning if the final speed is opposite to the direction of motion [m/s]."""
@@ -219,14 +229,17 @@ class SynchronizeAction(ActionBehaviour):
         return way % layout.length if layout.closed and layout.length > 0.0 else way
 
     def _final_speed(self) -> float | None:
+        """Return the final speed within the maximum of the vehicle [m/s]; None if none is specified."""
         final = self.action.final_speed
         if final is None:
             return None
         if final.absolute_speed is not None:
-            return final.absolute_speed.value
-        assert final.relative_speed_to_master is not None
-        relative, master = final.relative_speed_to_master, self.context.speed(self.action.master_entity_ref)
-        return relative_speed(master, relative.value, relative.speed_target_value_type)
+            speed = final.absolute_speed.value
+        else:
+            assert final.relative_speed_to_master is not None
+            relative, master = final.relative_speed_to_master, self.context.speed(self.action.master_entity_ref)
+            speed = relative_speed(master, relative.value, relative.speed_target_value_type)
+        return math.copysign(min(abs(speed), self.actor.limits()[0]), speed)
 
     def _steady_distance(self, final: float) -> float:
         """Return the length of the final segment at the final speed [m]."""

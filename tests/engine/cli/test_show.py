@@ -10,6 +10,7 @@ import pytest
 from command_fixtures import Eidrive
 
 from eidrive_scenario.cli.show import Names
+from eidrive_scenario.experiments.sweeps.store import ResultStore
 from eidrive_scenario.registry import GROUPS
 
 
@@ -180,6 +181,17 @@ def test_report_without_runs_is_invalid_input(eidrive: Eidrive, tmp_path: Path) 
     result = eidrive("report", tmp_path, "-o", tmp_path / "report")
     assert result.exit_code == 2
     assert "no result.json in" in result.stderr
+
+
+def test_report_of_store_without_runs_is_invalid_input(eidrive: Eidrive, tmp_path: Path) -> None:
+    store = tmp_path / "sweep.db"
+    with ResultStore.open(store, {}):
+        pass
+    result = eidrive("report", store, "-o", tmp_path / "report")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"no run in {store}; ")
+    result = eidrive("report", store, tmp_path, "-o", tmp_path / "report")
+    assert result.stderr.startswith(f"no run in {store}, and no result.json in {tmp_path}; ")
 
 
 def test_tree_with_svg_option_draws_diagram(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
