@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from typing import Any
 
@@ -23,6 +24,11 @@ _FOGS = (
 )
 _LIGHT = (0.01, 1.0, 3.0, 10.0, 20.0, 400.0, 1000.0, 10_000.0)
 """Limits of the classes of ambient illumination [lx]."""
+_EIGHTHS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT")
+_OBSCURED = "nineOktas"
+"""Value of the standard for a sky that cannot be seen."""
+_NO_SKY = "skyOff"
+"""Value of files up to version 1.1 for a sky that is not drawn, whose clouds are unknown."""
 
 
 def set_environment(
@@ -53,6 +59,9 @@ def _set_weather(osi: Osi, conditions: Any, weather: Weather) -> None:
     conditions.precipitation = _precipitation(osi, weather)
     conditions.fog = _fog(osi, weather.visual_range)
     conditions.ambient_illumination = _illumination(osi, weather)
+    conditions.clouds.fractional_cloud_cover = _clouds(osi, weather.cloud_cover)
+    _set_wind(conditions, weather.wind_direction, weather.wind_speed)
+    _set_sun(conditions, weather)
 
 
 def _set_environment_weather(osi: Osi, conditions: Any, environment: Environment, time: float) -> None:
@@ -63,8 +72,13 @@ def _set_environment_weather(osi: Osi, conditions: Any, environment: Environment
         conditions.precipitation = _precipitation(osi, weather)
     if environment.fog_range is not None:
         conditions.fog = _fog(osi, environment.fog_range)
+    if environment.clouds not in (None, _NO_SKY):
+        conditions.clouds.fractional_cloud_cover = _clouds(osi, weather.cloud_cover, environment.clouds == _OBSCURED)
+    if environment.wind_speed is not None:
+        _set_wind(conditions, weather.wind_direction, environment.wind_speed)
     if (environment.sun_elevation, environment.date_time) != (None, None):
         conditions.ambient_illumination = _illumination(osi, weather)
+        _set_sun(conditions, weather)
 
 
 def _precipitation(osi: Osi, weather: Weather) -> int:
@@ -81,3 +95,26 @@ def _illumination(osi: Osi, weather: Weather) -> int:
     lamps = weather.street_lighting if weather.lamps_on else 0.0
     level = bisect_right(_LIGHT, float(daylight(weather).ground @ LUMA) + lamps) + 1
     return int(osi.environment.AmbientIllumination.Value(f"AMBIENT_ILLUMINATION_LEVEL{level}"))
+
+
+def _clouds(osi: Osi, cover: float, obscured: bool = False) -> int:
+    """Return the class of a share of the sky in eighths; only a sky without a cloud and a full one are 0 and 8."""
+    eighths = min(max(round(8.0 * cover), 1), 7) if 0.0 < cover < 1.0 else round(8.0 * cover)
+    name = "SKY_OBSCURED" if obscured else f"{_EIGHTHS[eighths]}_OKTAS"
+    return int(osi.environment.CloudLayer.FractionalCloudCover.Value(f"FRACTIONAL_CLOUD_COVER_{name}"))
+
+
+def _set_wind(conditions: Any, direction: float, speed: float) -> None:
+    """Set the direction of origin [rad], counterclockwise from north, of a wind to `direction` [degrees] from x over y.
+
+    North is y.
+    """
+    conditions.wind.origin_direction = math.radians((direction + 90.0) % 360.0)
+    conditions.wind.speed = speed
+
+
+def _set_sun(conditions: Any, weather: Weather) -> None:
+    """Set azimuth, counterclockwise from north, elevation [rad] and illuminance without clouds [lx] of the sun."""
+    conditions.sun.azimuth = math.radians(-weather.sun_azimuth % 360.0)
+    conditions.sun.elevation = math.radians(weather.sun_elevation)
+    conditions.sun.intensity = float(daylight(weather.model_copy(update={"cloud_cover": 0.0})).sun @ LUMA)

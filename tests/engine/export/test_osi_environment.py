@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,63 @@ def test_precipitation_without_unit_is_a_share_of_heavy_rain() -> None:
     environment = Environment(precipitation="rain", precipitation_share=0.5)
     found = conditions(environment)
     assert type(found).Precipitation.Name(found.precipitation) == "PRECIPITATION_HEAVY"
+
+
+@pytest.mark.parametrize(
+    ("clouds", "name"),
+    [
+        ("zeroOktas", "ZERO_OKTAS"),
+        ("threeOktas", "THREE_OKTAS"),
+        ("eightOktas", "EIGHT_OKTAS"),
+        ("nineOktas", "SKY_OBSCURED"),
+        ("free", "ZERO_OKTAS"),
+        ("overcast", "EIGHT_OKTAS"),
+    ],
+)
+def test_clouds_are_in_eighths_of_the_sky(clouds: str, name: str) -> None:
+    found = conditions(Environment(clouds=clouds)).clouds
+    assert type(found).FractionalCloudCover.Name(found.fractional_cloud_cover) == f"FRACTIONAL_CLOUD_COVER_{name}"
+
+
+@pytest.mark.parametrize(
+    ("cover", "name"), [(0.0, "ZERO"), (0.01, "ONE"), (0.5, "FOUR"), (0.99, "SEVEN"), (1.0, "EIGHT")]
+)
+def test_only_a_full_sky_has_eight_eighths(tmp_path: Path, cover: float, name: str) -> None:
+    metadata = {"settings": json.dumps({"weather_profile": {"cloud_cover": cover}})}
+    run = write_run(tmp_path, [Frame(view({"A": {}}))], metadata=metadata)
+    builder = GroundTruthBuilder(Osi(), None, Identifiers(), None, weather=run.weather)
+    (found,) = (builder.build(frame).environmental_conditions.clouds for frame in run.frames())
+    assert type(found).FractionalCloudCover.Name(found.fractional_cloud_cover) == f"FRACTIONAL_CLOUD_COVER_{name}_OKTAS"
+
+
+@pytest.mark.parametrize(
+    ("towards", "origin"),
+    [(0.0, 0.5), (0.5, 1.0), (1.0, 1.5), (1.5, 0.0), (-0.5, 0.0), (2.25, 0.75)],
+    ids=["east", "north", "west", "south", "south negative", "northeast"],
+)
+def test_wind_comes_from_where_it_does_not_blow_to(towards: float, origin: float) -> None:
+    """OpenSCENARIO: target of the wind from x (east) over y. OSI: its origin from north (y) over west."""
+    found = conditions(Environment(wind_direction=towards * math.pi, wind_speed=7.5)).wind
+    assert found.origin_direction == pytest.approx(origin * math.pi)
+    assert found.speed == 7.5
+
+
+def test_sun_has_azimuth_counterclockwise_from_north() -> None:
+    """An azimuth of pi/2 is east in OpenSCENARIO and west in OSI. At noon the sun of the north is in the south."""
+    found = conditions(Environment(sun_azimuth=math.pi / 2.0, sun_elevation=0.7, illuminance=60_000.0)).sun
+    assert (found.azimuth, found.elevation) == pytest.approx((1.5 * math.pi, 0.7))
+    assert found.intensity == pytest.approx(60_000.0)
+    noon = conditions(Environment(date_time="2026-06-21T12:00:00")).sun
+    assert noon.azimuth == pytest.approx(math.pi)
+    assert math.degrees(noon.elevation) == pytest.approx(90.0 - 48.0 + 23.45, abs=0.1)
+    night = conditions(Environment(date_time="2026-06-21T00:00:00")).sun
+    assert night.elevation < 0.0
+    assert night.intensity == 0.0
+
+
+def test_environment_without_sky_has_no_clouds_wind_and_sun() -> None:
+    found = conditions(Environment(temperature=280.0, clouds="skyOff"))
+    assert not any(found.HasField(name) for name in ("clouds", "wind", "sun"))
 
 
 def test_weather_option_replaces_that_of_the_scenario(tmp_path: Path) -> None:
