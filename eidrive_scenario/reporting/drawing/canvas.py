@@ -58,6 +58,14 @@ class Canvas:
 
     def roads(self, roads: RoadDrawing) -> None:
         """Draw the roads and houses inside the section."""
+        for level in roads.levels:
+            self._level(level)
+        for house, _ in roads.houses:
+            if self._shows(house):
+                self.fill(house, HOUSE)
+
+    def _level(self, roads: RoadDrawing) -> None:
+        """Draw lanes and road marks of one level."""
         for kind, polygon in roads.lanes:
             if self._shows(polygon):
                 self.fill(polygon, LANES.get(kind, LANE))
@@ -69,9 +77,6 @@ class Canvas:
                         self.dashes(start, end, paint, 0.2, STROKE)
                 else:
                     self.line(line, paint, 0.2)
-        for house, _ in roads.houses:
-            if self._shows(house):
-                self.fill(house, HOUSE)
 
     def fill(self, polygon: Points, color: str, opacity: float = 1.0) -> None:
         """Fill a polygon (M, 2) [m]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.geometry import footprint
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.run_files import ROAD_FILE
+from eidrive_scenario.reporting.drawing.bridges import CLEARANCE, Strip, bridge_spans
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lateral_axis
@@ -36,26 +38,81 @@ _LOWEST = ("none", "shoulder", "border", "sidewalk", "median")
 def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDrawing:
     """Return lanes and road marks of these roads, limited to an optional `window`.
 
-    Driving lanes come last, so that they cover the shoulders of crossing roads in a junction. Edges of a large map have
-    a larger point spacing. Raise InputError if the map exceeds the maximum spacing.
+    Driving lanes come last, so that they cover the shoulders of crossing roads in a junction. Parts of roads that pass
+    above others are repeated in `above`. Edges of a large map have a larger point spacing. Raise InputError if the map
+    exceeds the maximum spacing.
     """
     roads = list(roads)
     spacing = _spacing(roads)
+    parts = [
+        _Part(road, section, stations)
+        for road in roads
+        for section in road.sections
+        if section.length > 0.0
+        for stations in _half_turns(road, _stations(section.s, section.end, spacing))
+    ]
+    edges = [part.edges() for part in parts]
+    ground = _drawn(zip(parts, edges, strict=True), window, spacing)
+    raised: dict[int, list[tuple[_Part, Sequence[Edges]]]] = {}
+    strips = [part.strip(found) for part, found in zip(parts, edges, strict=True)]
+    for index, start, end in bridge_spans(strips):
+        part = parts[index]
+        over = part.between(start, end, spacing)
+        height = part.road.elevation.value((start + end) / 2.0)
+        raised.setdefault(math.floor(height / CLEARANCE), []).append((over, over.edges()))
+    return replace(ground, above=tuple(_drawn(raised[level], window, spacing) for level in sorted(raised)))
+
+
+class Edges(NamedTuple):
+    """Lane and its inner and outer edge (N, 2) [m]."""
+
+    lane: Lane
+    inner: Array
+    outer: Array
+
+
+class _Part(NamedTuple):
+    """Part of a lane section between the first and the last of some s coordinates [m]."""
+
+    road: Road
+    section: LaneSection
+    stations: list[float]
+
+    def edges(self) -> list[Edges]:
+        """Return the edges of all lanes except the center lane."""
+        return [
+            Edges(
+                lane,
+                _edge(self.road, self.section, lane, self.stations, outer=False),
+                _edge(self.road, self.section, lane, self.stations, outer=True),
+            )
+            for lane in self.section.lanes.values()
+            if lane.id != 0
+        ]
+
+    def strip(self, edges: Sequence[Edges]) -> Strip:
+        """Return heights and edges of the part, with the middle of each lane."""
+        lines = [line for _, inner, outer in edges for line in (inner, (inner + outer) / 2.0, outer)]
+        points = np.array(lines) if lines else np.empty((0, len(self.stations), 2))
+        heights = np.array([self.road.elevation.value(s) for s in self.stations])
+        return Strip(np.array(self.stations), heights, points)
+
+    def between(self, start: float, end: float, spacing: float) -> _Part:
+        """Return a shorter part."""
+        return self._replace(stations=_stations(start, end, spacing))
+
+
+def _drawn(parts: Iterable[tuple[_Part, Sequence[Edges]]], window: Window | None, spacing: float) -> RoadDrawing:
+    """Return lanes and road marks of parts of roads."""
     lanes: list[tuple[str, Array]] = []
     markings: list[tuple[str, str, Array]] = []
-    for road in roads:
-        for section in road.sections:
-            if section.length <= 0.0:
-                continue
-            parts = _half_turns(road, _stations(section.s, section.end, spacing))
-            for lane in section.lanes.values():
-                for stations in parts if lane.id != 0 else ():
-                    inner = _edge(road, section, lane, stations, outer=False)
-                    outer = _edge(road, section, lane, stations, outer=True)
-                    polygon = np.concatenate([simplify_line(inner), simplify_line(outer)[::-1]])
-                    if _reaches(polygon, window):
-                        lanes.append((lane.type, polygon))
-                markings.extend(mark for mark in _marks(road, section, lane, spacing) if _reaches(mark[2], window))
+    for part, edges in parts:
+        for lane, inner, outer in edges:
+            polygon = np.concatenate([simplify_line(inner), simplify_line(outer)[::-1]])
+            if _reaches(polygon, window):
+                lanes.append((lane.type, polygon))
+        for lane in part.section.lanes.values():
+            markings.extend(mark for mark in _marks(part, lane, spacing) if _reaches(mark[2], window))
     lanes.sort(key=lambda entry: _LOWEST.index(entry[0]) if entry[0] in _LOWEST else len(_LOWEST))
     return RoadDrawing(tuple(lanes), tuple(markings))
 
@@ -160,11 +217,13 @@ def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *
     return np.array(points)
 
 
-def _marks(road: Road, section: LaneSection, lane: Lane, spacing: float) -> Iterator[tuple[str, str, Array]]:
+def _marks(part: _Part, lane: Lane, spacing: float) -> Iterator[tuple[str, str, Array]]:
     """Yield the road marks on the outer edge of a lane."""
+    road, section = part.road, part.section
     for index, mark in enumerate(lane.road_marks):
         after = lane.road_marks[index + 1].s_offset if index + 1 < len(lane.road_marks) else section.length
-        start, end = section.s + mark.s_offset, section.s + min(after, section.length)
+        start = max(section.s + mark.s_offset, part.stations[0])
+        end = min(section.s + min(after, section.length), part.stations[-1])
         if mark.type in ("none", "curb", "grass") or end - start < 1e-6:
             continue
         stations = _stations(start, end, spacing)

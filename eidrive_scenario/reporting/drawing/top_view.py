@@ -62,10 +62,22 @@ class RoadDrawing:
     lanes: tuple[tuple[str, Array], ...] = ()
     markings: tuple[tuple[str, str, Array], ...] = ()
     houses: tuple[tuple[Array, float], ...] = ()
+    above: tuple[RoadDrawing, ...] = ()
+    """Parts of roads that pass above others, from low to high: they are drawn after those below them."""
+
+    @property
+    def levels(self) -> tuple[RoadDrawing, ...]:
+        """Return the drawings of lanes and road marks in the order in which they cover each other."""
+        return (self, *self.above)
 
 
 def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
     """Return the roads as a group with an id, which several figures of a page can reference."""
+    return f'<g id="{escape(identifier)}">{"".join(map(_level, roads.levels))}</g>'
+
+
+def _level(roads: RoadDrawing) -> str:
+    """Return lanes and road marks of one level."""
     lanes = "".join(
         f'<path d="{_path(polygon)}Z" fill="{LANES.get(kind, LANE)}" stroke="{LANES.get(kind, LANE)}" '
         'stroke-width="0.05"/>'
@@ -75,7 +87,7 @@ def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
         f'<path d="{_path(line)}" fill="none" stroke="{PAINT.get(color, WHITE)}" stroke-width="0.18"{_dashes(kind)}/>'
         for kind, color, line in roads.markings
     )
-    return f'<g id="{escape(identifier)}">{lanes}{lines}</g>'
+    return lanes + lines
 
 
 def top_view(

@@ -94,9 +94,16 @@ def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[s
 
 def _roads(roads: RoadDrawing) -> dict[str, Any]:
     return {
+        "levels": [_level(level) for level in roads.levels],
+        "houses": [[round(height, 2), outline.round(2).tolist()] for outline, height in roads.houses],
+    }
+
+
+def _level(roads: RoadDrawing) -> dict[str, Any]:
+    """Return lanes and road marks of one level."""
+    return {
         "lanes": [[LANES.get(kind, LANE), polygon.round(2).tolist()] for kind, polygon in roads.lanes],
         "lines": [
             [is_broken(kind), PAINT.get(color, WHITE), line.round(2).tolist()] for kind, color, line in roads.markings
         ],
-        "houses": [[round(height, 2), outline.round(2).tolist()] for outline, height in roads.houses],
     }

@@ -78,8 +78,10 @@ function drawPerspective() {
     if (closed) pen.closePath();
     return true;
   };
-  for (const lane of lanes) if (near(lane) && polygon(lane.points, true)) { pen.fillStyle = lane.color; pen.fill(); }
-  for (const line of lines) if (near(line)) drawMark(line, camera, polygon);
+  for (const { lanes, lines } of levels) {
+    for (const lane of lanes) if (near(lane) && polygon(lane.points, true)) { pen.fillStyle = lane.color; pen.fill(); }
+    for (const line of lines) if (near(line)) drawMark(line, camera, polygon);
+  }
   const path = shown.layers.plan && isPresent() ? part("path") : [];
   if (path.length > 1 && polygon(ribbon(path, 0.9), true)) {
     pen.fillStyle = part("braking") ? C.lost : C.link; pen.globalAlpha = 0.55; pen.fill(); pen.globalAlpha = 1;

@@ -6,8 +6,10 @@ function bounds(points) {
   const xs = points.map((p) => p[0]), ys = points.map((p) => p[1]);
   return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
 }
-const lanes = data.roads.lanes.map(([color, points]) => ({ color, points, area: bounds(points) }));
-const lines = data.roads.lines.map(([broken, color, points]) => ({ broken, color, points, area: bounds(points) }));
+/* Lanes and lines of each level, in the order in which they cover each other. */
+const levels = data.roads.levels.map(({ lanes, lines }) => ({
+  lanes: lanes.map(([color, points]) => ({ color, points, area: bounds(points) })),
+  lines: lines.map(([broken, color, points]) => ({ broken, color, points, area: bounds(points) })) }));
 const houses = data.roads.houses.map(([height, points]) => ({ height, points, area: bounds(points) }));
 
 function fit() {
@@ -67,15 +69,17 @@ function drawPerceived({ box, color, line, kind }) {
 
 function drawRoads([left, bottom, right, top]) {
   const inside = ({ area }) => area[0] <= right && area[2] >= left && area[1] <= top && area[3] >= bottom;
-  pen.lineWidth = 0.05;
-  for (const lane of lanes) if (inside(lane)) {
-    trace(lane.points); pen.closePath(); pen.fillStyle = pen.strokeStyle = lane.color; pen.fill(); pen.stroke();
+  for (const { lanes, lines } of levels) {
+    pen.lineWidth = 0.05;
+    for (const lane of lanes) if (inside(lane)) {
+      trace(lane.points); pen.closePath(); pen.fillStyle = pen.strokeStyle = lane.color; pen.fill(); pen.stroke();
+    }
+    pen.lineWidth = 0.18;
+    for (const line of lines) if (inside(line)) {
+      pen.setLineDash(line.broken ? [3, 3] : []); pen.strokeStyle = line.color; trace(line.points); pen.stroke();
+    }
+    pen.setLineDash([]);
   }
-  pen.lineWidth = 0.18;
-  for (const line of lines) if (inside(line)) {
-    pen.setLineDash(line.broken ? [3, 3] : []); pen.strokeStyle = line.color; trace(line.points); pen.stroke();
-  }
-  pen.setLineDash([]);
   for (const house of houses) if (inside(house)) {
     trace(house.points); pen.closePath(); pen.fillStyle = C.house; pen.fill();
   }
