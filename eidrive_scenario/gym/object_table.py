@@ -29,6 +29,7 @@ FEW = 12
 """Maximum number of objects for which scalar arithmetic is faster than arrays."""
 _SIGNED = ("x", "y", "velocity_x", "velocity_y", "cos", "sin")
 _CLASS = {name: COLUMNS.index(name) for name in CLASSES}
+_CLASS_COLUMNS = {name: [float(name == other) for other in CLASSES] for name in CLASSES}
 
 
 def column_bounds(reach: float) -> tuple[Array, Array]:
@@ -63,14 +64,15 @@ def nearest_rows(objects: Detections, ego: EgoState, reach: float = math.inf) ->
     return [row for row in order.tolist() if distance[row] <= reach]
 
 
-def object_table(objects: Detections, ego: EgoState, now: float, *, count: int, reach: float) -> Array:
-    """Return the table (count, C) of the nearest objects in SI units; rows without an object are 0."""
-    table = np.zeros((count, len(COLUMNS)))
+def object_values(
+    objects: Detections, ego: EgoState, now: float, *, count: int, reach: float
+) -> Sequence[float] | Array:
+    """Return the values of the table of the nearest objects in SI units, row by row; at most `count` rows."""
     rows = nearest_rows(objects, ego, reach)[:count]
-    if rows:
-        fill = few_object_rows if len(rows) <= FEW else object_rows
-        table[: len(rows)] = fill(objects, rows, ego, max(now - objects.time, 0.0))
-    return table
+    age = max(now - objects.time, 0.0)
+    if len(rows) > FEW:
+        return object_rows(objects, rows, ego, age).ravel()
+    return [value for row in few_object_rows(objects, rows, ego, age) for value in row] if rows else ()
 
 
 def few_object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age: float) -> list[list[float]]:
@@ -94,7 +96,6 @@ def few_object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age
             ahead = cos * cos * xx + cos * sin * (xy + yx) + sin * sin * yy
             aside = sin * sin * xx - sin * cos * (xy + yx) + cos * cos * yy
         heading = yaw - ego.yaw
-        known_class = objects.classes[row]
         filled.append(
             [
                 1.0,
@@ -112,7 +113,7 @@ def few_object_rows(objects: Detections, rows: Sequence[int], ego: EgoState, age
                 math.sqrt(max(aside, 0.0)),
                 float(certain),
                 age,
-                *[float(name == known_class) for name in CLASSES],
+                *_CLASS_COLUMNS[objects.classes[row]],
             ]
         )
     return filled

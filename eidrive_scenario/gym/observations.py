@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.step import StationPerception
 from eidrive_scenario.gym.libraries import spaces
-from eidrive_scenario.gym.object_table import MAX_AGE, MAX_SPEED, column_bounds, object_table
+from eidrive_scenario.gym.object_table import MAX_AGE, MAX_SPEED, column_bounds, object_values
 from eidrive_scenario.gym.observation_settings import ObservationSettings, RouteSettings, TableSettings
 from eidrive_scenario.gym.occupancy_grid import grid_bounds, occupancy_grid
 from eidrive_scenario.sensing.readings import EgoState
@@ -29,7 +30,8 @@ ROUTE_COLUMNS = ("known", "x", "y")
 SENDER_COLUMNS = ("known", "age")
 """Columns of the part `senders`: whether a message was received, and the age of the newest one [s]."""
 
-Part = Callable[[StationPerception], NDArray[Any]]
+Part = Callable[[StationPerception], Sequence[float] | NDArray[Any]]
+"""Conversion that returns the first values of a part, in one dimension; the others are 0."""
 
 
 class ObservationEncoder:
@@ -106,13 +108,16 @@ class ObservationEncoder:
         route    points (M, 2) of the route ahead in the world frame [m]; empty if there is none
         control  control of the last step; None if there is none
         """
-        self._route, self._control = _in_frame(route, perceived.ego), control or Control()
-        values = np.empty(len(self._scale))
+        self._route, self._control = route, control or Control()
+        values = np.zeros(len(self._scale))
         for encode, place, _ in self._parts.values():
-            values[place] = encode(perceived).ravel()
+            first = encode(perceived)
+            values[place.start : place.start + len(first)] = first
         values /= self._scale
         found = values.astype(np.float32)
-        return self._in_parts(found.clip(self._low, self._high, out=found))
+        np.maximum(found, self._low, out=found)
+        np.minimum(found, self._high, out=found)
+        return self._in_parts(found)
 
     def zeros(self) -> Any:
         """Return the observation of a station that is not present."""
@@ -124,32 +129,33 @@ class ObservationEncoder:
             return values
         return {name: values[place].reshape(shape) for name, (_, place, shape) in self._parts.items()}
 
-    def _ego(self, perceived: StationPerception) -> Array:
+    def _ego(self, perceived: StationPerception) -> Sequence[float]:
         ego, control = perceived.ego, self._control
         requested = None if perceived.goal is None else perceived.goal.speed
         request = (0.0, 0.0) if requested is None else (requested, 1.0)
         driven = control.throttle, control.brake, control.steering
-        return np.array([ego.speed, ego.acceleration, ego.yaw_rate, *request, *driven])
+        return (ego.speed, ego.acceleration, ego.yaw_rate, *request, *driven)
 
-    def _route_ahead(self, perceived: StationPerception) -> Array:
+    def _route_ahead(self, perceived: StationPerception) -> Sequence[float]:
         assert self.settings.route is not None
-        return _points_ahead(self._route, self.settings.route)
+        return _points_ahead(self._route, perceived.ego, self.settings.route)
 
     def _table_part(self, name: str, table: TableSettings) -> Part:
-        def encode(perceived: StationPerception) -> Array:
+        def encode(perceived: StationPerception) -> Sequence[float] | Array:
             objects = perceived.fused if name == "tracks" else perceived.detections
-            return object_table(objects, perceived.ego, perceived.time, count=table.count, reach=table.range)
+            return object_values(objects, perceived.ego, perceived.time, count=table.count, reach=table.range)
 
         return encode
 
-    def _ages(self, perceived: StationPerception) -> Array:
+    def _ages(self, perceived: StationPerception) -> Sequence[float]:
         newest = [self._newest.get(sender) for sender in self._senders]
         rows = [(0.0, 0.0) if time is None else (1.0, max(perceived.time - time, 0.0)) for time in newest]
-        return np.array(rows).reshape(-1, 2)
+        return [value for row in rows for value in row]
 
-    def _grid(self, perceived: StationPerception) -> Array:
+    def _grid(self, perceived: StationPerception) -> NDArray[Any]:
         assert self.settings.grid is not None
-        return occupancy_grid(perceived.fused, self._route, perceived.ego, self.settings.grid)
+        ego = perceived.ego
+        return occupancy_grid(perceived.fused, _in_frame(self._route, ego), ego, self.settings.grid).ravel()
 
 
 def _in_frame(points: Array, ego: EgoState) -> Array:
@@ -159,19 +165,33 @@ def _in_frame(points: Array, ego: EgoState) -> Array:
     return local
 
 
-def _points_ahead(route: Array, settings: RouteSettings) -> Array:
-    """Return rows (points, 3) with points at multiples of the spacing along the route from its point at the vehicle."""
-    rows = np.zeros((settings.points, 3))
+def _points_ahead(route: Array, ego: EgoState, settings: RouteSettings) -> list[float]:
+    """Return known, x and y of points at multiples of the spacing along the route from its point at the vehicle.
+
+    route  points (M, 2) in the world frame; the first segment is that at the vehicle
+    """
+    found: list[float] = []
     if len(route) < 2:
-        return rows
-    step = route[1:] - route[:-1]
-    along = np.zeros(len(route))
-    np.hypot(step[:, 0], step[:, 1]).cumsum(out=along[1:])
-    (x, y), (dx, dy), length = route[0].tolist(), step[0].tolist(), float(along[1])
-    share = -(x * dx + y * dy) / max(length**2, 1e-12)
-    wanted = min(max(share, 0.0), 1.0) * length + settings.spacing * np.arange(1, settings.points + 1)
-    known = int(wanted.searchsorted(along[-1], side="right"))
-    rows[:known, 0] = 1.0
-    rows[:known, 1] = np.interp(wanted[:known], along, route[:, 0])
-    rows[:known, 2] = np.interp(wanted[:known], along, route[:, 1])
-    return rows
+        return found
+    points: list[list[float]] = route.tolist()
+    own_x, own_y, _ = ego.position.tolist()
+    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+    (x, y), (next_x, next_y) = points[0], points[1]
+    dx, dy = next_x - x, next_y - y
+    length = math.hypot(dx, dy)
+    share = ((own_x - x) * dx + (own_y - y) * dy) / max(length**2, 1e-12)
+    start, along, number = min(max(share, 0.0), 1.0) * length, 0.0, 1
+    wanted = start + settings.spacing
+    for (x, y), (next_x, next_y) in pairwise(points):
+        dx, dy = next_x - x, next_y - y
+        length = math.hypot(dx, dy)
+        while wanted <= along + length:
+            share = (wanted - along) / length if length > 0.0 else 0.0
+            ahead_x, ahead_y = x + share * dx - own_x, y + share * dy - own_y
+            found += 1.0, cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
+            if number == settings.points:
+                return found
+            number += 1
+            wanted = start + number * settings.spacing
+        along += length
+    return found

@@ -10,7 +10,9 @@ The parameters are declared in the file like all others; other engines use their
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from functools import lru_cache
 from typing import Annotated, Any
+from weakref import WeakKeyDictionary
 
 import msgspec
 from pydantic import Field, model_validator
@@ -45,19 +47,40 @@ class Distribution(Settings):
 
     def draw(self, seed: int, name: str) -> float:
         """Return the value of the parameter `name` for this seed."""
-        random = generator(seed, "variation", name)
-        if self.uniform is not None:
-            return float(random.uniform(*self.uniform))
-        mean, sd = self.normal or (0.0, 0.0)
-        return mean + sd * min(3.0, max(-3.0, float(random.standard_normal())))
+        return _draw(self.uniform, self.normal, seed, name)
+
+
+@lru_cache(maxsize=256)
+def _draw(uniform: tuple[float, float] | None, normal: tuple[float, float] | None, seed: int, name: str) -> float:
+    random = generator(seed, "variation", name)
+    if uniform is not None:
+        return float(random.uniform(*uniform))
+    mean, sd = normal or (0.0, 0.0)
+    return mean + sd * min(3.0, max(-3.0, float(random.standard_normal())))
 
 
 def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
-    """Return the parameters that this scenario draws for `seed`.
+    """Return the parameters that this scenario draws for `seed`. Raise InputError like `variations`."""
+    return {name: repr(distribution.draw(seed, name)) for name, distribution in variations(scenario).items()}
+
+
+_known: WeakKeyDictionary[Scenario, Mapping[str, Distribution]] = WeakKeyDictionary()
+"""Variations of scenarios without errors."""
+
+
+def variations(scenario: Scenario) -> Mapping[str, Distribution]:
+    """Return the distribution of each parameter that this scenario draws, by its name.
 
     The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but not to drawn ones. Raise InputError with
     file and line of every error in the commands.
     """
+    found = _known.get(scenario)
+    if found is None:
+        found = _known[scenario] = _read_variations(scenario)
+    return found
+
+
+def _read_variations(scenario: Scenario) -> Mapping[str, Distribution]:
     errors = ErrorCollector()
     specified: list[_Specification] = []
     for command in scenario.custom_commands:
@@ -65,14 +88,14 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
             with errors:
                 specified += _specifications(scenario, command)
     names = {one.name for one in specified}
-    drawn: dict[str, str] = {}
+    found: dict[str, Distribution] = {}
     for one in specified:
         with errors:
-            if one.name in drawn:
+            if one.name in found:
                 raise one.error(f"parameter {quoted(one.name)} is drawn twice", "remove one")
-            drawn[one.name] = repr(one.distribution(scenario, names).draw(seed, one.name))
+            found[one.name] = one.distribution(scenario, names)
     errors.raise_if_any()
-    return drawn
+    return found
 
 
 class _Specification(msgspec.Struct, frozen=True):

@@ -28,7 +28,7 @@ from eidrive_scenario.openscenario.model import (
 )
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
-from eidrive_scenario.openscenario.variation import drawn_parameters
+from eidrive_scenario.openscenario.variation import variations
 from eidrive_scenario.registry import registry
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 from eidrive_scenario.v2x.profile import ChannelProfile, load_profile
@@ -75,7 +75,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
         CHANNEL: channel_profile,
         CRITERION: read_criteria,
-        VARIATION: lambda _: drawn_parameters(scenario, 0),
+        VARIATION: lambda _: variations(scenario),
     }
     diagnostics: list[Diagnostic] = []
     for command in scenario.custom_commands:

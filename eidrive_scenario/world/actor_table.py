@@ -90,4 +90,5 @@ class ActorTable:
         view.__dict__.update(rows=self.rows, states=states, kinematics=table[:, 0:9])
         if len(self.bodies) <= FEW:
             view.__dict__["plain_boxes"] = [body.box for body in self.bodies]
+            view.__dict__["is_upright"] = not any([state.pitch or state.roll for state in states])
         return view

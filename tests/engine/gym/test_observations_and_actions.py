@@ -15,7 +15,7 @@ from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.gym import EidriveEnv, GridSettings, RewardSettings
-from eidrive_scenario.gym.object_table import COLUMNS, few_object_rows, nearest_rows, object_rows, object_table
+from eidrive_scenario.gym.object_table import COLUMNS, few_object_rows, nearest_rows, object_rows, object_values
 from eidrive_scenario.gym.occupancy_grid import occupancy_grid
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
@@ -120,17 +120,18 @@ EGO = EgoState(10.0, np.array([10.0, 20.0, 0.0]), math.pi / 2, 0.0, 0.0, 3.0, 0.
 
 
 def test_table_rows_are_in_the_frame_of_the_vehicle() -> None:
-    rows = object_table(two_objects(), EGO, 10.0, count=3, reach=50.0)
-    car, walker = (dict(zip(COLUMNS, row, strict=True)) for row in rows[:2].tolist())
+    rows = np.reshape(object_values(two_objects(), EGO, 10.0, count=3, reach=50.0), (2, -1))
+    car, walker = (dict(zip(COLUMNS, row, strict=True)) for row in rows.tolist())
     named: dict[str, Any] = {"present": 1.0, "x": 4.0, "y": 0.0, "velocity_x": 5.0, "velocity_y": 0.0, "cos": 1.0}
     # The deviation is 1 m to the east, which is across the vehicle, and 2 m along it.
     named |= {"existence": 0.9, "deviation_x": 2.0, "deviation_y": 1.0, "age": 0.5, "car": 1.0, "velocity_known": 1.0}
     assert {name: car[name] for name in named} == pytest.approx(named, abs=1e-12)
     assert [walker[name] for name in ("x", "velocity_known", "covariance_known", "pedestrian")] == [10.0, 0.0, 0.0, 1.0]
     assert walker["sin"] == pytest.approx(-1.0)
-    assert not rows[2].any()
     assert sum(car[name] for name in CLASSES) == 1.0
-    assert object_table(two_objects(), EGO, 10.0, count=3, reach=5.0)[:, 0].tolist() == [1.0, 0.0, 0.0]
+    assert list(object_values(two_objects(), EGO, 10.0, count=3, reach=5.0)) == rows[0].tolist()
+    assert list(object_values(two_objects(), EGO, 10.0, count=1, reach=50.0)) == rows[0].tolist()
+    assert not len(object_values(two_objects(), EGO, 10.0, count=3, reach=1.0))
 
 
 def test_grid_cells_of_an_object_contain_its_existence_and_velocity() -> None:
