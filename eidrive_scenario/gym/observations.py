@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.step import StationPerception
 from eidrive_scenario.gym.libraries import spaces
 from eidrive_scenario.gym.object_table import MAX_AGE, MAX_SPEED, column_bounds, object_values
@@ -46,7 +47,7 @@ class ObservationEncoder:
         self.settings = settings
         self._senders = senders
         self._newest: dict[str, float] = {}
-        self._route: Array = np.empty((0, 2))
+        self._route: PathPart | None = None
         self._control = Control()
         self._parts: dict[str, tuple[Part, slice, tuple[int, ...]]] = {}
         """Conversion, place among all values, and shape of each part."""
@@ -102,10 +103,10 @@ class ObservationEncoder:
             sender, time = received.message.sender, received.message.state.time
             self._newest[sender] = max(time, self._newest.get(sender, -math.inf))
 
-    def encode(self, perceived: StationPerception, route: Array, control: Control | None) -> Any:
+    def encode(self, perceived: StationPerception, route: PathPart | None, control: Control | None) -> Any:
         """Return the observation.
 
-        route    points (M, 2) of the route ahead in the world frame [m]; empty if there is none
+        route    route ahead in the world frame; None if there is none
         control  control of the last step; None if there is none
         """
         self._route, self._control = route, control or Control()
@@ -138,7 +139,7 @@ class ObservationEncoder:
 
     def _route_ahead(self, perceived: StationPerception) -> Sequence[float]:
         assert self.settings.route is not None
-        return _points_ahead(self._route, perceived.ego, self.settings.route)
+        return () if self._route is None else points_ahead(self._route, perceived.ego, self.settings.route)
 
     def _table_part(self, name: str, table: TableSettings) -> Part:
         def encode(perceived: StationPerception) -> Sequence[float] | Array:
@@ -155,7 +156,8 @@ class ObservationEncoder:
     def _grid(self, perceived: StationPerception) -> NDArray[Any]:
         assert self.settings.grid is not None
         ego = perceived.ego
-        return occupancy_grid(perceived.fused, _in_frame(self._route, ego), ego, self.settings.grid).ravel()
+        points = np.empty((0, 2)) if self._route is None else _in_frame(self._route.points, ego)
+        return occupancy_grid(perceived.fused, points, ego, self.settings.grid).ravel()
 
 
 def _in_frame(points: Array, ego: EgoState) -> Array:
@@ -165,33 +167,25 @@ def _in_frame(points: Array, ego: EgoState) -> Array:
     return local
 
 
-def _points_ahead(route: Array, ego: EgoState, settings: RouteSettings) -> list[float]:
+def points_ahead(route: PathPart, ego: EgoState, settings: RouteSettings) -> list[float]:
     """Return known, x and y of points at multiples of the spacing along the route from its point at the vehicle.
 
-    route  points (M, 2) in the world frame; the first segment is that at the vehicle
+    Points beyond the end of the route are omitted.
     """
-    found: list[float] = []
-    if len(route) < 2:
-        return found
-    points: list[list[float]] = route.tolist()
     own_x, own_y, _ = ego.position.tolist()
     cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-    (x, y), (next_x, next_y) = points[0], points[1]
-    dx, dy = next_x - x, next_y - y
-    length = math.hypot(dx, dy)
-    share = ((own_x - x) * dx + (own_y - y) * dy) / max(length**2, 1e-12)
-    start, along, number = min(max(share, 0.0), 1.0) * length, 0.0, 1
-    wanted = start + settings.spacing
-    for (x, y), (next_x, next_y) in pairwise(points):
-        dx, dy = next_x - x, next_y - y
-        length = math.hypot(dx, dy)
-        while wanted <= along + length:
-            share = (wanted - along) / length if length > 0.0 else 0.0
-            ahead_x, ahead_y = x + share * dx - own_x, y + share * dy - own_y
-            found += 1.0, cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
-            if number == settings.points:
-                return found
-            number += 1
-            wanted = start + number * settings.spacing
-        along += length
+    segments, along = route.segments, route.along
+    x, y, dx, dy, square = segments[0]
+    share = ((own_x - x) * dx + (own_y - y) * dy) / square
+    start = along[0] + min(max(share, 0.0), 1.0) * (along[1] - along[0])
+    found: list[float] = []
+    for number in range(1, settings.points + 1):
+        wanted = start + number * settings.spacing
+        if wanted > along[-1]:
+            break
+        index = bisect_left(along, wanted, 1) - 1
+        x, y, dx, dy, square = segments[index]
+        share = (wanted - along[index]) / math.sqrt(square)
+        ahead_x, ahead_y = x + share * dx - own_x, y + share * dy - own_y
+        found += 1.0, cos * ahead_x + sin * ahead_y, cos * ahead_y - sin * ahead_x
     return found

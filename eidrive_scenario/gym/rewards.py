@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
@@ -67,13 +67,13 @@ class Rewards:
         before: WorldView,
         after: WorldView,
         step: AgentStep | None,
-        route: Array,
+        route: PathPart | None,
         attached: Collection[str] = (),
     ) -> dict[str, float]:
         """Return the terms of one tick. The views are the ground truth before and after it.
 
         step      step of the station in this tick
-        route     points (M, 2) of the route from the point at the vehicle on, before the tick [m]
+        route     route ahead of the vehicle before the tick; None if there is none
         attached  trailers of the station, which are no other actors for the time to collision
         """
         name, weight = self._station, self.settings
@@ -83,9 +83,9 @@ class Rewards:
         was, now = before.states[before.row(name)], after.states[after.row(name)]
         duration = after.time - before.time
         terms["time"] = weight.time * duration
-        if len(route) > 1:
-            ahead = (route[1] - route[0]).tolist()
-            covered = ((now.x - was.x) * ahead[0] + (now.y - was.y) * ahead[1]) / math.hypot(*ahead)
+        if route is not None:
+            _, _, ahead_x, ahead_y, square = route.segments[0]
+            covered = ((now.x - was.x) * ahead_x + (now.y - was.y) * ahead_y) / math.sqrt(square)
             terms["progress"] = weight.progress * covered
         contacts = sum(name in (contact.first, contact.second) for contact in after.contacts)
         terms["collision"] = weight.collision * contacts

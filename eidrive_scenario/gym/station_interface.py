@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.station_action import StationAction
@@ -24,9 +22,6 @@ from eidrive_scenario.settings import S, parse_settings
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.specs import actor_spec
-
-NO_ROUTE: Array = np.empty((0, 2))
-"""Route of a station that does not drive."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +80,7 @@ class StationInterface:
         self.rewards = Rewards(settings.reward, name)
         self._needs_route = drives and (self.encoder.needs_route or self.rewards.needs_route)
         self._planner: RoutePlanner | None = None
-        self._route: tuple[float, Array] = -1.0, NO_ROUTE
+        self._route: tuple[float, PathPart | None] = -1.0, None
         self._control: Control | None = None
 
     @property
@@ -99,7 +94,7 @@ class StationInterface:
         self.encoder.reset()
         simulation, perceived = episode.simulation, episode.perceived[self.name]
         self.spec = actor_spec(self.name, simulation.scenario.entities[self.name])
-        self._control, self._planner, self._route = None, None, (-1.0, NO_ROUTE)
+        self._control, self._planner, self._route = None, None, (-1.0, None)
         if self._needs_route:
             own: AgentSettings = simulation.stack.settings[self.name]  # type: ignore[attr-defined]
             own = own.model_copy(update={"obey_signals": False})
@@ -121,7 +116,7 @@ class StationInterface:
             return self.encoder.zeros()
         return self.encoder.encode(perceived, self.route(perceived), self._control)
 
-    def reward_terms(self, transition: Transition, route: Array, episode: Episode) -> dict[str, float]:
+    def reward_terms(self, transition: Transition, route: PathPart | None, episode: Episode) -> dict[str, float]:
         """Return the terms of the reward of one tick, and register its control and messages.
 
         route  the one before the tick
@@ -135,12 +130,12 @@ class StationInterface:
         attached = episode.simulation.world.attached(self.name)
         return self.rewards.terms_of_tick(transition.before, transition.after, step, route, attached)
 
-    def route(self, perceived: StationPerception) -> Array:
-        """Return the points (M, 2) of the route in the world frame [m]; the first segment is that at the vehicle."""
+    def route(self, perceived: StationPerception) -> PathPart | None:
+        """Return the route ahead in the world frame, None for a station that does not drive."""
         if self._planner is None:
-            return NO_ROUTE
+            return None
         if self._route[0] != perceived.time:
-            self._route = perceived.time, self._planner.points_ahead(perceived.ego, perceived.goal)
+            self._route = perceived.time, self._planner.path_ahead(perceived.ego, perceived.goal)
         return self._route[1]
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +23,19 @@ polyline and move a curve of radius R inwards by at most 1/R m²."""
 LEADS_AWAY = 5.0
 """Increase of the distance to a point that ends the search for its nearest segment [m]: a later approach of the path is
 another curve or lap."""
+
+
+class PathPart(NamedTuple):
+    """Part of a path, at least one segment.
+
+    points    (M, 2) [m]
+    segments  start, vector and squared length of each segment (M - 1) [m]
+    along     distance of each point from the beginning of the path (M) [m]
+    """
+
+    points: Array
+    segments: Sequence[Sequence[float]]
+    along: Sequence[float]
 
 
 class PlannedPath:
@@ -43,9 +59,20 @@ class PlannedPath:
         square = np.einsum("mi,mi->m", step, step)
         self._segments: list[list[float]] = np.column_stack([self.points[:-1], step, square]).tolist()
         """Start, vector and squared length of each segment."""
+        self._along: list[float] = []
+        """Distance of each point from the first one [m]; empty until it is computed."""
 
     def __len__(self) -> int:
         return len(self._x)
+
+    def part(self, start: int, count: int) -> PathPart:
+        """Return the part of `count` points from the point `start` on, fewer at the end, but at least one segment."""
+        if not self._along:
+            lengths = [math.sqrt(segment[4]) for segment in self._segments]
+            self._along = [*accumulate(lengths, initial=0.0)]
+        start = min(start, len(self._segments) - 1)
+        end = start + max(count, 2)
+        return PathPart(self.points[start:end], self._segments[start : end - 1], self._along[start:end])
 
     def project(self, x: float, y: float, start: int = 0, reach: int = 30) -> int:
         """Return the index of the nearest segment among `reach` segments from `start` on.

@@ -12,7 +12,7 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.lane_below import lane_below
 from eidrive_scenario.driving.planning.levels import path_heights
-from eidrive_scenario.driving.planning.path import SPACING, PlannedPath
+from eidrive_scenario.driving.planning.path import SPACING, PathPart, PlannedPath
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
 from eidrive_scenario.driving.settings import AgentSettings
@@ -84,10 +84,9 @@ class RoutePlanner(Planner):
         acceleration = goal.acceleration if goal is not None and free else 0.0
         return Plan(path.points[part], speeds, reason, acceleration)
 
-    def points_ahead(self, ego: EgoState, goal: Goal | None) -> Array:
-        """Return the points (M, 2) of `plan` without its speeds [m]."""
-        path = self._advanced_path(ego, goal)
-        return path.points[self._progress : self._progress + HORIZON]
+    def path_ahead(self, ego: EgoState, goal: Goal | None) -> PathPart:
+        """Return the path of `plan` without its speeds; the first segment is that at the vehicle."""
+        return self._advanced_path(ego, goal).part(self._progress, HORIZON)
 
     def _advanced_path(self, ego: EgoState, goal: Goal | None) -> PlannedPath:
         """Return the path of the goal after setting the progress of the vehicle on it; extended where it continues."""

@@ -64,6 +64,16 @@ def test_smoothing_moves_curve_by_less_than_a_decimeter() -> None:
     assert np.abs(radius - 10.0).max() < 0.11
 
 
+@pytest.mark.parametrize(("start", "count", "points"), [(0, 60, 11), (3, 4, 4), (8, 60, 3), (9, 60, 2), (40, 60, 2)])
+def test_part_of_a_path_has_at_least_one_segment(start: int, count: int, points: int) -> None:
+    part = PlannedPath(np.array([[0.0, 0.0], [4.0, 3.0], [8.0, 6.0]]), ends=True).part(start, count)
+    first = min(start, 9)
+    assert (len(part.points), len(part.segments), len(part.along)) == (points, points - 1, points)
+    assert part.along == pytest.approx([first + number for number in range(points)])
+    assert part.points[0] == pytest.approx((0.8 * first, 0.6 * first))
+    assert part.segments[0] == pytest.approx((0.8 * first, 0.6 * first, 0.8, 0.6, 1.0))
+
+
 def test_projection_is_monotonic() -> None:
     """A path that crosses itself: the vehicle stays on the branch that it is on."""
     angles = np.linspace(0.0, 2 * math.pi, 300)

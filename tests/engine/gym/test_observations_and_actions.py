@@ -13,9 +13,12 @@ from openscenario_xml import agent_xml, parameters_xml, road_file_xml, round_car
 from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 
 from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.gym import EidriveEnv, GridSettings, RewardSettings
 from eidrive_scenario.gym.object_table import COLUMNS, few_object_rows, nearest_rows, object_rows, object_values
+from eidrive_scenario.gym.observation_settings import RouteSettings
+from eidrive_scenario.gym.observations import points_ahead
 from eidrive_scenario.gym.occupancy_grid import occupancy_grid
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import RunSettings
@@ -52,6 +55,28 @@ def test_observation_of_lone_car_states_its_motion_and_route() -> None:
     expected = [[1.0, 5.0 * step, 0.0] for step in range(1, 11)]
     assert observation["route"] == pytest.approx(np.array(expected), abs=0.05)
     assert not observation["tracks"].any()
+
+
+def test_route_points_are_on_the_path_from_the_point_at_the_vehicle() -> None:
+    """On a circle of 50 m around the origin, 2 m right of it, and heading along it at its angle 0.3."""
+    angles = np.linspace(0.0, 2.0, 500)
+    path = PlannedPath(50.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1), ends=True)
+    x, y = 52.0 * math.cos(0.3), 52.0 * math.sin(0.3)
+    vehicle = EgoState(0.0, np.array([x, y, 0.0]), 0.3 + math.pi / 2.0, 0.0, 0.0, 4.0, 0.0, 0.0)
+    found = points_ahead(path.part(path.project(x, y), 60), vehicle, RouteSettings(points=4, spacing=10.0))
+    turned = [step * 10.0 / 50.0 for step in range(1, 5)]
+    expected = [value for turn in turned for value in (1.0, 50.0 * math.sin(turn), 52.0 - 50.0 * math.cos(turn))]
+    assert found == pytest.approx(expected, abs=0.05)
+
+
+def test_route_points_end_with_the_path() -> None:
+    """The path is 20 m long; from 3 m before its beginning, points of 8 m are at 8 m and 16 m of it."""
+    path = PlannedPath(np.array([[0.0, 0.0], [20.0, 0.0]]), ends=True)
+    vehicle = EgoState(0.0, np.array([-3.0, 1.0, 0.0]), 0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
+    found = points_ahead(path.part(0, 60), vehicle, RouteSettings(points=5, spacing=8.0))
+    assert found == pytest.approx([1.0, 11.0, -1.0, 1.0, 19.0, -1.0])
+    beyond = EgoState(0.0, np.array([30.0, 0.0, 0.0]), 0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
+    assert points_ahead(path.part(19, 60), beyond, RouteSettings(points=5, spacing=8.0)) == []
 
 
 def test_left_steering_turns_left_with_the_radius_of_the_wheelbase() -> None:
