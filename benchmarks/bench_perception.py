@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from statistics import median
 
 import numpy as np
-from detector_runs import print_table
+from detector_shares import print_table
 from random_scenes import random_scenes
 
 from eidrive_scenario.detections import Detections

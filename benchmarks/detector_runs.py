@@ -1,62 +1,42 @@
-"""Processor time of scenario 1 with each detector on ego and roadside unit, by component."""
+"""Processor time of scenario 1 with each detector on ego and roadside unit.
+
+Only names that older versions have as well are imported, so that their commits can be measured.
+"""
 
 from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import wraps
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import cv2
+from typing import NamedTuple
 
 from eidrive_scenario.library import library_path, resolve_scenario
-from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector
-from eidrive_scenario.perception.learned.image_network import ImageNetwork
-from eidrive_scenario.perception.lidar.detector import LidarDetector
-from eidrive_scenario.sensing.camera import Camera, ImageSensor
-from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
-from eidrive_scenario.world.scene import UndrawnImage
 
 SCENARIO = "coop/scenario_1"
 DEFAULT = ""
 AS_EI_DRIVE = "{camera: {width: 800, height: 600, rate: 20}, lidar: {rate: 20}}"
 """Image of CARLA's default size and a lidar reading in each tick."""
-CASES = (
-    ("yolov5", DEFAULT),
-    ("ssd", DEFAULT),
-    ("lidar", DEFAULT),
-    ("yolov5", AS_EI_DRIVE),
-)
-PARTS: dict[str, tuple[tuple[type, str], ...]] = {
-    "images": ((Camera, "read"), (UndrawnImage, "draw"), (ImageSensor, "develop")),
-    "network": ((ImageNetwork, "find"),),
-    "detector": ((LearnedDetector, "detect"), (LidarDetector, "detect")),
-    "lidar": ((Lidar, "read"),),
-}
-"""Measured methods by component, each without the measured methods that it calls: a detector draws the images."""
 
 
 class RunTime(NamedTuple):
-    """Simulated time, processor time and its parts [s] of one run, and whether it passed."""
+    """Simulated time and processor time [s] of one run, and whether it passed."""
 
     simulated: float
     total: float
-    parts: dict[str, float]
     passed: bool
 
 
 def run(detector: str, sensors: str, seed: int) -> RunTime:
     """Run the scenario once; `sensors` is the property of that name of the stations, empty for the default."""
-    with _scenario(sensors) as path, _measure_parts() as parts:
+    with _scenario(sensors) as path:
         simulation = Simulation(load_for_seed(path, seed, {}), seed=seed, settings=RunSettings(detector=detector))
         start = time.process_time()
         result = simulation.run()
         times = time.process_time() - start
-    return RunTime(result.simulated_s, times, parts, result.passed)
+    return RunTime(result.simulated_s, times, result.passed)
 
 
 @contextmanager
@@ -72,57 +52,3 @@ def _scenario(sensors: str) -> Iterator[Path]:
         copy = Path(folder) / path.name
         copy.write_text(text.replace(oracle, f'{oracle}<Property name="sensors" value="{sensors}"/>'), encoding="utf-8")
         yield copy
-
-
-@contextmanager
-def _measure_parts() -> Iterator[dict[str, float]]:
-    """Measure the processor time of each of PARTS [s]."""
-    times, inner = dict.fromkeys(PARTS, 0.0), [0.0]
-    originals: list[tuple[type, str, Callable[..., Any]]] = []
-    for part, methods in PARTS.items():
-        for kind, name in methods:
-            originals.append((kind, name, getattr(kind, name)))
-            setattr(kind, name, _timed(originals[-1][2], times, part, inner))
-    try:
-        yield times
-    finally:
-        for kind, name, method in originals:
-            setattr(kind, name, method)
-
-
-def _timed(method: Callable[..., Any], times: dict[str, float], part: str, inner: list[float]) -> Callable[..., Any]:
-    """Return a method that adds its time to a part; `inner` has the time of measured calls within each open call."""
-
-    @wraps(method)
-    def wrapped(*arguments: Any, **options: Any) -> Any:
-        start = time.process_time()
-        inner.append(0.0)
-        try:
-            return method(*arguments, **options)
-        finally:
-            elapsed = time.process_time() - start
-            times[part] += elapsed - inner.pop()
-            inner[-1] += elapsed
-
-    return wrapped
-
-
-def print_table(seed: int, repeats: int) -> None:
-    """Run all cases repeatedly, and print the fastest run of each."""
-    cv2.setNumThreads(1)
-    run("yolov5", DEFAULT, seed)
-    runtime = ", ".join(f"{name} {version}" for name, version in YoloDetector().library_versions.items())
-    print(
-        f"{SCENARIO}, complete runs, equal detectors on ego and roadside unit; {runtime}, one thread; "
-        f"OpenCV {cv2.getNumThreads()} thread; simulated time per processor time, and shares by component"
-    )
-    print(f"{'':38}" + "".join(f"{part:>10}" for part in (*PARTS, "rest")))
-    for detector, sensors in CASES:
-        best = min(
-            (run(detector, sensors, seed) for _ in range(repeats)), key=lambda entry: entry.total / entry.simulated
-        )
-        shares = [*best.parts.values(), best.total - sum(best.parts.values())]
-        name = f"{detector}, {'800 x 600 and lidar at 20 Hz' if sensors else 'default sensors'}"
-        cells = "".join(f"{100 * share / best.total:8.0f} %" for share in shares)
-        verdict = "passed" if best.passed else "failed"
-        print(f"{name:38}{cells}   {best.simulated / best.total:.2f} times real time, {verdict}")
