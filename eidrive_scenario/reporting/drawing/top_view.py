@@ -26,6 +26,7 @@ LANES = {
     "border": "#d8dce2",
     "parking": "#cfd4dc",
     "bidirectional": "#c9ced7",
+    "none": "#e4e9dd",
 }
 LANE, GROUND = "#c1c7d1", "#f1f3ee"
 PAINT = {"yellow": "#f4c542"}
