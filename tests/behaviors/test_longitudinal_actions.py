@@ -12,6 +12,7 @@ from eidrive_behaviors.actions.speed import duration_over
 from eidrive_behaviors.actions.speed_profile import smoothed_segments
 from recorded_scene import RunScene
 from street_scene import after
+from whole_run import Run
 
 
 def speed(target: str, shape: str = "linear", dimension: str = "time", value: float = 0.0) -> str:
@@ -297,3 +298,22 @@ def test_synchronize_does_not_exceed_the_maximum_speed_of_the_vehicle(scene: Run
     assert max(row["Ego"].speed for row in played.rows) == 70.0
     assert played.when("action 0", "completeState") == pytest.approx(10.0, abs=0.1), "the arrival of the master"
     assert 100.0 + 20.0 * 10.0 < played.at(10.0).x < 100.0 + 70.0 * 10.0
+
+
+@pytest.mark.parametrize(("target", "is_late"), [(740.0, False), (765.0, False), (900.0, True)])
+def test_synchronize_warns_only_if_the_maximum_speed_is_too_low(run: Run, target: float, is_late: bool) -> None:
+    """Other needs 10 s; Ego needs means of 64, 66.5 and 80 m/s, begins with 60 m/s, and can drive 70 m/s.
+
+    Between two phases of equal acceleration it would have 68, 73 and 100 m/s.
+    """
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster><LanePosition roadId="1" laneId="-2" s="250"/></TargetPositionMaster>
+      <TargetPosition><LanePosition roadId="1" laneId="-1" s="{target}"/></TargetPosition>
+      <FinalSpeed><AbsoluteSpeed value="60"/></FinalSpeed></SynchronizeAction></PrivateAction>"""
+    played = run(12.0, ("Ego", action), ego=(-1, 100.0, 60.0), driven=False, others={"Other": (-2, 150.0, 10.0)})
+    assert any("cannot arrive in time" in text for text in played.result.warnings) is is_late
+    assert max(played.of("Ego", "speed")) <= 70.0
+    if is_late:
+        assert played.x("Ego")[200] < 100.0 + 10.0 * 70.0
+    else:
+        assert played.x("Ego")[200] == pytest.approx(target, abs=2.0)

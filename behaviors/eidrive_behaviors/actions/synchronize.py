@@ -56,7 +56,7 @@ class SynchronizeAction(ActionBehaviour):
     Distances are measured along the trajectory that an entity follows, else along the roads. An entity with a negative
     speed arrives backwards. A final speed opposite to the direction of motion cannot be reached on the way to the
     target: the actor arrives at standstill and changes to the final speed at once, which is a warning. The maximum
-    speed of a vehicle limits its speed, so that it can arrive late, which is a warning as well.
+    speed of a vehicle limits its speed; if it therefore arrives late, this is a warning as well.
     """
 
     domains = Domain.LONGITUDINAL
@@ -113,20 +113,15 @@ class SynchronizeAction(ActionBehaviour):
         if final is None and self._mean is None and math.isfinite(time) and present > 2.0 * way / time:
             self._mean = way / time
         final = self._mean if final is None else max(0.0, sense * final)
-        if final is not None:
-            motion.set_speed(sense * self._limited(self._next(present, way, time, final, dt)))
-        elif math.isfinite(time):
-            motion.set_speed(sense * self._limited(present + 2.0 * (way / time - present) / time * dt))
-        return Status.RUNNING
-
-    def _limited(self, speed: float) -> float:
-        """Return a speed within the maximum of the vehicle [m/s], with a warning for one above it."""
         top = self.actor.limits()[0]
-        if speed <= top:
-            return speed
-        message = f"{self.actor.name} cannot arrive in time: this takes more than its maximum speed, {top:g} m/s"
-        self.context.warn(*self.error(message, "give it a shorter distance or more time").diagnostics)
-        return top
+        if way > top * (time + dt):
+            message = f"{self.actor.name} cannot arrive in time: this takes more than its maximum speed, {top:g} m/s"
+            self.context.warn(*self.error(message, "specify a shorter distance or more time").diagnostics)
+        if final is not None:
+            motion.set_speed(sense * min(self._next(present, way, time, final, dt), top))
+        elif math.isfinite(time):
+            motion.set_speed(sense * min(present + 2.0 * (way / time - present) / time * dt, top))
+        return Status.RUNNING
 
     def _check_direction(self, final: float, sense: float) -> None:
         """Add a warning if the final speed is opposite to the direction of motion [m/s]."""
