@@ -49,7 +49,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
         for road in roads
         for section in road.sections
         if section.length > 0.0
-        for stations in _half_turns(road, _stations(section.s, section.end, spacing))
+        for stations in _simple_parts(road, section, _stations(section.s, section.end, spacing))
     ]
     edges = [part.edges() for part in parts]
     ground = _drawn(zip(parts, edges, strict=True), window, spacing)
@@ -188,29 +188,47 @@ def _stations(start: float, end: float, spacing: float) -> list[float]:
     return found
 
 
-def _half_turns(road: Road, stations: list[float]) -> list[list[float]]:
-    """Return the s coordinates in parts in which the road turns by at most about 180°; neighbors share a station.
+def _simple_parts(road: Road, section: LaneSection, stations: list[float]) -> list[list[float]]:
+    """Return the s coordinates in parts whose polygons do not overlap themselves; neighbors share a station.
 
-    A polygon over several turns, such as those of a helical ramp, would overlap itself, and its fill would have holes.
+    In each part the road turns by at most about 180°, as a helical ramp would overlap itself. Tight curves are separate
+    parts: inside of them, the lanes before and after the curve overlap. The fill would have holes there.
     """
-    headings = np.unwrap([road.reference.at(s)[2] for s in stations])
+    points = [road.reference.at(s) for s in stations]
+    headings = np.unwrap([point.h for point in points]).tolist()
+    tight = [_is_tight(road, section, s, point.curvature) for s, point in zip(stations, points, strict=True)]
     parts: list[list[float]] = [[stations[0]]]
     start = headings[0]
-    for s, heading in zip(stations[1:], headings[1:].tolist(), strict=True):
+    for index in range(1, len(stations)):
+        s = stations[index]
         parts[-1].append(s)
-        if abs(heading - start) > math.pi and s < stations[-1]:
+        if s < stations[-1] and (abs(headings[index] - start) > math.pi or tight[index] != tight[index - 1]):
             parts.append([s])
-            start = heading
+            start = headings[index]
     return parts
 
 
+def _is_tight(road: Road, section: LaneSection, s: float, curvature: float) -> bool:
+    """Return whether the outermost lane on the inside of a curve reaches beyond its center."""
+    if curvature == 0.0 or not section.lanes:
+        return False
+    lane = section.lanes[max(section.lanes) if curvature > 0.0 else min(section.lanes)]
+    return (road.lane_offset.value(s) + lane.side * lane.outer.value(s - section.s)) * curvature > 1.0
+
+
 def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *, outer: bool) -> Array:
-    """Return points (N, 2) of the inner or outer edge of a lane; both are the center line for lane 0."""
+    """Return points (N, 2) of the inner or outer edge of a lane; both are the center line for lane 0.
+
+    On the inside of a curve no edge is beyond the center of the curve, where it would run backwards: a polygon with
+    such an edge overlaps itself, and its fill has holes.
+    """
     width = lane.outer if outer else lane.inner
     points = []
     for s in stations:
-        x, y, heading, _, _ = road.reference.at(s)
+        x, y, heading, curvature, _ = road.reference.at(s)
         t = road.lane_offset.value(s) + lane.side * width.value(s - section.s)
+        if t * curvature > 1.0:
+            t = 1.0 / curvature
         ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
         sin, cos = t * math.sin(heading), t * math.cos(heading)
         points.append((x + ahead * cos - left * sin, y + ahead * sin + left * cos))

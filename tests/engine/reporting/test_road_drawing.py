@@ -84,3 +84,23 @@ def test_helical_ramp_is_filled_in_pictures(turns: float) -> None:
         angle = math.radians(degrees)
         x, y = canvas.pixel((22.0 * math.cos(angle), 22.0 * math.sin(angle)))
         assert canvas.image[y, x].tolist() == [0xD1, 0xC7, 0xC1], degrees
+
+
+def test_lane_beyond_the_center_of_a_curve_is_filled_in_pictures() -> None:
+    """A sidewalk from 3 to 8 m inside a left-hand corner of 5 m, with straight parts of 20 m before and after it."""
+    corner = 5.0 * math.pi / 2.0
+    parts = (
+        f'<geometry s="0" x="-20" y="-5" hdg="0" length="20"><line/></geometry>'
+        f'<geometry s="20" x="0" y="-5" hdg="0" length="{corner}"><arc curvature="0.2"/></geometry>'
+        f'<geometry s="{20 + corner}" x="5" y="0" hdg="{math.pi / 2}" length="20"><line/></geometry>'
+    )
+    lanes = section_xml(lane_xml(2, 5.0, kind="sidewalk") + lane_xml(1, 3.0), "")
+    text = map_xml(road_xml(length=40.0 + corner, geometry=parts, lanes=lanes))
+    canvas = Canvas(Window(-20.0, 10.0, -10.0, 20.0), (300, 300))
+    canvas.roads(road_drawing(parse_road_map(text.encode(), "corner.xodr").roads.values()))
+    # Beside both straight parts, each 3 to 8 m from its reference line, where both overlap, and near the center
+    straight = [(-10.0, y) for y in (-1.5, 1.5)] + [(x, 10.0) for x in (-2.5, 1.5)]
+    inside = [(x, y) for x in (-2.5, -1.5, -0.5, 0.5, 1.0) for y in (-1.0, -0.5, 0.5, 1.5, 2.5)]
+    for x, y in straight + inside:
+        column, row = canvas.pixel((x, y))
+        assert canvas.image[row, column].tolist() == [0xD5, 0xE1, 0xE7], (x, y)

@@ -134,6 +134,12 @@ function outline(name, [x, y, yaw], at) {
 const covered = ([left, top, right, bottom], others) => others.reduce((sum, [l, t, r, b]) =>
   sum + Math.max(0, Math.min(right, r) - Math.max(left, l)) * Math.max(0, Math.min(bottom, b) - Math.max(top, t)), 0);
 
+/* Return whether a tenth of the smaller one of two rectangles is covered by the other. */
+function covers(one, other) {
+  const size = ([left, top, right, bottom]) => (right - left) * (bottom - top);
+  return covered(one, [other]) > 0.1 * Math.min(size(one), size(other));
+}
+
 /* Return the rectangle of a label (right, left, above or below) that others cover least. */
 function place(width, [left, top, right, bottom], others) {
   const middle = (left + right) / 2 - width / 2;
@@ -160,7 +166,7 @@ function drawLabels(poses, at, area) {
     const others = boxes.filter(([other]) => other !== name).map(([, ...outlined]) => outlined);
     const spot = place(width, box, [...others, ...labels]);
     // In dense traffic a name would cover others; it is shown after zooming in
-    if (rank(name) === 2 && covered(spot, labels) > 1.6 * width) continue;
+    if (rank(name) === 2 && labels.some((other) => covers(spot, other))) continue;
     labels.push(spot);
     writeLabel(text, spot[0], spot[1] + 8);
   }
