@@ -10,7 +10,6 @@ The parameters are declared in the file like all others; other engines use their
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from functools import lru_cache
 from typing import Annotated, Any
 from weakref import WeakKeyDictionary
 
@@ -47,16 +46,11 @@ class Distribution(Settings):
 
     def draw(self, seed: int, name: str) -> float:
         """Return the value of the parameter `name` for this seed."""
-        return _draw(self.uniform, self.normal, seed, name)
-
-
-@lru_cache(maxsize=256)
-def _draw(uniform: tuple[float, float] | None, normal: tuple[float, float] | None, seed: int, name: str) -> float:
-    random = generator(seed, "variation", name)
-    if uniform is not None:
-        return float(random.uniform(*uniform))
-    mean, sd = normal or (0.0, 0.0)
-    return mean + sd * min(3.0, max(-3.0, float(random.standard_normal())))
+        random = generator(seed, "variation", name)
+        if self.uniform is not None:
+            return float(random.uniform(*self.uniform))
+        mean, sd = self.normal or (0.0, 0.0)
+        return mean + sd * min(3.0, max(-3.0, float(random.standard_normal())))
 
 
 def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:

@@ -172,11 +172,9 @@ class Element:
         while ahead:
             element = ahead.pop()
             yield element
-            for value in reversed(element.__dict__.values()):
-                if isinstance(value, Element):
-                    ahead.append(value)
-                elif isinstance(value, tuple):
-                    ahead.extend(reversed(value))
+            below = list(element.children())
+            below.reverse()
+            ahead += below
 
     def chosen(self) -> Element:
         """Return the alternative that is set in an element with a choice.

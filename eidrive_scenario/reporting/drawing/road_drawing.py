@@ -53,17 +53,16 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
     ]
     edges = [part.edges() for part in parts]
     ground = _drawn(zip(parts, edges, strict=True), window, spacing)
-    raised: dict[int, list[tuple[_Part, Sequence[Edges]]]] = {}
+    raised: dict[int, list[tuple[_Part, Sequence[_Edges]]]] = {}
     strips = [part.strip(found) for part, found in zip(parts, edges, strict=True)]
     for index, start, end in bridge_spans(strips):
-        part = parts[index]
-        over = part.between(start, end, spacing)
-        height = part.road.elevation.value((start + end) / 2.0)
+        over = parts[index]._replace(stations=_stations(start, end, spacing))
+        height = over.road.elevation.value((start + end) / 2.0)
         raised.setdefault(math.floor(height / CLEARANCE), []).append((over, over.edges()))
     return replace(ground, above=tuple(_drawn(raised[level], window, spacing) for level in sorted(raised)))
 
 
-class Edges(NamedTuple):
+class _Edges(NamedTuple):
     """Lane and its inner and outer edge (N, 2) [m]."""
 
     lane: Lane
@@ -78,10 +77,10 @@ class _Part(NamedTuple):
     section: LaneSection
     stations: list[float]
 
-    def edges(self) -> list[Edges]:
+    def edges(self) -> list[_Edges]:
         """Return the edges of all lanes except the center lane."""
         return [
-            Edges(
+            _Edges(
                 lane,
                 _edge(self.road, self.section, lane, self.stations, outer=False),
                 _edge(self.road, self.section, lane, self.stations, outer=True),
@@ -90,19 +89,15 @@ class _Part(NamedTuple):
             if lane.id != 0
         ]
 
-    def strip(self, edges: Sequence[Edges]) -> Strip:
+    def strip(self, edges: Sequence[_Edges]) -> Strip:
         """Return heights and edges of the part, with the middle of each lane."""
         lines = [line for _, inner, outer in edges for line in (inner, (inner + outer) / 2.0, outer)]
         points = np.array(lines) if lines else np.empty((0, len(self.stations), 2))
         heights = np.array([self.road.elevation.value(s) for s in self.stations])
         return Strip(np.array(self.stations), heights, points)
 
-    def between(self, start: float, end: float, spacing: float) -> _Part:
-        """Return a shorter part."""
-        return self._replace(stations=_stations(start, end, spacing))
 
-
-def _drawn(parts: Iterable[tuple[_Part, Sequence[Edges]]], window: Window | None, spacing: float) -> RoadDrawing:
+def _drawn(parts: Iterable[tuple[_Part, Sequence[_Edges]]], window: Window | None, spacing: float) -> RoadDrawing:
     """Return lanes and road marks of parts of roads."""
     lanes: list[tuple[str, Array]] = []
     markings: list[tuple[str, str, Array]] = []
