@@ -317,3 +317,13 @@ def test_synchronize_warns_only_if_the_maximum_speed_is_too_low(run: Run, target
         assert played.x("Ego")[200] < 100.0 + 10.0 * 70.0
     else:
         assert played.x("Ego")[200] == pytest.approx(target, abs=2.0)
+
+
+def test_synchronize_of_a_driven_vehicle_warns_only_that_it_has_no_effect(run: Run) -> None:
+    action = """<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster><LanePosition roadId="1" laneId="-2" s="250"/></TargetPositionMaster>
+      <TargetPosition><LanePosition roadId="1" laneId="-1" s="990"/></TargetPosition>
+      </SynchronizeAction></PrivateAction>"""
+    played = run(2.0, ("Ego", action), others={"Other": (-2, 150.0, 10.0)})
+    (warning,) = [text for text in played.result.warnings if "SynchronizeAction" in text or "arrive" in text]
+    assert "no effect" in warning

@@ -114,7 +114,7 @@ class SynchronizeAction(ActionBehaviour):
             self._mean = way / time
         final = self._mean if final is None else max(0.0, sense * final)
         top = self.actor.limits()[0]
-        if way > top * (time + dt):
+        if way > top * (time + dt) and not self.actor.driven:
             message = f"{self.actor.name} cannot arrive in time: this takes more than its maximum speed, {top:g} m/s"
             self.context.warn(*self.error(message, "specify a shorter distance or more time").diagnostics)
         if final is not None:
