@@ -62,11 +62,41 @@ def assign_matrix(cost: Array, inside: Bools) -> list[tuple[int, int]]:
 def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
     """Return the assigned pairs of the candidate pairs (row, column): maximum number, then minimum sum of costs.
 
-    Each row and column is used at most once. The order of the indices resolves ties.
+    Each row and column is used at most once. The order of the indices resolves ties. Pairs without a common row or
+    column, directly or by other pairs, are assigned separately.
     """
     found = _assign_stars(rows, columns, costs)
     if found is not None:
         return found
+    chosen: set[tuple[int, int]] = set()
+    for part in _components(rows, columns):
+        own_rows, own_columns = [rows[place] for place in part], [columns[place] for place in part]
+        own_costs = [costs[place] for place in part]
+        stars = _assign_stars(own_rows, own_columns, own_costs)
+        chosen.update(_assign_optimally(own_rows, own_columns, own_costs) if stars is None else stars)
+    return [pair for pair in zip(rows, columns, strict=True) if pair in chosen]
+
+
+def _components(rows: Sequence[int], columns: Sequence[int]) -> list[list[int]]:
+    """Return the places of the pairs of each connected component."""
+    parent: dict[tuple[int, int], tuple[int, int]] = {}
+
+    def root(node: tuple[int, int]) -> tuple[int, int]:
+        while (above := parent.setdefault(node, node)) != node:
+            parent[node] = parent.setdefault(above, above)
+            node = parent[node]
+        return node
+
+    for row, column in zip(rows, columns, strict=True):
+        parent[root((1, column))] = root((0, row))
+    parts: dict[tuple[int, int], list[int]] = {}
+    for place, row in enumerate(rows):
+        parts.setdefault(root((0, row)), []).append(place)
+    return list(parts.values())
+
+
+def _assign_optimally(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
+    """Return the result of `assign` by the general method."""
     from scipy.optimize import linear_sum_assignment
 
     row_of = {row: place for place, row in enumerate(sorted(set(rows)))}

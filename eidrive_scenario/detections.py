@@ -19,7 +19,7 @@ VULNERABLE = frozenset({"pedestrian", "bicycle", "motorbike"})
 """Classes of vulnerable road users."""
 
 
-class Detections(msgspec.Struct, frozen=True):
+class Detections(msgspec.Struct, frozen=True, gc=False):
     """Perceived objects at one instant.
 
     boxes       (N, 7) x y z l w h yaw of the box center in the world frame [m, rad]

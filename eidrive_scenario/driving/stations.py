@@ -15,6 +15,7 @@ from eidrive_scenario.driving.agent_factory import build_agent, build_detector, 
 from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
 from eidrive_scenario.driving.control.overrides import ControlOverrides
 from eidrive_scenario.driving.planning.area_checks import areas_off_road
+from eidrive_scenario.driving.report_fusion import fuse_reports
 from eidrive_scenario.driving.resolved_stations import resolved_stations
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackInputs, StackSettings
@@ -206,8 +207,8 @@ class Stations(DrivingStack):
         self._readings = readings = read_stations(self._rigs, self._signal_sensors, world, view, inputs.signals)
         now, own_perception = view.time, self._own_perception
         intervals = {name: self._min_message_interval(name) for name in self._agents}
-        return {
-            name: agent.perceive(
+        sensed = {
+            name: agent.sense(
                 readings[name],
                 self._deliver(name, now),
                 now,
@@ -217,6 +218,7 @@ class Stations(DrivingStack):
             )
             for name, agent in self._agents.items()
         }
+        return fuse_reports(self._agents, sensed, now)
 
     def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:
         """Let every agent act on what it perceives, with the actions from outside."""

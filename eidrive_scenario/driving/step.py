@@ -14,7 +14,7 @@ from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, Stat
 from eidrive_scenario.world.actor import Control
 
 
-class Plan(msgspec.Struct, frozen=True):
+class Plan(msgspec.Struct, frozen=True, gc=False):
     """Trajectory: points (M, 2) [m], the speed at each point (M,) [m/s], and the reason for them."""
 
     points: Array
@@ -28,7 +28,7 @@ class Plan(msgspec.Struct, frozen=True):
     """Objects that are the reason for the plan, as rows of the objects passed to the planner."""
 
 
-class StationPerception(msgspec.Struct, frozen=True):
+class StationPerception(msgspec.Struct, frozen=True, gc=False):
     """Perception of one station in one tick, before it plans: the input of its step.
 
     time              of the tick [s]
@@ -53,7 +53,7 @@ class StationPerception(msgspec.Struct, frozen=True):
     message_interval: float = 0.0
 
 
-class AgentStep(msgspec.Struct, frozen=True):
+class AgentStep(msgspec.Struct, frozen=True, gc=False):
     """Step of one station: detections, received messages, fused objects, plan, control and sent messages."""
 
     detections: Detections

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import islice
-from typing import ClassVar
+from itertools import pairwise
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.fusion.covariance import covariances, estimates, fuse, means
-from eidrive_scenario.fusion.grouping import group_tracks
+from eidrive_scenario.fusion.grouping import Objects, group_tracks
 from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table
 from eidrive_scenario.fusion.report_history import ReportHistory
-from eidrive_scenario.fusion.tracks import predict_tracks
+from eidrive_scenario.fusion.tracks import Rows, join_rows, predict_tracks
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
+
+_BATCH = 16
+"""Maximum number of receiving stations whose tracks are processed at once, so that their arrays fit in the cache."""
 
 
 class CovarianceIntersectionSettings(Settings):
@@ -55,51 +58,107 @@ class CovarianceIntersectionFusion(FusionMethod):
         self.settings = settings or CovarianceIntersectionSettings()
         self._gate = AssociationGate.of(self.settings.gate, self.settings.gate_distance)
         self._history = ReportHistory(self.settings.max_age, self._gate)
+        self._order: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
+        """Stations of the last reports, and the same in order of their names."""
 
     def add_report(self, report: Report) -> None:
         self._history.add_report(report)
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
-        self._history.evict_stale(now)
-        tracks = self._history.tracks()
-        names = self._history.stations
-        rank: dict[str | None, int] = {
-            name: place for place, name in enumerate(sorted({report.station for report in reports}))
-        }
-        station = np.array([rank.get(name, -1) for name in names], dtype=np.int64)[tracks["station"]]
-        rows = np.flatnonzero((station >= 0) & (now - tracks["seen"] <= self.settings.max_age + TIME_TOLERANCE))
-        if not len(rows):
-            return Detections(now)
-        rows = rows[np.argsort(station[rows], kind="stable")]
-        present = tracks[rows]
-        predict_tracks(present, np.full(len(rows), now))
-        present["station"] = station[rows]
-        objects = group_tracks(present, self._gate)
-        return _fuse_objects(present, objects, now, self.settings.existence, self._gate.chi_square)
+        return _fuse_batch([self], [reports], now)[0]
+
+    @classmethod
+    def fuse_batch(
+        cls, methods: Sequence[Self], reports: Sequence[Sequence[Report]], now: float
+    ) -> Sequence[Detections]:
+        if cls.fuse is not CovarianceIntersectionFusion.fuse:
+            return super().fuse_batch(methods, reports, now)
+        batches: dict[tuple[float, ...], list[int]] = {}
+        for place, method in enumerate(methods):
+            settings = method.settings
+            key = (settings.gate, settings.gate_distance, settings.max_age, settings.existence)
+            batches.setdefault(key, []).append(place)
+        fused: list[Detections | None] = [None] * len(methods)
+        for places in batches.values():
+            for start in range(0, len(places), _BATCH):
+                part = places[start : start + _BATCH]
+                found = _fuse_batch([methods[place] for place in part], [reports[place] for place in part], now)
+                for place, one in zip(part, found, strict=True):
+                    fused[place] = one
+        return [one for one in fused if one is not None]
+
+    def _tracks(self, reports: Sequence[Report]) -> tuple[Rows, Integers]:
+        """Return the tracks of the stations of these reports in order of their names, and the rank of each station."""
+        names = tuple([report.station for report in reports])
+        if names != self._order[0]:
+            self._order = names, tuple(sorted(set(names)))
+        return self._history.tracks(self._order[1])
 
 
-def _fuse_objects(tracks: Table, objects: list[list[int]], now: float, least: float, gate: float) -> Detections:
-    """Return one box per object with an existence probability of at least `least`.
+def _fuse_batch(
+    methods: Sequence[CovarianceIntersectionFusion], reports: Sequence[Sequence[Report]], now: float
+) -> list[Detections]:
+    """Return the objects of several receiving stations, whose methods have equal settings."""
+    settings, gate = methods[0].settings, methods[0]._gate
+    ReportHistory.process([method._history for method in methods])
+    for method in methods:
+        method._history.evict_stale(now)
+    rows, ranks = zip(*(method._tracks(held) for method, held in zip(methods, reports, strict=True)), strict=True)
+    tracks = join_rows(rows)
+    tracks["receiver"] = np.repeat(np.arange(len(methods)), [len(part) for part in rows])
+    tracks["station"] = np.concatenate(ranks)
+    recent = now - tracks["seen"] <= settings.max_age + TIME_TOLERANCE
+    if not recent.all():
+        tracks = tracks.take(np.flatnonzero(recent))
+    if not len(tracks):
+        return [Detections(now) for _ in methods]
+    predict_tracks(tracks, np.full(len(tracks), now))
+    objects = group_tracks(tracks, gate)
+    fused = _fuse_objects(tracks, objects, now, gate.chi_square)
+    likely = fused.existence >= settings.existence
+    if len(methods) == 1:
+        return [fused if likely.all() else fused.subset(np.flatnonzero(likely).tolist())]
+    receiver = tracks["receiver"][objects.rows[objects.starts]]
+    if not likely.all():
+        fused, receiver = fused.subset(np.flatnonzero(likely).tolist()), receiver[likely]
+    ends = np.searchsorted(receiver, np.arange(len(methods)), "right").tolist()
+    return [_slice(fused, start, end) for start, end in pairwise([0, *ends])]
+
+
+def _slice(fused: Detections, start: int, end: int) -> Detections:
+    return Detections(
+        fused.time,
+        fused.boxes[start:end],
+        fused.scores[start:end],
+        fused.classes[start:end],
+        fused.velocity[start:end],
+        fused.covariance[start:end],
+        existence=fused.existence[start:end],
+    )
+
+
+def _fuse_objects(tracks: Table, objects: Objects, now: float, gate: float) -> Detections:
+    """Return one box per object.
 
     gate  squared Mahalanobis distance above which estimates disagree
     """
-    rows = np.array([row for members in objects for row in members], dtype=np.intp)
-    starts = np.cumsum([0, *(len(members) for members in objects[:-1])])
-    members = tracks[rows]
+    rows, starts = objects
+    count = len(starts)
+    members = tracks if count == len(rows) else tracks.take(rows)
     existence = 1.0 - np.multiply.reduceat(1.0 - members["existence"], starts)
     mean, covariance = _fuse_states(tracks, objects, gate)
     known = np.logical_or.reduceat(members["moving"], starts)
     velocity = np.where(known[:, None], mean[:, 1], np.nan)
     weights = np.maximum(members["score"], 1e-6)
-    shares = weights / np.repeat(np.add.reduceat(weights, starts), [len(group) for group in objects])
+    shares = weights / np.repeat(np.add.reduceat(weights, starts), np.diff(starts, append=len(rows)))
     body = np.add.reduceat(shares[:, None] * members["body"], starts, axis=0)
-    boxes = np.empty((len(objects), 7))
+    boxes = np.empty((count, 7))
     boxes[:, :2], boxes[:, 2:6] = mean[:, 0], body
     errors = np.trace(members["covariance"][:, :2, :2] + members["pose"], axis1=1, axis2=2)
     boxes[:, 6] = fuse_headings(members["heading"][:, 0], weights, errors, starts, velocity)
     votes = members["votes"] / np.maximum(members["votes"].sum(axis=1, keepdims=True), 1e-12)
     words = np.argmax(np.add.reduceat(weights[:, None] * votes, starts, axis=0), axis=1)
-    fused = Detections(
+    return Detections(
         now,
         boxes,
         1.0 - np.multiply.reduceat(1.0 - members["score"], starts),
@@ -108,11 +167,9 @@ def _fuse_objects(tracks: Table, objects: list[list[int]], now: float, least: fl
         covariance,
         existence=existence,
     )
-    likely = np.flatnonzero(existence >= least)
-    return fused if len(likely) == len(fused) else fused.subset(likely.tolist())
 
 
-def _fuse_states(tracks: Table, objects: list[list[int]], gate: float) -> tuple[Array, Array]:
+def _fuse_states(tracks: Table, objects: Objects, gate: float) -> tuple[Array, Array]:
     """Return positions and velocities (G, 2, 2) of the objects, and covariances of their positions (G, 2, 2).
 
     Position and velocity are fused separately, because their units differ. Members are fused in pairs, then the results
@@ -122,18 +179,16 @@ def _fuse_states(tracks: Table, objects: list[list[int]], gate: float) -> tuple[
     covariance[:, 0] = tracks["covariance"][:, :2, :2] + tracks["pose"]
     covariance[:, 1] = tracks["covariance"][:, 2:, 2:]
     known = estimates(tracks["mean"].reshape(-1, 2, 2), covariance)
-    groups, count = objects, len(tracks)
-    while pairs := [
-        pair for members in groups if len(members) > 1 for pair in zip(members[::2], members[1::2], strict=False)
-    ]:
-        first, second = zip(*pairs, strict=True)
-        fresh = fuse(known.take(first, axis=1), known.take(second, axis=1), gate)
-        known = np.concatenate([known, fresh], axis=1)
-        places = iter(range(count, count + len(pairs)))
-        groups = [
-            members if len(members) == 1 else [*islice(places, len(members) // 2), *members[len(members) // 2 * 2 :]]
-            for members in groups
-        ]
-        count += len(pairs)
-    final = known.take([members[0] for members in groups], axis=1)
+    members, starts = objects
+    while len(members) > len(starts):
+        counts = np.diff(starts, append=len(members))
+        place = np.arange(len(members)) - np.repeat(starts, counts)
+        first = np.flatnonzero((place % 2 == 0) & (place + 1 < np.repeat(counts, counts)))
+        pair = known.take(members[first], axis=1), known.take(members[first + 1], axis=1)
+        members = members.copy()
+        members[first] = known.shape[1] + np.arange(len(first))
+        members = np.delete(members, first + 1)
+        known = np.concatenate([known, fuse(*pair, gate)], axis=1)
+        starts = np.cumsum([0, *((counts + 1) // 2)[:-1].tolist()])
+    final = known.take(members, axis=1)
     return means(final), covariances(final[:, :, 0])

@@ -4,37 +4,67 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
+import numpy as np
+
+from eidrive_scenario.arrays import Integers
 from eidrive_scenario.fusion.pairs import AssociationGate, Pairs, Table, assigned_pairs, gated_pairs
 
 
-def group_tracks(tracks: Table, gate: AssociationGate) -> list[list[int]]:
-    """Return the rows of each object, from tracks at a common time that are sorted by station.
+class Objects(NamedTuple):
+    """Tracks by object: (N,) rows of the tracks, those of one object in sequence, and (G,) their first places."""
+
+    rows: Integers
+    starts: Integers
+
+
+def group_tracks(tracks: Table, gate: AssociationGate) -> Objects:
+    """Return the rows of each object, from tracks at a common time that are sorted by receiving station and station.
 
     The tracks of each station in turn are assigned to known objects: maximum number, then minimum cost, and at most one
     per object, because a station reports different objects. Unassigned tracks form new objects. The cost of an object
-    is that of its likeliest member.
+    is that of its likeliest member. Objects are in the order of their first tracks. Each receiving station has its own
+    objects.
     """
-    stations = tracks["station"].tolist()
-    if stations[0] == stations[-1]:
-        return [[row] for row in range(len(tracks))]
+    label = np.arange(len(tracks))
+    station, receiver = tracks["station"], tracks["receiver"]
+    if station[0] == station[-1] and receiver[0] == receiver[-1]:
+        return Objects(label, label)
     pairs = gated_pairs(tracks, tracks, gate, same_station=False)
-    return _cliques(stations, pairs) or _group_sequentially(stations, pairs)
+    if not pairs.first:
+        return Objects(label, label)
+    first, second = np.array(pairs.first), np.array(pairs.second)
+    np.minimum.at(label, second, first)
+    unclear = label[first] != label[second]
+    if not all(pairs.inside):
+        unclear |= ~np.array(pairs.inside)
+    twice = _tracks_of_one_station(label, station)
+    if unclear.any() or len(twice):
+        for ambiguous in np.unique(receiver[np.concatenate([first[unclear], twice])]).tolist():
+            begin, end = np.searchsorted(receiver, [ambiguous, ambiguous + 1]).tolist()
+            own = _pairs_between(pairs, begin, end)
+            for members in _group_sequentially(station[begin:end].tolist(), own):
+                label[[begin + row for row in members]] = begin + members[0]
+    rows = np.argsort(label, kind="stable")
+    grouped = label[rows]
+    return Objects(rows, np.flatnonzero(np.concatenate([[True], grouped[1:] != grouped[:-1]])))
 
 
-def _cliques(stations: Sequence[int], pairs: Pairs) -> list[list[int]] | None:
-    """Return the objects if the grouping is unambiguous: all associated tracks belong to different stations."""
-    object_of = list(range(len(stations)))
-    for first, second in zip(pairs.first, pairs.second, strict=True):
-        object_of[second] = min(object_of[second], first)
-    if not all(pairs.inside) or len(set(zip(object_of, stations, strict=True))) < len(stations):
-        return None
-    if any(object_of[first] != object_of[second] for first, second in zip(pairs.first, pairs.second, strict=True)):
-        return None
-    objects: dict[int, list[int]] = {}
-    for row, label in enumerate(object_of):
-        objects.setdefault(label, []).append(row)
-    return list(objects.values())
+def _tracks_of_one_station(label: Integers, station: Integers) -> Integers:
+    """Return tracks of an object (N,) that has another track of their station (N,)."""
+    keys = label * (int(station.max()) + 1) + station
+    order = np.argsort(keys)
+    ordered = keys[order]
+    twice: Integers = order[1:][ordered[1:] == ordered[:-1]]
+    return twice
+
+
+def _pairs_between(pairs: Pairs, begin: int, end: int) -> Pairs:
+    """Return the pairs of these rows, relative to the first one."""
+    own = [pair for pair in zip(*pairs, strict=True) if begin <= pair[0] < end]
+    first, second, cost, inside = zip(*own, strict=True)
+    return Pairs([row - begin for row in first], [row - begin for row in second], list(cost), list(inside))
 
 
 def _group_sequentially(stations: Sequence[int], pairs: Pairs) -> list[list[int]]:

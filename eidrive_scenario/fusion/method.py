@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import msgspec
 
@@ -16,7 +16,7 @@ from eidrive_scenario.v2x.messages.message import StationState
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 
-class Report(msgspec.Struct, frozen=True):
+class Report(msgspec.Struct, frozen=True, gc=False):
     """Detections of one station, measured at `detections.time` and received at `arrived` [s].
 
     state     reported state of the station; None if it is not reported
@@ -66,3 +66,14 @@ class FusionMethod(ABC):
     @abstractmethod
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
         """Return one box per object; `reports` holds the newest report of each station, including the own one."""
+
+    @classmethod
+    def fuse_batch(
+        cls, methods: Sequence[Self], reports: Sequence[Sequence[Report]], now: float
+    ) -> Sequence[Detections]:
+        """Return the results of `fuse` of several receiving stations, one method of this class each.
+
+        Built-in classes override it to process all stations in common arrays, with the results of separate calls. It is
+        not called for third-party classes, because errors in a batch do not name a station.
+        """
+        return [method.fuse(held, now) for method, held in zip(methods, reports, strict=True)]

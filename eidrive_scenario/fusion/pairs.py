@@ -23,6 +23,8 @@ LEVEL_TOLERANCE = 2.0
 """Maximum vertical gap between two boxes of one object [m], since heights of detections have large errors."""
 _FEW_PAIRS = 1024
 """Maximum number of pairs that are all listed, which is faster."""
+_MAX_EXTENT = 1e7
+"""Maximum extent of the tracks and their gates [m] for a search by position, which rounding would affect."""
 CERTAIN = -1e3
 """Cost of a pair with the same object id of a station: less than any other."""
 
@@ -58,13 +60,17 @@ class Pairs(NamedTuple):
 def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_station: bool) -> Pairs:
     """Return association candidates: tracks of the same station, or of two stations with the lower one first.
 
+    Stations are distinct over all receiving stations if `same_station`, and those of one receiving station otherwise.
     Candidates are on one level, not on and below a bridge. They are within the gate, have the same object id of the
     station, or have centers within half a width of each other, because two bodies cannot overlap even if the
     covariances are small. The cost is the negative log-likelihood of the offset without constants.
     """
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
-    rows, columns = _pairs_of_stations(first["station"], second["station"], own, other, same_station)
+    if same_station:
+        rows, columns = _pairs_of_one_station(first["station"], second["station"])
+    else:
+        rows, columns = _pairs_of_two_stations(first, second, own, other)
     x, y = own.x[rows] - other.x[columns], own.y[rows] - other.y[columns]
     limit = own.reach[rows] + other.reach[columns]
     near = (x * x + y * y <= limit * limit) & _on_one_level(first["body"][rows], second["body"][columns])
@@ -118,30 +124,53 @@ def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
     return assigned + assign(*zip(*rest, strict=True)) if rest else assigned
 
 
-def _pairs_of_stations(
-    first: Integers, second: Integers, own: _Side, other: _Side, same_station: bool
-) -> tuple[Integers, Integers]:
-    """Return rows and columns, in order, of the pairs of one station, or of two stations with the lower one first.
-
-    Pairs of two stations that are too far apart may be omitted.
-    """
+def _pairs_of_one_station(first: Integers, second: Integers) -> tuple[Integers, Integers]:
+    """Return rows and columns, in order, of the pairs of one station."""
     if len(first) * len(second) <= _FEW_PAIRS:
-        return _where(first[:, None] == second if same_station else first[:, None] < second)
-    if same_station:
-        order = np.argsort(second, kind="stable")
-        return _ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
-    order = np.argsort(other.x, kind="stable")
+        return _where(first[:, None] == second)
+    order = np.argsort(second, kind="stable")
+    return _ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
+
+
+def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side) -> tuple[Integers, Integers]:
+    """Return rows and columns, in order, of the pairs of two stations of one receiving station, the lower one first.
+
+    Pairs that are too far apart may be omitted.
+    """
+    station, other_station = first["station"], second["station"]
+    receiver, other_receiver = first["receiver"], second["receiver"]
     distance = (own.reach + other.reach.max()) * (1.0 + 1e-9) + 1e-6  # a margin for rounding
-    sorted_x = other.x[order]
-    if not math.isfinite(sorted_x[-1] + distance.max()):
-        return _where(first[:, None] < second)
+    extent = max(float(own.x.max()), float(other.x.max())) - min(float(own.x.min()), float(other.x.min()))
+    if len(first) * len(second) <= _FEW_PAIRS or not extent + distance.max() < _MAX_EXTENT:
+        return _all_pairs_of_two_stations(first, second)
+    # Receiving stations are shifted so far that no pair of two of them is near.
+    width = extent + 3.0 * float(distance.max())
+    x, other_x = own.x + width * receiver, other.x + width * other_receiver
+    distance += 1e-12 * max(float(np.abs(x).max()), float(np.abs(other_x).max()))
+    order = np.argsort(other_x, kind="stable")
+    sorted_x = other_x[order]
     rows, columns = _ranges(
-        np.searchsorted(sorted_x, own.x - distance), np.searchsorted(sorted_x, own.x + distance, "right"), order
+        np.searchsorted(sorted_x, x - distance), np.searchsorted(sorted_x, x + distance, "right"), order
     )
-    ahead = first[rows] < second[columns]
+    ahead = (station[rows] < other_station[columns]) & (receiver[rows] == other_receiver[columns])
     rows, columns = rows[ahead], columns[ahead]
     in_order = np.lexsort((columns, rows))
     return rows[in_order], columns[in_order]
+
+
+def _all_pairs_of_two_stations(first: Table, second: Table) -> tuple[Integers, Integers]:
+    """Return rows and columns of all pairs of two stations of one receiving station; tracks are sorted by it."""
+    rows: list[Integers] = []
+    columns: list[Integers] = []
+    for receiver in np.unique(first["receiver"]).tolist():
+        (begin, end), (other_begin, other_end) = (
+            np.searchsorted(side["receiver"], [receiver, receiver + 1]) for side in (first, second)
+        )
+        before = first["station"][begin:end, None] < second["station"][other_begin:other_end]
+        own, other = _where(before)
+        rows.append(own + begin)
+        columns.append(other + other_begin)
+    return np.concatenate(rows), np.concatenate(columns)
 
 
 def _where(pairs: NDArray[np.bool_]) -> tuple[Integers, Integers]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY
 
 _PLACE = np.diag([1.0, 1.0, 0.0, 0.0])
@@ -12,15 +12,33 @@ _SPEED = np.diag([0.0, 0.0, 1.0, 1.0])
 _BOTH = np.eye(4, k=2) + np.eye(4, k=-2)
 
 
-def predict(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
+def predict(
+    mean: Array, covariance: Array, step: Array, turn: Array, turning: Bools | None = None
+) -> tuple[Array, Array]:
     """Return states (N, 4) x y vx vy and covariances (N, 4, 4), predicted by `step` (N,) [s].
 
     The model is white noise acceleration with a coordinated turn of known rate `turn` (N,) [rad/s] (Bar-Shalom, Li and
     Kirubarajan, Estimation with applications to tracking and navigation, 2001, sections 6.3.2 and 11.7.1). A step can
     be negative if a clock is fast; the uncertainty grows by the same amount.
+
+    turning  (N,) whether the equations of a turn are evaluated, which differ from the others by rounding if the rate is
+             0; None: for all if any track turns
     """
-    if not turn.any():
+    if turning is None:
+        turning = np.full(len(turn), turn.any())
+    if not turning.any():
         return _predict_straight(mean, covariance, step)
+    if turning.all():
+        return _predict_turn(mean, covariance, step, turn)
+    moved, later = np.empty_like(mean), np.empty_like(covariance)
+    straight = ~turning
+    moved[straight], later[straight] = _predict_straight(mean[straight], covariance[straight], step[straight])
+    moved[turning], later[turning] = _predict_turn(mean[turning], covariance[turning], step[turning], turn[turning])
+    return moved, later
+
+
+def _predict_turn(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
+    """Return the prediction with a turn."""
     forward = np.zeros(covariance.shape)
     forward[:, 0, 0] = forward[:, 1, 1] = forward[:, 2, 2] = forward[:, 3, 3] = 1.0
     angle = turn * step

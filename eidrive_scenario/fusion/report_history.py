@@ -6,29 +6,69 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
+from eidrive_scenario.arrays import Integers
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import AssociationGate, Table
-from eidrive_scenario.fusion.tracks import TRACK, update_tracks
+from eidrive_scenario.fusion.pairs import AssociationGate
+from eidrive_scenario.fusion.tracks import TRACK, Rows, join_rows, rows_of, update_tracks
+
+_NO_ROWS = rows_of(np.zeros(0, TRACK))
 
 
-class _Entry(NamedTuple):
-    """Report of one station, and a table with the tracks of the station after it."""
+class _Entry(msgspec.Struct, frozen=True, gc=False):
+    """Report of one station, and the tracks of the station after it."""
 
     report: Report
-    tracks: Table
+    rows: Rows
 
 
-@dataclass
+@dataclass(slots=True)
 class _History:
     """Stored reports of one station; reports up to `begin` [s] are no longer accepted."""
 
     entries: list[_Entry] = field(default_factory=list)
     new: list[Report] = field(default_factory=list)
     begin: float = -math.inf
+    latest: float = -math.inf
+    """Time of the last processed report [s]."""
+    rows: Rows = field(default_factory=lambda: _NO_ROWS)
+    """Tracks of the station after the last processed report."""
+    place: tuple[int, int] | None = None
+    """First and last row of the tracks in the table of the receiving station; None outside the table."""
+
+    def due(self) -> Sequence[Report]:
+        """Return the unprocessed reports in order, after rollback of the tracks to the first of them."""
+        if len(self.new) == 1 and self.latest < self.new[0].detections.time < math.inf:
+            return [self.new.pop()]
+        reports = [entry.report for entry in self.entries]
+        kept = len(reports)
+        for report in self.new:
+            time = report.detections.time
+            if not self.begin < time < math.inf:
+                continue
+            place = bisect_left(reports, time, key=lambda held: held.detections.time)
+            again = place < len(reports) and reports[place].detections.time == time
+            reports[place : place + again] = [report]
+            kept = min(kept, place)
+        self.new.clear()
+        if kept < len(self.entries):
+            del self.entries[kept:]
+            last = self.entries[-1] if self.entries else None
+            self.latest = self.begin if last is None else last.report.detections.time
+            self.rows = _NO_ROWS if last is None else last.rows
+        return reports[kept:]
+
+    def add_entry(self, report: Report, rows: Rows, span: float) -> None:
+        """Store the tracks after a report, and delete reports that are older by more than `span` [s]."""
+        entries, time = self.entries, report.detections.time
+        entries.append(_Entry(report, rows))
+        self.latest, self.rows = time, rows
+        while len(entries) > 1 and entries[1].report.detections.time < time - span:
+            del entries[0]
+            self.begin = entries[0].report.detections.time
 
 
 class ReportHistory:
@@ -43,91 +83,127 @@ class ReportHistory:
 
     def __init__(self, span: float, gate: AssociationGate) -> None:
         self.span = span
-        self.stations: list[str | None] = []
-        """Station names; rows of `tracks` refer to their index. Slots of evicted stations are None or reused."""
         self._gate = gate
-        self._tracks: Table = np.zeros(0, TRACK)
-        self._histories: list[_History] = []
-        self._places: dict[str, int] = {}
+        self._histories: dict[str, _History] = {}
+        self._updated: dict[str, _History] = {}
+        """Histories with unprocessed reports."""
+        self._next_eviction = math.inf
+        """Time up to which no station is evicted [s]."""
+        self._order: tuple[str, ...] = ()
+        self._rows = _NO_ROWS
+        self._ranks: Integers = np.zeros(0, np.int64)
+        self._complete = False
+        """Whether the table has the rows of all tracks of the stations in `_order`."""
+
+    @property
+    def stations(self) -> frozenset[str]:
+        """Stations with stored reports."""
+        return frozenset(self._histories)
 
     def add_report(self, report: Report) -> None:
-        """Store a report. It is processed at the next call of `tracks`."""
-        place = self._places.get(report.station)
-        if place is None:
-            place = self._places[report.station] = self._allocate_slot(report.station)
-        self._histories[place].new.append(report)
+        """Store a report. It is processed at the next `process`."""
+        history = self._histories.get(report.station)
+        if history is None:
+            history = self._histories[report.station] = _History()
+            self._complete = False
+        history.new.append(report)
+        self._updated[report.station] = history
 
     def evict_stale(self, now: float) -> None:
-        """Evict stations whose last report is older than twice the retention time.
+        """Evict stations whose last report is older than twice the retention time, after `process`.
 
         Reports older than `span` [s] are not used, and no later report can continue a track that ended more than
         `span` earlier.
         """
-        stale = [
-            place
-            for place in self._places.values()
-            if not (history := self._histories[place]).new
-            and (not history.entries or history.entries[-1].report.detections.time < now - 2.0 * self.span)
+        if now <= self._next_eviction:
+            return
+        oldest = now - 2.0 * self.span
+        for station, history in list(self._histories.items()):
+            if history.latest < oldest:
+                del self._histories[station]
+                self._complete = False
+        latest = min([history.latest for history in self._histories.values()], default=math.inf)
+        self._next_eviction = latest + 2.0 * self.span
+
+    def tracks(self, stations: tuple[str, ...]) -> tuple[Rows, Integers]:
+        """Return the tracks of these stations in this order, and the index of the station of each (N,).
+
+        Each station has one row per object, at its newest processed report. The rows are valid until the next
+        `process`.
+        """
+        if not self._complete or stations != self._order:
+            self._arrange(stations)
+        return self._rows, self._ranks
+
+    def _arrange(self, stations: tuple[str, ...]) -> None:
+        """Build the table of these stations."""
+        for history in self._histories.values():
+            history.place = None
+        present = [
+            (rank, self._histories[station]) for rank, station in enumerate(stations) if station in self._histories
         ]
-        for place in stale:
-            name = self.stations[place]
-            assert name is not None
-            del self._places[name]
-            self.stations[place], self._histories[place] = None, _History()
-            self._tracks = self._tracks[self._tracks["station"] != place]
+        start = 0
+        for _, history in present:
+            end = start + len(history.rows)
+            history.place, start = (start, end), end
+        self._order, self._complete = stations, True
+        self._rows = np.concatenate([_NO_ROWS, *[history.rows for _, history in present]])
+        self._ranks = np.repeat([rank for rank, _ in present], [len(history.rows) for _, history in present])
 
-    def _allocate_slot(self, station: str) -> int:
-        if None in self.stations:
-            place = self.stations.index(None)
-            self.stations[place] = station
-            return place
-        self.stations.append(station)
-        self._histories.append(_History())
-        return len(self.stations) - 1
+    def _refresh(self, history: _History) -> None:
+        """Write the tracks of a station to the table, which is incomplete if their number changed."""
+        if history.place is None or not self._complete:
+            return
+        start, end = history.place
+        if len(history.rows) == end - start:
+            self._rows[start:end] = history.rows
+        else:
+            self._complete = False
 
-    def tracks(self) -> Table:
-        """Return the tracks after all reports: one row per station and object, at the newest report of the station."""
-        due = {
-            station: reports
-            for station, history in enumerate(self._histories)
-            if history.new and (reports := self._due(station, history))
-        }
+    @staticmethod
+    def process(histories: Sequence[ReportHistory]) -> None:
+        """Process the new reports of several receiving stations with equal settings, as one batch.
+
+        The result equals that of a separate call for each.
+        """
+        due: list[tuple[int, _History, Sequence[Report]]] = []
+        for receiver, owner in enumerate(histories):
+            for history in owner._updated.values():
+                if reports := history.due():
+                    due.append((receiver, history, reports))
+                owner._next_eviction = min(owner._next_eviction, history.latest + 2.0 * owner.span)
+            owner._updated.clear()
+        changed = due
         while due:
-            self._advance(list(due), [reports[0] for reports in due.values()])
-            due = {station: reports[1:] for station, reports in due.items() if len(reports) > 1}
-        return self._tracks
+            first = histories[0]
+            _advance(
+                [receiver for receiver, _, _ in due],
+                [history for _, history, _ in due],
+                [reports[0] for _, _, reports in due],
+                first._gate,
+                first.span,
+            )
+            due = [(receiver, history, reports[1:]) for receiver, history, reports in due if len(reports) > 1]
+        for receiver, history, _ in changed:
+            histories[receiver]._refresh(history)
 
-    def _due(self, station: int, history: _History) -> Sequence[Report]:
-        """Return the unprocessed reports of a station in order, after rollback of the tracks to the first of them."""
-        latest = history.entries[-1].report.detections.time if history.entries else history.begin
-        if len(history.new) == 1 and latest < history.new[0].detections.time < math.inf:
-            return [history.new.pop()]
-        reports = [entry.report for entry in history.entries]
-        kept = len(reports)
-        for report in history.new:
-            time = report.detections.time
-            if not history.begin < time < math.inf:
-                continue
-            place = bisect_left(reports, time, key=lambda held: held.detections.time)
-            again = place < len(reports) and reports[place].detections.time == time
-            reports[place : place + again] = [report]
-            kept = min(kept, place)
-        history.new.clear()
-        if kept < len(history.entries):
-            before = history.entries[kept - 1].tracks if kept else self._tracks[:0]
-            others = self._tracks[self._tracks["station"] != station]
-            self._tracks = np.concatenate([others, before[before["station"] == station]])
-            del history.entries[kept:]
-        return reports[kept:]
 
-    def _advance(self, stations: list[int], reports: list[Report]) -> None:
-        self._tracks = update_tracks(self._tracks, stations, reports, self._gate, self.span)
-        for station, report in zip(stations, reports, strict=True):
-            history = self._histories[station]
-            history.entries.append(_Entry(report, self._tracks))
-            while (
-                len(history.entries) > 1
-                and history.entries[1].report.detections.time < report.detections.time - self.span
-            ):
-                del history.entries[0]
-                history.begin = history.entries[0].report.detections.time
+def _advance(
+    receivers: Sequence[int],
+    histories: Sequence[_History],
+    reports: Sequence[Report],
+    gate: AssociationGate,
+    span: float,
+) -> None:
+    """Process one report of each station."""
+    before = [history.rows for history in histories]
+    tracks = join_rows(before)
+    counts = [len(rows) for rows in before]
+    tracks["receiver"] = np.repeat(receivers, counts)
+    tracks["station"] = np.repeat(np.arange(len(reports)), counts)
+    tracks = update_tracks(tracks, receivers, reports, gate, span)
+    ends = np.searchsorted(tracks["station"], np.arange(len(reports)), "right").tolist()
+    rows, start = rows_of(tracks), 0
+    for history, report, end in zip(histories, reports, ends, strict=True):
+        history.add_entry(report, rows[start:end], span)
+        start = end

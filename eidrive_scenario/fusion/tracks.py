@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.arrays import Array
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
 from eidrive_scenario.fusion.headings import initiate_heading, predict_heading, significant_turn_rate, update_heading
 from eidrive_scenario.fusion.method import Report
@@ -22,6 +22,7 @@ from eidrive_scenario.perception.tracking.uncertain_pose import pose_jacobian
 
 TRACK = np.dtype(
     [
+        ("receiver", "i8"),  # index of the receiving station in a batch
         ("station", "i8"),
         ("number", "i8"),  # object id of the station, -1 without one
         ("time", "f8"),  # time of the estimate [s]
@@ -48,14 +49,29 @@ MIN_EXISTENCE = 0.05
 """Minimum existence probability of a track; below, it is deleted, as by `delete_existence` of trackers."""
 MAX_WEIGHT = 10.0
 """Maximum weight of earlier reports of the size, so that it can still change."""
+_ROW = np.dtype((np.void, TRACK.itemsize))
+Rows = NDArray[np.void]
+"""Rows of a table as bytes: numpy copies them at once, and those of a table field by field."""
 _ROW_OF_CLASS = {name: row for row, name in enumerate(CLASSES)}
 _MISC = _ROW_OF_CLASS["misc"]
 
 
-def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table:
-    """Return new tracks of the objects in reports, one row each, in order.
+def join_rows(parts: Sequence[Rows]) -> Table:
+    """Return a table of these rows."""
+    return np.concatenate(parts).view(TRACK)
+
+
+def rows_of(tracks: Table) -> Rows:
+    """Return the rows of a table as bytes, which share its memory."""
+    return tracks.view(_ROW)
+
+
+def initiate_tracks(receivers: Sequence[int], reports: Sequence[Report]) -> Table:
+    """Return new tracks of the objects in reports, one row each, in order. The station is the index of its report.
 
     Boxes that are not finite or have no size are omitted.
+
+    receivers  index of the receiving station of each report
     """
     lists = [report.detections for report in reports]
     boxes = np.concatenate([found.boxes for found in lists])
@@ -79,7 +95,8 @@ def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table
     covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
     table["heading"], table["heading_covariance"] = initiate_heading(boxes[:, 6])
     table["facing"] = 1.0
-    table["station"] = np.repeat(stations, counts)
+    table["receiver"] = np.repeat(receivers, counts)
+    table["station"] = np.repeat(np.arange(len(reports)), counts)
     table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
     table["number"] = [number for found in lists for number in found.tracks or (-1,) * len(found)]
     words = [_ROW_OF_CLASS.get(name, _MISC) for found in lists for name in found.classes]
@@ -106,58 +123,78 @@ def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
 
 
 def predict_tracks(tracks: Table, time: Array) -> None:
-    """Predict the tracks to `time` (N,) [s]."""
+    """Predict the tracks to `time` (N,) [s].
+
+    The tracks of one receiving station are predicted by the same formula, and independent of other receiving stations.
+    """
     step = time - tracks["time"]
-    if not step.any():
+    moved = _of_receivers_with(step != 0.0, tracks["receiver"])
+    if not moved.all():
+        rows = np.flatnonzero(moved)
+        if len(rows):
+            part = tracks.take(rows)
+            predict_tracks(part, time[rows])
+            rows_of(tracks)[rows] = rows_of(part)
         return
     mean, covariance, heading, of_heading = (
         tracks[name] for name in ("mean", "covariance", "heading", "heading_covariance")
     )
-    mean[:], covariance[:] = predict(mean, covariance, step, significant_turn_rate(heading, of_heading))
+    turn = significant_turn_rate(heading, of_heading)
+    turning = _of_receivers_with(turn != 0.0, tracks["receiver"])
+    mean[:], covariance[:] = predict(mean, covariance, step, turn, turning)
     heading[:], of_heading[:] = predict_heading(heading, of_heading, step)
     tracks["existence"] = survived(tracks["existence"], step)
     tracks["time"] = time
 
 
-def update_tracks(
-    tracks: Table, stations: Sequence[int], reports: Sequence[Report], gate: AssociationGate, max_age: float
-) -> Table:
-    """Return the tracks after one report of each of these stations, in sequence for each station.
+def _of_receivers_with(marked: NDArray[np.bool_], receivers: Integers) -> NDArray[np.bool_]:
+    """Return whether each row belongs to a receiving station with a marked row."""
+    count = np.count_nonzero(marked)
+    if count in (0, len(marked)):
+        return marked
+    found = np.zeros(int(receivers.max()) + 1, dtype=bool)
+    found[receivers[marked]] = True
+    return found[receivers]
 
-    Tracks that the station did not detect for `max_age` seconds are deleted. Tracks of other stations are unchanged. A
-    report with velocities replaces the state, because its sender has filtered the object, and filtering it again would
-    count its past twice. Reports with positions only are filtered by a Kalman filter.
+
+def update_tracks(
+    tracks: Table, receivers: Sequence[int], reports: Sequence[Report], gate: AssociationGate, max_age: float
+) -> Table:
+    """Return the tracks of several stations after one report of each, sorted by station; `tracks` is changed.
+
+    Tracks that the station did not detect for `max_age` seconds are deleted. A report with velocities replaces the
+    state, because its sender has filtered the object, and filtering it again would count its past twice. Reports with
+    positions only are filtered by a Kalman filter.
+
+    tracks     with the index of the report of its station as station
+    receivers  index of the receiving station of each report
     """
-    born = initiate_tracks(stations, reports)
-    time_of = np.full(max(stations, default=0) + 1 + int(tracks["station"].max(initial=0)), np.nan)
-    time_of[stations] = [report.detections.time for report in reports]
-    times = time_of[tracks["station"]]
-    concerned = np.isfinite(times)
+    born = initiate_tracks(receivers, reports)
+    if not len(tracks):
+        return born
+    times = np.array([report.detections.time for report in reports])[tracks["station"]]
     recent = times - tracks["seen"] <= max_age
-    old = tracks[recent]
-    predict_tracks(old, times[recent])
-    pairs = assigned_pairs(gated_pairs(old, born, gate, same_station=True))
+    if not recent.all():
+        tracks, times = tracks.take(np.flatnonzero(recent)), times[recent]
+    predict_tracks(tracks, times)
+    pairs = assigned_pairs(gated_pairs(tracks, born, gate, same_station=True))
     rows = np.array([row for row, _ in pairs], dtype=np.intp)
     columns = np.array([column for _, column in pairs], dtype=np.intp)
-    if len(rows) == len(old):
-        order = np.argsort(rows)
-        old = _update(old, born[columns[order]])
+    if len(rows) == len(tracks):
+        tracks = _update(tracks, born.take(columns[np.argsort(rows)]))
     else:
-        old[rows] = _update(old[rows], born[columns])
-        missed = np.ones(len(old), dtype=bool)
+        rows_of(tracks)[rows] = rows_of(_update(tracks.take(rows), born.take(columns)))
+        missed = np.ones(len(tracks), dtype=bool)
         missed[rows] = False
-        tracked = {station for station, report in zip(stations, reports, strict=True) if report.detections.tracks}
-        incomplete = {station for station, report in zip(stations, reports, strict=True) if not report.complete}
-        _coast(old, missed, tracked, incomplete)
-        old = old[old["existence"] >= MIN_EXISTENCE]
-    parts = [old]
-    if not concerned.all():
-        parts.insert(0, tracks[~concerned])
-    if len(columns) < len(born):
-        fresh = np.ones(len(born), dtype=bool)
-        fresh[columns] = False
-        parts.append(born[fresh])
-    return old if len(parts) == 1 else np.concatenate(parts)
+        _coast(tracks, missed, reports)
+    if tracks["existence"].min(initial=1.0) < MIN_EXISTENCE:
+        tracks = tracks.take(np.flatnonzero(tracks["existence"] >= MIN_EXISTENCE))
+    if len(columns) == len(born):
+        return tracks
+    fresh = np.ones(len(born), dtype=bool)
+    fresh[columns] = False
+    both = join_rows([rows_of(tracks), rows_of(born.take(np.flatnonzero(fresh)))])
+    return both.take(np.argsort(both["station"], kind="stable"))
 
 
 def _update(old: Table, new: Table) -> Table:
@@ -204,16 +241,15 @@ def _kalman_update(old: Table, new: Table) -> tuple[Array, Array]:
     return old["mean"] + (gain @ innovation[:, :, None])[:, :, 0], after
 
 
-def _coast(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], incomplete: set[int]) -> None:
+def _coast(tracks: Table, missed: NDArray[np.bool_], reports: Sequence[Report]) -> None:
     """Reduce the existence probability of tracks after a missed detection; delete those of tracking stations.
 
     Tracks of stations with incomplete reports are unchanged.
     """
-    for row in np.flatnonzero(missed).tolist():
-        station = int(tracks["station"][row])
-        if station in incomplete:
-            continue
-        before = min(float(tracks["existence"][row]), 0.999)
-        after = 0.0 if station in tracked else float(after_miss(np.array(before)))
-        tracks["existence"][row] = after
-        tracks["score"][row] *= after / before if before > 0.0 else 0.0
+    complete = np.array([report.complete for report in reports])
+    tracked = np.array([bool(report.detections.tracks) for report in reports])
+    rows = np.flatnonzero(missed & complete[tracks["station"]])
+    before = np.minimum(tracks["existence"][rows], 0.999)
+    after = np.where(tracked[tracks["station"][rows]], 0.0, after_miss(before))
+    tracks["existence"][rows] = after
+    tracks["score"][rows] *= np.divide(after, before, out=np.zeros(len(rows)), where=before > 0.0)

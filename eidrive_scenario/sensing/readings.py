@@ -20,7 +20,7 @@ FIELDS = frozenset({"truth", "camera", "lidar", "gnss", "imu"})
 """Kinds of sensors with a separate field in `Readings`."""
 
 
-class EgoState(msgspec.Struct, frozen=True):
+class EgoState(msgspec.Struct, frozen=True, gc=False):
     """Ego motion as measured by the station: reference point (3,) [m], angles [rad], speed along the heading [m/s]."""
 
     time: float
@@ -34,7 +34,7 @@ class EgoState(msgspec.Struct, frozen=True):
     """Acceleration along the heading [m/s²]."""
 
 
-class TruthReading(msgspec.Struct, frozen=True):
+class TruthReading(msgspec.Struct, frozen=True, gc=False):
     """Objects in the line of sight of a truth sensor: the input of the oracle detector.
 
     names (N,), categories (N,), boxes (N, 7) in the world frame [m, rad], velocity (N, 2) [m/s], visibility (N,) share
@@ -185,7 +185,7 @@ class SignalReading(msgspec.Struct, frozen=True):
     state: str
 
 
-class Readings(msgspec.Struct, frozen=True):
+class Readings(msgspec.Struct, frozen=True, gc=False):
     """Readings of all sensors of one station; sensors that were not due in this tick are missing."""
 
     time: float

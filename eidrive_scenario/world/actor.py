@@ -59,7 +59,7 @@ class ActorSpec:
         return self.wheelbase > 0.0
 
 
-class Placement(msgspec.Struct, frozen=True):
+class Placement(msgspec.Struct, frozen=True, gc=False):
     """State of a scripted actor after the next step: reference point [m], angles [rad], speed [m/s]."""
 
     x: float
@@ -77,7 +77,7 @@ class Placement(msgspec.Struct, frozen=True):
     """
 
 
-class Control(msgspec.Struct, frozen=True):
+class Control(msgspec.Struct, frozen=True, gc=False):
     """Pedals and steering of a driven vehicle for the next step."""
 
     throttle: float = 0.0

@@ -29,12 +29,14 @@ class _Place(NamedTuple):
     pose      center of the body and height of its reference point [m], heading [rad]
     body      outline of the body
     trailers  outlines of the trailers
+    driven    length of the path of the center since the first place [m]
     """
 
     time: float
     pose: tuple[float, float, float, float]
     body: Outline
     trailers: Sequence[Outline]
+    driven: float
 
 
 class OwnBody:
@@ -48,7 +50,10 @@ class OwnBody:
         self._spec = spec
         length, width, _ = spec.size
         self._half_size = length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN
+        self._half_diagonal = 1.001 * math.hypot(*self._half_size)
         self._places: deque[_Place] = deque(maxlen=math.ceil(duration / dt) + 2)
+        self._has_trailers = False
+        """Whether a stored place may have trailers."""
         self._tracks: dict[str, int] = {}
         """Object id of the ego body at each station."""
 
@@ -60,7 +65,13 @@ class OwnBody:
         x, y = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
         body = Outline(x, y, cos, sin, *self._half_size)
         trailers = outlines(attached) if len(attached) else ()
-        self._places.append(_Place(ego.time, (x, y, z, ego.yaw), body, trailers))
+        driven = 0.0
+        if self._places:
+            last = self._places[-1]
+            driven = last.driven + math.hypot(x - last.pose[0], y - last.pose[1])
+        self._places.append(_Place(ego.time, (x, y, z, ego.yaw), body, trailers, driven))
+        if trailers:
+            self._has_trailers = True
 
     def place(self, time: float) -> tuple[float, float, float, float]:
         """Return center, height [m] and heading [rad] of the body at the last instant up to `time`, or the first."""
@@ -90,9 +101,19 @@ class OwnBody:
 
         The boxes are compared with the ego pose at the time of measurement, so that delay has no effect.
         """
+        if len(detections.boxes) == 1 and self._is_far(detections.boxes.item(0), detections.boxes.item(1)):
+            return detections
         place = self._at(detections.time)
         detections = _without_bodies(detections, place.trailers)
         return _without_bodies(detections, [place.body])
+
+    def _is_far(self, x: float, y: float) -> bool:
+        """Return True only if a point [m] is on no stored outline."""
+        if self._has_trailers:
+            return False
+        last = self._places[-1]
+        reach = last.driven - self._places[0].driven + self._half_diagonal
+        return math.hypot(x - last.pose[0], y - last.pose[1]) > reach
 
     def without_perceived(
         self,

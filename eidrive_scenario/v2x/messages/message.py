@@ -16,7 +16,7 @@ LineOfSight = Literal["los", "nlosv", "nlos"]
 """State of a line of sight: free, blocked by vehicles only, or by a building or the ground (3GPP TR 37.885, 6.2.1)."""
 
 
-class StationState(msgspec.Struct, frozen=True):
+class StationState(msgspec.Struct, frozen=True, gc=False):
     """State of the sender as it reports it: reference point [m], yaw [rad], speed [m/s], at station `time` [s].
 
     pose_covariance (3, 3) covariance of x, y and yaw, not included in the covariances of the reported objects; None:
@@ -32,7 +32,7 @@ class StationState(msgspec.Struct, frozen=True):
     pose_covariance: NDArray[np.float64] | None = None
 
 
-class Message(msgspec.Struct, frozen=True):
+class Message(msgspec.Struct, frozen=True, gc=False):
     """Message with the objects of a station at station time `detections.time`, generated at true time `generated` [s].
 
     kind     cpm  collective perception message (ETSI TS 103 324): objects that the sender perceives
@@ -59,14 +59,14 @@ class Message(msgspec.Struct, frozen=True):
     """Time from the time step of the message until the sender passes it to the radio [s]; radio models include it."""
 
 
-class ReceivedMessage(msgspec.Struct, frozen=True):
+class ReceivedMessage(msgspec.Struct, frozen=True, gc=False):
     """Message at its receiver, with the time of arrival [s]."""
 
     message: Message
     arrived: float
 
 
-class LinkEvent(msgspec.Struct, frozen=True):
+class LinkEvent(msgspec.Struct, frozen=True, gc=False):
     """Outcome of one message on one link: it arrives at `arrives` [s] or is lost for `reason`.
 
     Radio models also report the path loss with shadowing and blockage [dB], the signal-to-noise ratio without

@@ -119,3 +119,21 @@ def test_empty_reports_and_those_older_than_the_history_are_read(car: ActorSpec)
     assert kept(body(car), seen()) == []
     assert kept(body(car), seen((5.0, 0.0), time=-30.0)) == []
     assert kept(body(car), seen((40.0, 0.0), time=60.0)) == [(40.0, 0.0)]
+
+
+def test_objects_far_from_all_places_of_the_body_are_kept(car: ActorSpec) -> None:
+    """A single object is compared with the outline at its time; the result is that of the same object in a list."""
+    rng = np.random.default_rng(2)
+    own = OwnBody(car, duration=1.0, dt=0.05)
+    for tick in range(40):
+        angle = 0.1 * tick
+        position = np.array([20.0 * math.cos(angle), 20.0 * math.sin(angle), 0.0])
+        own.record(EgoState(0.05 * tick, position, angle + math.pi / 2.0, 0.0, 40.0, 0.0, 0.0, 0.0))
+    far_away = (500.0, 500.0)
+    removed = 0
+    for _ in range(2000):
+        time, place = rng.uniform(0.0, 2.0), (rng.uniform(-25.0, 25.0), rng.uniform(-25.0, 25.0))
+        alone = len(own.without(seen(place, time=time)))
+        assert alone == len(own.without(seen(place, far_away, time=time))) - 1
+        removed += alone == 0
+    assert removed > 5

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scenario_1 import ONE, FrameCollector, simulate, with_properties
 
+from eidrive_scenario.driving import stations
 from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError
@@ -67,6 +68,19 @@ def test_mast_with_cooperates_with_fuses_received_and_sends_own_detections(tmp_p
             away = np.hypot(unit.fused.boxes[:, 0] - mast[0], unit.fused.boxes[:, 1] - mast[1])
             assert away.min() > 1.0, "the list of a mast does not contain the mast"
     assert learned > 0
+
+
+def test_batch_of_all_stations_equals_fusion_by_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = listening(tmp_path, cooperates_with="Ego")
+    path.write_text(path.read_text().replace('"average"', '"covariance_intersection"'))
+    batch, frames = play(path, "bursty")
+    assert max(len(frame.steps["RSU"].fused) for frame in frames) > 1
+    monkeypatch.setattr(
+        stations,
+        "fuse_reports",
+        lambda agents, sensed, now: {name: agent.fuse(sensed[name]) for name, agent in agents.items()},
+    )
+    assert play(path, "bursty")[0].trace_hash == batch.trace_hash
 
 
 def test_fused_objects_of_mast_count_in_perception_metrics(tmp_path: Path) -> None:

@@ -53,3 +53,24 @@ def test_infinitely_wide_track_is_a_candidate_of_all(monkeypatch: pytest.MonkeyP
     wide = {row for pair in zip(few.first, few.second, strict=True) if 7 in pair for row in pair}
     others = np.flatnonzero(tracks["station"] != tracks["station"][7]).tolist()
     assert wide == {7, *others}
+
+
+@pytest.mark.parametrize("few", [0, 10**6])
+def test_pairs_of_several_receiving_stations_equal_those_of_each(monkeypatch: pytest.MonkeyPatch, few: int) -> None:
+    """Tracks of two receiving stations are no candidates, though they are at the same places."""
+    rng = np.random.default_rng(5)
+    parts = [random_tracks(rng, count, spread) for count, spread in ((40, 30.0), (1, 30.0), (70, 90.0), (25, 8.0))]
+    expected = []
+    begin = 0
+    for receiver, part in enumerate(parts):
+        part["receiver"] = receiver
+        found = gated_pairs(part, part, GATE, same_station=False)
+        expected += [(first + begin, second + begin) for first, second in zip(found.first, found.second, strict=True)]
+        begin += len(part)
+    monkeypatch.setattr(pairs, "_FEW_PAIRS", few)
+    both = np.concatenate(parts)
+    found = gated_pairs(both, both, GATE, same_station=False)
+    assert list(zip(found.first, found.second, strict=True)) == expected
+    both["mean"][3, 0] = 1e150
+    found = gated_pairs(both, both, GATE, same_station=False)
+    assert list(zip(found.first, found.second, strict=True)) == [pair for pair in expected if 3 not in pair]

@@ -1,0 +1,159 @@
+"""Newest report of each station, from received messages and from the own sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from msgspec.structs import replace
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.communication.own_body import OwnBody
+from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
+from eidrive_scenario.driving.communication.perception_regions import PerceptionRegionStore
+from eidrive_scenario.driving.communication.relative_pose import relative_state
+from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.tolerances import TIME_TOLERANCE
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
+
+SENDER_REPORT_SUFFIX = " itself"
+"""Suffix of the reports of a station about itself, which are kept as those of another station."""
+
+
+class ReportStore:
+    """Newest report of each station until the end of its lifetime. Every report is passed to the fusion method.
+
+    regions  perception regions that received CPMs are added to; None if the station does not use them
+    points   received point clouds; None if the station does not use them
+    """
+
+    def __init__(
+        self,
+        name: str,
+        settings: AgentSettings,
+        *,
+        fusion: FusionMethod,
+        own_body: OwnBody,
+        regions: PerceptionRegionStore | None,
+        points: PointCloudSharing | None,
+    ) -> None:
+        self._name = name
+        self._clock = settings.clock
+        self._fusion = fusion
+        self._own_body = own_body
+        self._regions = regions
+        self._points = points
+        self._reports: dict[str, Report] = {}
+        self._partial: dict[str, PartialReportAssembler] = {}
+        self._usual_lifetime = settings.lifetime(complete=True)
+        self._long_lifetime = settings.lifetime(complete=False)
+        self._lifetimes: dict[str, float] = {}
+        """Lifetime of the reports of each station [s]."""
+        self._next_deletion = math.inf
+        """Time up to which no report exceeds its lifetime [s]."""
+
+    @property
+    def newest(self) -> Sequence[Report]:
+        """Newest report of each station."""
+        return list(self._reports.values())
+
+    def process(
+        self,
+        inbox: Sequence[ReceivedMessage],
+        now: float,
+        ego: EgoState,
+        *,
+        pose_covariance: Array | None,
+        own_perception: bool,
+    ) -> None:
+        """Store the newest report of each sender, and delete reports that exceed their lifetime.
+
+        ego              assumed pose of the station, with (3, 3) `pose_covariance` of x, y and yaw; None: it is exact
+        own_perception   whether the channel carries the detections of a station back to itself
+        """
+        is_exact = self._clock.error(now) == 0.0
+        for received in inbox:
+            message = received.message
+            if not is_exact:
+                message = self._clock.with_local_timestamps(message, now)
+            sender, own = message.sender, message.sender == self._name
+            if own and (not own_perception or message.kind == "cam"):
+                continue
+            if self._regions is not None:
+                self._regions.add_message(message)
+            if self._points is not None and message.points is not None and not own:
+                self._points.add_points(sender, message.points, self._own_body.box(message.points.time))
+                continue
+            detections = _numbered(message)
+            state: StationState | None = message.state
+            if not own:
+                detections = self._without_own_body(message, detections, pose_covariance)
+                state = relative_state(state, ego, pose_covariance)
+            elif state is not None:
+                state = replace(state, pose_covariance=None)
+            complete, perceived = message.objects is None, message.kind == "cpm"
+            station = sender if perceived else sender + SENDER_REPORT_SUFFIX
+            lifetime = self._usual_lifetime if complete and perceived else self._long_lifetime
+            if self._lifetimes.get(station, self._usual_lifetime) != lifetime:
+                self._lifetimes[station] = lifetime
+                self._next_deletion = -math.inf
+            self.add(
+                Report(station, detections, received.arrived, state, complete),
+                None if complete else self._assembled_detections(message, pose_covariance),
+            )
+        if now > self._next_deletion:
+            self._delete_old(now)
+
+    def add(self, report: Report, completed: Detections | None = None) -> None:
+        """Pass a report to the fusion method, and store it unless a newer one of its station is stored.
+
+        An incomplete report is stored with all known objects of its station, `completed`.
+        """
+        self._fusion.add_report(report)
+        if completed is not None:
+            report = replace(report, detections=completed, complete=True)
+        station = report.station
+        held = self._reports.get(station)
+        if held is None:
+            self._next_deletion = min(self._next_deletion, self._end_of_life(station, report))
+        if held is None or report.detections.time >= held.detections.time:
+            self._reports[station] = report
+
+    def _end_of_life(self, station: str, report: Report) -> float:
+        """Return the time up to which a report is stored [s]."""
+        return report.detections.time + self._lifetimes.get(station, self._usual_lifetime)
+
+    def _delete_old(self, now: float) -> None:
+        """Delete reports that exceed their lifetime."""
+        ends = {station: self._end_of_life(station, held) for station, held in self._reports.items()}
+        for station, end in ends.items():
+            if end < now - TIME_TOLERANCE:
+                del self._reports[station]
+        self._next_deletion = min([ends[station] for station in self._reports], default=math.inf)
+
+    def _assembled_detections(self, message: Message, pose_covariance: Array | None) -> Detections:
+        """Return all known objects of the sender of a message that lists a part of them."""
+        memory = self._partial.get(message.sender)
+        if memory is None:
+            memory = self._partial[message.sender] = PartialReportAssembler(self._long_lifetime)
+        return self._without_own_body(message, memory.update(message), pose_covariance)
+
+    def _without_own_body(self, message: Message, detections: Detections, pose_covariance: Array | None) -> Detections:
+        """Return detections of a message without the ego body."""
+        if message.kind != "cpm" or message.sender == self._name:
+            return self._own_body.without(detections)
+        own = self._reports.get(self._name)
+        return self._own_body.without_perceived(
+            detections, message.sender, message.state, None if own is None else own.detections, pose_covariance
+        )
+
+
+def _numbered(message: Message) -> Detections:
+    """Return the detections of a message, with the object ids of the sender as track numbers if it has none."""
+    if message.objects is None or message.detections.tracks:
+        return message.detections
+    return replace(message.detections, tracks=message.objects)
