@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -61,10 +62,10 @@ def _tracks_of_one_station(label: Integers, station: Integers) -> Integers:
 
 
 def _pairs_between(pairs: Pairs, begin: int, end: int) -> Pairs:
-    """Return the pairs of these rows, relative to the first one."""
-    own = [pair for pair in zip(*pairs, strict=True) if begin <= pair[0] < end]
-    first, second, cost, inside = zip(*own, strict=True)
-    return Pairs([row - begin for row in first], [row - begin for row in second], list(cost), list(inside))
+    """Return the pairs of these rows, relative to the first one; pairs are in order of their rows."""
+    own = slice(bisect_left(pairs.first, begin), bisect_left(pairs.first, end))
+    first, second = ([row - begin for row in side[own]] for side in (pairs.first, pairs.second))
+    return Pairs(first, second, pairs.cost[own], pairs.inside[own])
 
 
 def _group_sequentially(stations: Sequence[int], pairs: Pairs) -> list[list[int]]:

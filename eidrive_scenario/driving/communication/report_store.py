@@ -75,31 +75,33 @@ class ReportStore:
         ego              assumed pose of the station, with (3, 3) `pose_covariance` of x, y and yaw; None: it is exact
         own_perception   whether the channel carries the detections of a station back to itself
         """
+        name, regions, points, lifetimes = self._name, self._regions, self._points, self._lifetimes
         is_exact = self._clock.error(now) == 0.0
         for received in inbox:
             message = received.message
             if not is_exact:
                 message = self._clock.with_local_timestamps(message, now)
-            sender, own = message.sender, message.sender == self._name
-            if own and (not own_perception or message.kind == "cam"):
+            sender, perceived, complete = message.sender, message.kind == "cpm", message.objects is None
+            own = sender == name
+            if own and not (own_perception and perceived):
                 continue
-            if self._regions is not None:
-                self._regions.add_message(message)
-            if self._points is not None and message.points is not None and not own:
-                self._points.add_points(sender, message.points, self._own_body.box(message.points.time))
+            if regions is not None:
+                regions.add_message(message)
+            if points is not None and message.points is not None and not own:
+                points.add_points(sender, message.points, self._own_body.box(message.points.time))
                 continue
-            detections = _numbered(message)
+            detections = message.detections if complete else _numbered(message)
             state: StationState | None = message.state
             if not own:
                 detections = self._without_own_body(message, detections, pose_covariance)
-                state = relative_state(state, ego, pose_covariance)
+                if pose_covariance is not None:
+                    state = relative_state(state, ego, pose_covariance)
             elif state is not None:
                 state = replace(state, pose_covariance=None)
-            complete, perceived = message.objects is None, message.kind == "cpm"
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
             lifetime = self._usual_lifetime if complete and perceived else self._long_lifetime
-            if self._lifetimes.get(station, self._usual_lifetime) != lifetime:
-                self._lifetimes[station] = lifetime
+            if lifetimes.get(station, self._usual_lifetime) != lifetime:
+                lifetimes[station] = lifetime
                 self._next_deletion = -math.inf
             self.add(
                 Report(station, detections, received.arrived, state, complete),
