@@ -129,7 +129,7 @@ def _pairs_of_one_station(first: Integers, second: Integers) -> tuple[Integers, 
     if len(first) * len(second) <= _FEW_PAIRS:
         return _where(first[:, None] == second)
     order = np.argsort(second, kind="stable")
-    return _ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
+    return ranges(np.searchsorted(second[order], first), np.searchsorted(second[order], first, "right"), order)
 
 
 def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side) -> tuple[Integers, Integers]:
@@ -149,7 +149,7 @@ def _pairs_of_two_stations(first: Table, second: Table, own: _Side, other: _Side
     distance += 1e-12 * max(float(np.abs(x).max()), float(np.abs(other_x).max()))
     order = np.argsort(other_x, kind="stable")
     sorted_x = other_x[order]
-    rows, columns = _ranges(
+    rows, columns = ranges(
         np.searchsorted(sorted_x, x - distance), np.searchsorted(sorted_x, x + distance, "right"), order
     )
     ahead = (station[rows] < other_station[columns]) & (receiver[rows] == other_receiver[columns])
@@ -178,8 +178,11 @@ def _where(pairs: NDArray[np.bool_]) -> tuple[Integers, Integers]:
     return rows, columns
 
 
-def _ranges(starts: Integers, ends: Integers, order: Integers) -> tuple[Integers, Integers]:
-    """Return each row as often as its range of places is long, and the entries of `order` at these places."""
+def ranges(starts: Integers, ends: Integers, order: Integers) -> tuple[Integers, Integers]:
+    """Return each row (N,) as often as its range of places is long, and the entries of `order` at these places.
+
+    starts, ends  (N,) first place of each row, and the one after its last
+    """
     counts = ends - starts
     total = np.cumsum(counts)
     rows = np.repeat(np.arange(len(counts)), counts)

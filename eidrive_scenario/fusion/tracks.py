@@ -12,7 +12,7 @@ from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
 from eidrive_scenario.fusion.headings import initiate_heading, predict_heading, significant_turn_rate, update_heading
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import AssociationGate, Table, assigned_pairs, gated_pairs
+from eidrive_scenario.fusion.pairs import AssociationGate, Table, assigned_pairs, gated_pairs, ranges
 from eidrive_scenario.fusion.prediction import predict
 from eidrive_scenario.perception.tracking.association import make_plausible
 from eidrive_scenario.perception.tracking.existence import detected, likelihood_ratio, survived
@@ -69,10 +69,26 @@ def rows_of(tracks: Table) -> Rows:
 def initiate_tracks(receivers: Sequence[int], reports: Sequence[Report]) -> Table:
     """Return new tracks of the objects in reports, one row each, in order. The station is the index of its report.
 
-    Boxes that are not finite or have no size are omitted.
+    Boxes that are not finite or have no size are omitted. A message that several stations received is converted once.
 
     receivers  index of the receiving station of each report
     """
+    places: dict[tuple[int, int], int] = {}
+    place = [places.setdefault((id(report.detections), id(report.state)), len(places)) for report in reports]
+    if len(places) < len(reports):
+        tracks = _converted(list({number: report for number, report in zip(place, reports, strict=True)}.values()))
+        starts, ends = (np.searchsorted(tracks["station"], place, side) for side in ("left", "right"))
+        number, rows = ranges(starts, ends, np.arange(len(tracks)))
+        tracks = tracks.take(rows)
+        tracks["station"] = number
+    else:
+        tracks = _converted(reports)
+    tracks["receiver"] = np.asarray(receivers)[tracks["station"]]
+    return tracks
+
+
+def _converted(reports: Sequence[Report]) -> Table:
+    """Return one row for each usable object of these reports."""
     lists = [report.detections for report in reports]
     boxes = np.concatenate([found.boxes for found in lists])
     scores = np.concatenate([found.scores for found in lists])
@@ -95,7 +111,6 @@ def initiate_tracks(receivers: Sequence[int], reports: Sequence[Report]) -> Tabl
     covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
     table["heading"], table["heading_covariance"] = initiate_heading(boxes[:, 6])
     table["facing"] = 1.0
-    table["receiver"] = np.repeat(receivers, counts)
     table["station"] = np.repeat(np.arange(len(reports)), counts)
     table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
     table["number"] = [number for found in lists for number in found.tracks or (-1,) * len(found)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from eidrive_scenario.v2x.messages.message import StationState
 DT = 0.05
 
 
+@cache
 def arrivals(seed: int) -> list[tuple[float, Report]]:
     """Return reports of up to seven stations on moving and turning objects over 2 s, with their times of arrival.
 
@@ -65,8 +67,8 @@ def arrivals(seed: int) -> list[tuple[float, Report]]:
 def drive(
     methods: Sequence[CovarianceIntersectionFusion], fuse: Callable[..., Sequence[Detections]]
 ) -> list[list[Detections]]:
-    """Return the objects of each method in each tick."""
-    pending = [arrivals(seed)[::-1] for seed in range(len(methods))]
+    """Return the objects of each method in each tick. Two methods in sequence receive the same messages."""
+    pending = [arrivals(number // 2)[::-1] for number in range(len(methods))]
     newest: list[dict[str, Report]] = [{} for _ in methods]
     results = []
     for tick in range(50):
@@ -101,7 +103,7 @@ def test_fuse_batch_equals_separate_calls(size: int, monkeypatch: pytest.MonkeyP
     ]
 
     def methods() -> list[CovarianceIntersectionFusion]:
-        return [CovarianceIntersectionFusion(settings[seed % 3]) for seed in range(24)]
+        return [CovarianceIntersectionFusion(settings[number // 4 % 3]) for number in range(48)]
 
     expected = drive(methods(), separately)
     found = drive(methods(), CovarianceIntersectionFusion.fuse_batch)
