@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from bench_radio import RATE, TICK, complete_run
+from bench_radio import RATE, TICK, complete_run, received_messages
 from bench_traffic import town_file, traffic_run
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
@@ -32,9 +32,14 @@ def car_cost(count: int) -> float:
     return 1e3 * TICK / traffic_run(town_file("Town04"), count, 0, SECONDS, runs=REPEATS) / count
 
 
+def simulated_time(stations: int) -> float:
+    """Return the simulated time of a run with stations [s]."""
+    return min(100.0 / stations, 2.0)
+
+
 def station_cost(count: int, *, all_listen: bool) -> float:
     """Return the time per station and tick [ms]; the fewer there are, the longer is the run."""
-    seconds = min(100.0 / count, 2.0)
+    seconds = simulated_time(count)
     rate = max(complete_run(count, seconds, RATE, all_listen, "random") for _ in range(REPEATS))
     return 1e3 * TICK / rate / count
 
@@ -78,6 +83,11 @@ def main() -> None:
         costs[name] = [(count, cost(count)) for count in counts]
         cells = "".join(f"{count:>8}: {value:.4f} ms" for count, value in costs[name])
         print(f"{name:24}{cells}   growth {costs[name][-1][1] / costs[name][0][1] - 1.0:+.0%}", flush=True)
+    cells = "".join(
+        f"{count:>8}: {value / received_messages(count, simulated_time(count), RATE):.4f} ms"
+        for count, value in costs["stations, all receive"]
+    )
+    print(f"{'  per received message':24}{cells}")
     if options.plot:
         draw(costs, options.plot)
         print(f"wrote {options.plot}")

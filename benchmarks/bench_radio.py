@@ -18,6 +18,8 @@ import argparse
 import cProfile
 import pstats
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -105,8 +107,11 @@ def run(stations: int, seconds: float, technology: str, create_events: bool) -> 
     return time.process_time() - started, channel
 
 
-def complete_run(stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str) -> float:
-    """Return the simulated time per processor time, without loading and the final statistics."""
+@contextmanager
+def complete_simulation(
+    stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str
+) -> Iterator[Simulation]:
+    """Yield a loaded run of a generated scenario."""
     channel = (
         f"{{model: radio, jitter: {TICK}, line_of_sight: {sight}, path_loss: {{kind: tr37885, environment: highway}}}}"
     )
@@ -114,11 +119,28 @@ def complete_run(stations: int, seconds: float, rate: float | None, all_listen: 
         path = write_scenario(Path(folder), stations, rate=rate, all_listen=all_listen)
         settings = RunSettings(dt=TICK, channel=channel, time_limit=seconds)
         with Simulation(load_for_seed(path, 1, {}), seed=1, settings=settings) as simulation:
-            started = time.process_time()
-            end = None
-            while end is None:
-                frame, end = simulation.tick()
-            return frame.view.time / (time.process_time() - started)
+            yield simulation
+
+
+def complete_run(stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str) -> float:
+    """Return the simulated time per processor time, without loading and the final statistics."""
+    with complete_simulation(stations, seconds, rate, all_listen, sight) as simulation:
+        started = time.process_time()
+        end = None
+        while end is None:
+            frame, end = simulation.tick()
+        return frame.view.time / (time.process_time() - started)
+
+
+def received_messages(stations: int, seconds: float, rate: float | None) -> float:
+    """Return the messages that a station receives per tick, if all receive."""
+    with complete_simulation(stations, seconds, rate, True, "random") as simulation:
+        end, ticks, received = None, 0, 0
+        while end is None:
+            frame, end = simulation.tick()
+            ticks += 1
+            received += sum(len(step.inbox) for step in frame.steps.values())
+        return received / ticks / stations
 
 
 def main() -> None:
