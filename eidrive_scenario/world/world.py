@@ -19,7 +19,7 @@ from eidrive_scenario.world.appearance import Appearance, hidden_actors
 from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
 from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
 from eidrive_scenario.world.physics.bullet import connect, disconnect
-from eidrive_scenario.world.physics.contacts import ContactTracker
+from eidrive_scenario.world.physics.contacts import ContactsOfTick
 from eidrive_scenario.world.physics.couplings import Couplings
 from eidrive_scenario.world.physics.crossings import Crossings, find_crossings
 from eidrive_scenario.world.physics.driven_body import DrivenBody
@@ -29,7 +29,7 @@ from eidrive_scenario.world.physics.ground import GroundUnder
 from eidrive_scenario.world.physics.rays import RayHits, cast_rays, cast_some, first_hits
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.road_objects import Building, signal_heads
-from eidrive_scenario.world.view import Contact, WorldView
+from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
 
 
@@ -66,12 +66,7 @@ class World:
         self._unseen_by: Mapping[str, tuple[str, ...]] = {}
         self._friction = 1.0
         self._couplings = Couplings(self._client)
-        self._tracker = ContactTracker(self._couplings)
-        self._contacts: tuple[Contact, ...] = ()
-        self._late_contacts: tuple[Contact, ...] = ()
-        """Contacts of actors that were added after the view of the tick was taken: those of the next view."""
-        self._is_viewed = False
-        """Whether a view of this tick was taken."""
+        self._contacts = ContactsOfTick(self._couplings)
         self._view: WorldView | None = None
         self._table: ActorTable | None = None
         self._scenery = Scenery(self._client, roads, entities)
@@ -111,19 +106,15 @@ class World:
         if spec.name in self._bodies:
             raise SimulationError(f"actor {spec.name!r} is already in the world")
         self._enter(spec, placement, driven)
-        found = self._tracker.update(tuple(self._bodies.values()), {})
-        if self._is_viewed:
-            self._late_contacts += found
-        else:
-            self._contacts += found
+        self._contacts.note_addition()
 
     def remove(self, name: str) -> None:
         """Remove an actor. Raise SimulationError if it is not present."""
+        self._contacts.find_added(self._bodies)
         self._body(name).remove()
         del self._bodies[name]
         self._driven.pop(name, None)
-        self._tracker.forget(name)
-        self._late_contacts = tuple(one for one in self._late_contacts if name not in (one.first, one.second))
+        self._contacts.forget(name)
         self._changed()
 
     def set_driven(self, name: str, driven: bool) -> None:
@@ -131,6 +122,7 @@ class World:
         body = self._body(name)
         if driven == (name in self._driven):
             return
+        self._contacts.find_added(self._bodies)
         order = list(self._bodies)
         placement = Placement(body.x, body.y, body.z, body.yaw, body.pitch, body.roll, body.speed)
         body.remove()
@@ -144,6 +136,7 @@ class World:
 
     def set_trailers(self, pairs: Collection[frozenset[str]]) -> None:
         """Set the pairs of a vehicle and its trailer, which may overlap; actors may be absent."""
+        self._contacts.find_added(self._bodies)
         self._couplings.pairs = frozenset(pairs)
 
     def attached(self, name: str) -> tuple[str, ...]:
@@ -190,6 +183,7 @@ class World:
         present = self._bodies.keys()
         if not (placements.keys() <= present and controls.keys() <= present):
             self._body(min({*placements, *controls} - present))
+        self._contacts.find_added(self._bodies)
         for name, body in self._bodies.items():
             placement = placements.get(name)
             if isinstance(body, ScriptedBody):
@@ -203,14 +197,14 @@ class World:
         touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
-        self._contacts = self._late_contacts + self._tracker.update(self._actors.bodies, touches)
-        self._late_contacts, self._is_viewed = (), False
+        self._contacts.step(self._actors.bodies, touches)
 
     def view(self) -> WorldView:
         """Return the current view, the same object until a change."""
+        self._contacts.find_added(self._bodies)
         if self._view is None:
-            self._view = self._actors.view(self.time, self.tick, self._contacts, self._unseen, self._unseen_by)
-            self._is_viewed = True
+            contacts = self._contacts.viewed()
+            self._view = self._actors.view(self.time, self.tick, contacts, self._unseen, self._unseen_by)
         return self._view
 
     def distance(self, first: str, second: str) -> float:

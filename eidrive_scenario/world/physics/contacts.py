@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -67,6 +67,54 @@ class ContactTracker:
                 self._touching[pair] = None
                 begun.append(Contact(*pair, touch.position, touch.impact_speed))
         return tuple(begun)
+
+
+class ContactsOfTick:
+    """Contacts that the view of a tick has: those that started in the last step, and those of actors added before it.
+
+    Contacts of actors that are added after the view was taken are those of the next view. The contacts of several added
+    actors are found at once, in the order of addition.
+    """
+
+    def __init__(self, couplings: Couplings) -> None:
+        self._tracker = ContactTracker(couplings)
+        self._started: tuple[Contact, ...] = ()
+        self._late: tuple[Contact, ...] = ()
+        """Contacts of actors that were added after the view was taken."""
+        self._is_viewed = False
+        self._has_added = False
+
+    def note_addition(self) -> None:
+        """Note that an actor was added. `find_added` has to be called before another change."""
+        self._has_added = True
+
+    def find_added(self, bodies: Mapping[str, Body]) -> None:
+        """Find the contacts of actors that were added since the last call."""
+        if not self._has_added:
+            return
+        self._has_added = False
+        rows = {name: row for row, name in enumerate(bodies)}
+        found = self._tracker.update(tuple(bodies.values()), {})
+        in_order = tuple(sorted(found, key=lambda one: (rows[one.second], rows[one.first])))
+        if self._is_viewed:
+            self._late += in_order
+        else:
+            self._started += in_order
+
+    def forget(self, name: str) -> None:
+        """Delete the contacts of a removed actor that no view has had yet."""
+        self._tracker.forget(name)
+        self._late = tuple(one for one in self._late if name not in (one.first, one.second))
+
+    def step(self, bodies: Sequence[Body], touches: dict[tuple[str, str], Touch]) -> None:
+        """Find the contacts that started in a step; `touches` are those of pybullet."""
+        self._started = self._late + self._tracker.update(bodies, touches)
+        self._late, self._is_viewed = (), False
+
+    def viewed(self) -> tuple[Contact, ...]:
+        """Return the contacts for the view of the tick, which is taken now."""
+        self._is_viewed = True
+        return self._started
 
 
 def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from sample_car import CarFactory
 
@@ -199,3 +200,27 @@ def test_contact_of_an_added_actor_ends_with_its_removal(world: World, car: CarF
     world.add(car("B"), Placement(1.0, 0.0))
     world.step({}, {})
     assert len(world.view().contacts) == 1
+
+
+@pytest.mark.parametrize("is_viewed", [False, True])
+def test_contacts_of_actors_added_at_once_are_in_order_of_addition(car: CarFactory, is_viewed: bool) -> None:
+    """The same contacts are found as by a search after each addition."""
+    found = []
+    for each in (False, True):
+        rng = np.random.default_rng(4)
+        with World() as world:
+            world.add(car("first"), Placement(0.0, 0.0))
+            if is_viewed:
+                world.view()
+            for number in range(30):
+                x, y, yaw = rng.uniform(-12.0, 12.0), rng.uniform(-12.0, 12.0), rng.uniform(-3.0, 3.0)
+                world.add(car(f"{number}"), Placement(x, y, yaw=yaw), driven=number % 7 == 0)
+                if each:
+                    world._contacts.find_added(world._bodies)
+                if number == 20:
+                    world.remove("11")
+            before = () if is_viewed else world.view().contacts
+            world.step({}, {})
+            found.append((before, world.view().contacts))
+    assert found[0] == found[1]
+    assert sum(map(len, found[0])) > 20
