@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -112,16 +113,26 @@ class Lidar(Sensor):
     def _rays(self, columns: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32], Array]:
         """Return directions (M, 3) in the sensor frame, rings (M,) and azimuths (M,) in (-pi, pi] of the rays of
         columns."""
+        azimuths = self._azimuths(columns)
+        if self.settings.field_of_view < 360.0:
+            inside = np.abs(azimuths) <= math.radians(self.settings.field_of_view) / 2.0 + 1e-9
+            columns, azimuths = columns[inside], azimuths[inside]
+        directions = self._turn.take(columns % self._columns_per_turn, axis=0).reshape(-1, 3)
+        rings = len(self._elevations)
+        return directions, np.tile(np.arange(rings, dtype=np.int32), len(azimuths)), np.repeat(azimuths, rings)
+
+    def _azimuths(self, columns: NDArray[np.int64]) -> Array:
+        """Return the azimuths (C,) of columns in (-pi, pi]."""
         turn = self._columns_per_turn
         behind = (columns * 2 + turn) % (2 * turn) - turn
-        azimuths = np.where(behind == -turn, turn, behind) * (math.pi / turn)
-        if self.settings.field_of_view < 360.0:
-            azimuths = azimuths[np.abs(azimuths) <= math.radians(self.settings.field_of_view) / 2.0 + 1e-9]
-        azimuth = np.repeat(azimuths, len(self._elevations))
-        elevation = np.tile(self._elevations, len(azimuths))
-        flat = np.cos(elevation)
-        directions = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=1)
-        return directions, np.tile(np.arange(len(self._elevations), dtype=np.int32), len(azimuths)), azimuth
+        return np.where(behind == -turn, turn, behind) * (math.pi / turn)
+
+    @cached_property
+    def _turn(self) -> Array:
+        """Directions (C, R, 3) of the rays of all columns of a revolution."""
+        azimuth, elevation = self._azimuths(np.arange(self._columns_per_turn))[:, None], self._elevations
+        flat, up = np.cos(elevation), np.sin(elevation)
+        return np.stack(np.broadcast_arrays(flat * np.cos(azimuth), flat * np.sin(azimuth), up), axis=-1)
 
     def _not_dropped(self, intensity: Array, draws: np.random.Generator) -> NDArray[np.bool_]:
         settings = self.settings

@@ -70,10 +70,14 @@ def ground_height(points: Array, foot: float) -> Array:
 
 
 def _lowest(z: Array, cell: Integers) -> Integers:
-    """Return the row of the lowest point of each cell."""
-    order = np.lexsort((z, cell))
-    first: Integers = order[np.concatenate([[True], np.diff(cell[order]) > 0])]
-    return first
+    """Return the row of the lowest point of each cell, in order of the cells; of several, the first one."""
+    count = int(cell.max()) + 1
+    height = np.full(count, np.inf)
+    np.minimum.at(height, cell, z)
+    rows = np.flatnonzero(z == height[cell])[::-1]
+    row = np.full(count, -1)
+    row[cell[rows]] = rows
+    return row[row >= 0]
 
 
 def _plane(plan: Array, rise: Array) -> Array:
