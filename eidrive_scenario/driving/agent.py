@@ -112,28 +112,11 @@ class Agent:
         message_interval: float = 0.0,
         own_perception: bool = False,
     ) -> AgentStep:
-        """Return the step of the station at `now` [s]; the arguments are those of `perceive`."""
-        return self.decide(
-            self.perceive(readings, inbox, now, goal, message_interval=message_interval, own_perception=own_perception)
+        """Return the step of the station at `now` [s]; the arguments are those of `sense`."""
+        sensed = self.sense(
+            readings, inbox, now, goal, message_interval=message_interval, own_perception=own_perception
         )
-
-    def perceive(
-        self,
-        readings: Readings,
-        inbox: Sequence[ReceivedMessage],
-        now: float,
-        goal: Goal | None,
-        *,
-        message_interval: float = 0.0,
-        own_perception: bool = False,
-    ) -> StationPerception:
-        """Return what the station perceives at `now` [s]; `decide` completes its step.
-
-        The arguments are those of `sense`.
-        """
-        return self.fuse(
-            self.sense(readings, inbox, now, goal, message_interval=message_interval, own_perception=own_perception)
-        )
+        return self.decide(self.fuse(sensed))
 
     def sense(
         self,
@@ -145,7 +128,7 @@ class Agent:
         message_interval: float = 0.0,
         own_perception: bool = False,
     ) -> StationPerception:
-        """Process sensor readings and received messages; return what the station perceives before fusion.
+        """Process sensor readings and received messages; return what the station perceives before `fuse`.
 
         inbox             messages delivered since the last tick
         goal              request of the scenario

@@ -78,14 +78,13 @@ class CovarianceIntersectionFusion(FusionMethod):
             settings = method.settings
             key = (settings.gate, settings.gate_distance, settings.max_age, settings.existence)
             batches.setdefault(key, []).append(place)
-        fused: list[Detections | None] = [None] * len(methods)
+        fused: dict[int, Detections] = {}
         for places in batches.values():
             for start in range(0, len(places), _BATCH):
                 part = places[start : start + _BATCH]
                 found = _fuse_batch([methods[place] for place in part], [reports[place] for place in part], now)
-                for place, one in zip(part, found, strict=True):
-                    fused[place] = one
-        return [one for one in fused if one is not None]
+                fused.update(zip(part, found, strict=True))
+        return [fused[place] for place in range(len(methods))]
 
     def _tracks(self, reports: Sequence[Report]) -> tuple[Rows, Integers]:
         """Return the tracks of the stations of these reports in order of their names, and the rank of each station."""
@@ -126,6 +125,7 @@ def _fuse_batch(
 
 
 def _slice(fused: Detections, start: int, end: int) -> Detections:
+    """Return consecutive objects, which share the memory of all."""
     return Detections(
         fused.time,
         fused.boxes[start:end],

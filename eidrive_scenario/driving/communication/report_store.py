@@ -76,11 +76,8 @@ class ReportStore:
         own_perception   whether the channel carries the detections of a station back to itself
         """
         name, regions, points, lifetimes = self._name, self._regions, self._points, self._lifetimes
-        is_exact = self._clock.error(now) == 0.0
         for received in inbox:
-            message = received.message
-            if not is_exact:
-                message = self._clock.with_local_timestamps(message, now)
+            message = self._clock.with_local_timestamps(received.message, now)
             sender, perceived, complete = message.sender, message.kind == "cpm", message.objects is None
             own = sender == name
             if own and not (own_perception and perceived):
@@ -90,12 +87,11 @@ class ReportStore:
             if points is not None and message.points is not None and not own:
                 points.add_points(sender, message.points, self._own_body.box(message.points.time))
                 continue
-            detections = message.detections if complete else _numbered(message)
+            detections = _numbered(message)
             state: StationState | None = message.state
             if not own:
                 detections = self._without_own_body(message, detections, pose_covariance)
-                if pose_covariance is not None:
-                    state = relative_state(state, ego, pose_covariance)
+                state = relative_state(state, ego, pose_covariance)
             elif state is not None:
                 state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
