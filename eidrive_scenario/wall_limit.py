@@ -2,8 +2,9 @@
 
 A watchdog thread interrupts the thread of the run by raising LimitReached in it: through a signal in the main thread,
 which also ends waiting system calls, else between two steps of the interpreter. It repeats that until the run ends,
-as code may catch the exception. Code that never returns to the interpreter cannot be interrupted: a process that has
-a LastResort ends in that case. The run does not depend on the clock before the limit is reached.
+as code may catch the exception, and the interpreter ignores exceptions in finalizers and callbacks of weak references:
+each time step of a run raises it, too. Code that never returns to the interpreter cannot be interrupted: a process
+that has a LastResort ends in that case. The run does not depend on the clock before the limit is reached.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ class Limit:
     notes: list[str] = field(default_factory=list)
     armed: bool = True
     """Whether the run is interrupted at the limit; False once its error is being raised."""
+    is_reached: bool = False
+    """Whether the run has been interrupted."""
 
     def add_note(self, note: str) -> None:
         """Append a line to the report of the last resort."""
@@ -113,6 +116,13 @@ def current_limit() -> Limit | None:
     """Return the limit under which this thread runs, or None."""
     limit: Limit | None = getattr(_of_thread, "limit", None)
     return limit
+
+
+def raise_if_limit_reached() -> None:
+    """Raise LimitReached if this thread has been interrupted and runs on."""
+    limit = current_limit()
+    if limit is not None and limit.is_reached and limit.armed:
+        raise LimitReached
 
 
 def running_line(trace: TracebackType | None) -> str:
@@ -214,6 +224,7 @@ class _Watchdog:
             self._interrupt()
             if self._ended.wait(POSTPONEMENT):
                 return
+            self.limit.is_reached = True
             if not self._is_postponed and self._ended.wait(min(REPEAT, max(last - time.monotonic(), 0.01))):
                 return
             if time.monotonic() >= last:

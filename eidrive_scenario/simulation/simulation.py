@@ -43,7 +43,7 @@ from eidrive_scenario.simulation.tick_start import TickStart, check_action
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
 from eidrive_scenario.v2x.messages.message import LinkEvent
-from eidrive_scenario.wall_limit import limit_wall_time
+from eidrive_scenario.wall_limit import limit_wall_time, raise_if_limit_reached
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
@@ -192,6 +192,7 @@ class Simulation:
         """
         self._check_continues()
         try:
+            raise_if_limit_reached()
             return self._tick()
         except BaseException as error:
             self.attribute(error)
@@ -211,6 +212,7 @@ class Simulation:
         Values that are set by other methods apply from the next tick on. Raise the errors of `tick`.
         """
         self._check_continues()
+        raise_if_limit_reached()
         if self._begun is None:
             view = self.world.view()
             perceived = self.stack.perceive(self.world, view, self._state.inputs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 import threading
@@ -18,7 +19,7 @@ import eidrive_scenario
 from eidrive_scenario import wall_limit
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
-from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording import Frame, read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.simulation.hung_runs import describe_dump
 from eidrive_scenario.wall_limit import LastResort, Limit, current_limit, limit_wall_time, set_last_resort
@@ -68,6 +69,53 @@ def test_hung_detector_in_another_thread_is_interrupted(package: Path, tmp_path:
     thread.join()
     assert errors[0].place is not None
     assert errors[0].place.name == "hangs"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("is_main", [True, False])
+def test_interruption_in_a_finalizer_aborts_the_run_at_its_next_step(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_main: bool
+) -> None:
+    """The interpreter ignores exceptions in finalizers, and no second interruption follows here."""
+    monkeypatch.setattr(wall_limit, "REPEAT", LONG)
+    interrupted: list[float] = []
+
+    class Interrupted:
+        def __del__(self) -> None:
+            try:
+                while True:
+                    pass
+            except BaseException:
+                interrupted.append(time.monotonic())
+                raise
+
+    class Deletes:
+        def observe(self, frame: Frame) -> None:
+            if not interrupted:
+                Interrupted()
+            elif time.monotonic() > interrupted[0] + 0.5:
+                times.append(frame.view.time)
+
+        def close(self) -> None:
+            pass
+
+    times: list[float] = []
+    errors: list[WallLimitError] = []
+
+    def run() -> None:
+        with pytest.raises(WallLimitError) as caught:
+            run_file(write_scenario(tmp_path / "s.xosc", end=3600.0), observers=[Deletes()], wall_limit=1.0)
+        errors.append(caught.value)
+
+    if is_main:
+        run()
+    else:
+        thread = threading.Thread(target=run)
+        thread.start()
+        thread.join()
+    assert interrupted
+    assert not times
+    assert re.search(r"not finished at t = \d+\.\d{3} s after 1 s of wall time", str(errors[0]))
 
 
 def test_hung_constructor_is_interrupted_while_loading(package: Path, tmp_path: Path) -> None:
