@@ -12,6 +12,7 @@ from eidrive_scenario.roads.model.curves import Arc
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.routing.links import LaneLinks
+from eidrive_scenario.roads.routing.steady_lanes import LEAST_REST, SteadyLane
 
 STRIDE = 2.0
 """Maximum step of the integration along a curved lane [m]."""
@@ -62,6 +63,7 @@ class Movement:
     def __init__(self, roads: Mapping[str, Road], links: LaneLinks) -> None:
         self._roads = roads
         self._links = links
+        self._steady: dict[tuple[str, int], SteadyLane] = {}
 
     def advance(
         self,
@@ -123,8 +125,15 @@ class Movement:
 
         The result is None if the step leaves the lane section, or if the lane does not exist.
         """
-        number, s, offset = location.lane, location.s, location.offset
-        road = self._roads[location.road]
+        name, number, s, offset, _ = location
+        steady = self._steady.get((name, number))
+        if steady is None:
+            road = self._roads[name]
+            steady = self._steady[name, number] = SteadyLane(road, number, driving_direction(road, number))
+        found = steady.step(s, offset, distance)
+        if found is not None:
+            return found
+        road = self._roads[name]
         section = road.section_at(s)
         lane = section.lanes.get(number)
         if lane is None or not 0.0 <= s <= road.length:
@@ -279,12 +288,12 @@ def _along(
         if ds < reach:
             s += direction * ds
             remaining -= ds * stretch
-            if remaining < 1e-12:
+            if remaining < LEAST_REST:
                 return s, 0.0
         else:
             s = end if reach == room else limit
             remaining -= reach * stretch
-            if remaining <= 1e-12:
+            if remaining <= LEAST_REST:
                 return s, 0.0
     return s, 0.0
 

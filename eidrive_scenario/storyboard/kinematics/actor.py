@@ -47,12 +47,12 @@ class Actor:
         self.keeps_controller = keeps_controller
         self.entity = entity
         self._controllers: tuple[model.Controller, ...] = ()
-        self._has_agent_controller = False
+        self._has_agent_controller = self._lateral = self._longitudinal = self._driven = False
         self.motion = Motion(roads)
         self.present = False
         for controller in controllers:
             self.assign(controller)
-        self._lateral = self._longitudinal = self._has_agent_controller
+        self._lateral = self._longitudinal = self._driven = self._has_agent_controller
         self._goal: Goal | None = None
         self._progress: TrajectoryProgress | None = None
         self._trailer: str | None = None
@@ -61,7 +61,6 @@ class Actor:
         self.end_of_road_since: float | None = None
         self.off_road_since: float | None = None
         self._tracks_off_road = self._tracks_end_of_road = False
-        self._last_position: tuple[float, float] | None = None
         self._last_state: ActorState | None = None
         self._location: LaneLocation | None = None
         self._location_tick = -1
@@ -75,6 +74,7 @@ class Actor:
         """Assign one more controller."""
         self._controllers = (*self._controllers, controller)
         self._has_agent_controller = self._has_agent_controller or is_agent_controller(controller)
+        self._update_driven()
 
     @property
     def lateral(self) -> bool:
@@ -90,6 +90,10 @@ class Actor:
         """Activate or deactivate its own controller in each domain; None leaves a domain unchanged."""
         self._lateral = self._lateral if lateral is None else lateral
         self._longitudinal = self._longitudinal if longitudinal is None else longitudinal
+        self._update_driven()
+
+    def _update_driven(self) -> None:
+        self._driven = self._lateral and self._longitudinal and self._has_agent_controller
 
     @property
     def goal(self) -> Goal | None:
@@ -126,7 +130,7 @@ class Actor:
     @property
     def driven(self) -> bool:
         """Whether its eidrive controller drives it."""
-        return self._lateral and self._longitudinal and self._has_agent_controller
+        return self._driven
 
     def limits(self) -> tuple[float, float, float]:
         """Return maximum speed [m/s], acceleration and deceleration [m/s²]; infinite without Performance."""
@@ -137,23 +141,24 @@ class Actor:
 
     def observe(self, view: WorldView, row: int) -> None:
         """Update the histories by a new view."""
-        state = view.states[row]
-        if state is self._last_state and not self.motion.teleported and not self.motion.end_of_road:
+        state, last, motion = view.states[row], self._last_state, self.motion
+        teleported, end_of_road = motion.teleported, motion.end_of_road
+        if state is last and not teleported and not end_of_road:
             return  # a standing actor whose histories are up to date
         self._last_state = state
-        x, y, speed = state.x, state.y, state.speed
-        if self._last_position is not None and not self.motion.teleported:
-            self.traveled += math.hypot(x - self._last_position[0], y - self._last_position[1])
-        self._last_position = (x, y)
-        self.motion.clear_teleported()
-        if abs(speed) >= STANDSTILL:
+        if teleported:
+            motion.clear_teleported()
+        elif last is not None:
+            self.traveled += math.hypot(state.x - last.x, state.y - last.y)
+        speed = state.speed
+        if not -STANDSTILL < speed < STANDSTILL:
             self.standing_since = None
         elif self.standing_since is None:
             self.standing_since = view.time
-        if self.driven:
-            self.motion.set_observed_state(pose_of(view, row), speed)
+        if self._driven:
+            motion.set_observed_state(pose_of(view, row), speed)
         else:
-            self._set_at_end_of_road(self.motion.end_of_road, view.time)
+            self._set_at_end_of_road(end_of_road, view.time)
 
     @property
     def tracks_off_road(self) -> bool:

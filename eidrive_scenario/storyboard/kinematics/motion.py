@@ -185,8 +185,8 @@ class Motion(MotionState):
         assert self.roads is not None
         assert self._location is not None
         here, left, total = self._location, 0.0, distance
-        way = self.roads.driving_direction(here.road, here.lane)
         if steering is not None:
+            way = self.roads.driving_direction(here.road, here.lane)
             left = steering.offset - here.offset * way
             here = here._replace(offset=steering.offset * way, t=here.t + left * way)
             if steering.distance is not None:
@@ -202,9 +202,9 @@ class Motion(MotionState):
             )
         if lane_pose is None:
             lane_pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
-            way = self.roads.driving_direction(here.road, here.lane)
         self._location = here
-        x, y, z, h, p, r = lane_pose.turned(self._heading if way > 0 else self._heading + math.pi)
+        against = self.roads.driving_direction(here.road, here.lane) < 0
+        x, y, z, h, p, r = lane_pose.turned(self._heading + math.pi if against else self._heading)
         self._pose = Pose(x, y, z if self._lift == 0.0 else z + self._lift, wrap_angle(h), p, r)
 
     def _advance(self, here: LaneLocation, distance: float) -> tuple[LaneLocation, Pose | None]:
@@ -216,7 +216,8 @@ class Motion(MotionState):
         within = self.roads.movement.step_in_section(here, distance)
         if within is not None:
             self._end_of_road = False
-            self._enter_lap(here, within[0])
+            if self._route is not None:
+                self._enter_lap(here, within[0])
             return within
         reached = self.ahead(here, distance)
         if reached is None:

@@ -165,17 +165,19 @@ class ScriptedBody(Body):
         The velocity along the heading is the given speed. The lateral one follows from the distance if there is any.
         """
         p, dt = placement, self._dt
-        px, py, pz, pyaw, pitch, speed = p.x, p.y, p.z, p.yaw, p.pitch, p.speed
-        if self._resting and speed == 0.0 and self._from == (px, py, pz, pyaw, pitch, p.roll):
+        speed = p.speed
+        after = px, py, pz, pyaw, _, _ = p.x, p.y, p.z, p.yaw, p.pitch, p.roll
+        if self._resting and speed == 0.0 and self._from == after:
             return
         x, y, z, yaw = self.x, self.y, self.z, self.yaw
         self._from = before = (x, y, z, yaw, self.pitch, self.roll)
         was_moving = self.yaw_rate != 0.0 or self.velocity != STILL
-        self._stand(p)
-        self.moved = before != (px, py, pz, pyaw, pitch, p.roll)
+        self._pose(*after)
+        self.speed = speed
+        self.moved = before != after
         along = self._along_heading(speed)
         if p.teleport:
-            self._from = (px, py, pz, pyaw, pitch, p.roll)
+            self._from = after
             self.velocity = self.velocity_before = along
             self.acceleration, self.yaw_rate = STILL, 0.0
         else:

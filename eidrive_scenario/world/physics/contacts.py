@@ -8,11 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.arrays import Bools, Integers
 from eidrive_scenario.geometry import box_corners, box_distance, overlap, points_in_box
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.physics.bodies import Body
 from eidrive_scenario.world.physics.couplings import PARTED, Couplings
 from eidrive_scenario.world.view import FEW, Contact
+
+ROUNDING = 1e-6
+"""Least distance beyond the hysteresis at which boxes certainly have parted [m]."""
 
 
 class Touch(NamedTuple):
@@ -118,7 +122,10 @@ class ContactsOfTick:
 
 
 def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
-    """Yield pairs with a moved body whose circles overlap, including the hysteresis, in the order of the bodies."""
+    """Yield pairs with a moved body that may be within the hysteresis, in the order of the bodies.
+
+    Few bodies are compared by their circles only.
+    """
     if len(bodies) > FEW:
         yield from _near_pairs_of_many(bodies)
         return
@@ -133,7 +140,7 @@ def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
 
 
 def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
-    """Yield the same pairs by a sweep along x: only consecutive bodies in x can be near."""
+    """Yield pairs by a sweep along x, as only consecutive bodies in x can be near, and by axes that separate them."""
     x, y, radius, moved = np.array([(b.center_x, b.center_y, b.radius, b.moved) for b in bodies]).T
     order = np.argsort(x, kind="stable")
     sorted_x = x[order]
@@ -144,9 +151,27 @@ def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
     first, second = order[left], order[left + within + 1]
     near = np.hypot(x[first] - x[second], y[first] - y[second]) <= radius[first] + radius[second] + PARTED
     near &= (moved[first] + moved[second]) > 0
+    near[near] = ~_are_apart(bodies, first[near], second[near])
     pairs = np.sort(np.stack([first[near], second[near]], axis=1), axis=1)
     for row, other in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
         yield bodies[row], bodies[other]
+
+
+def _are_apart(bodies: Sequence[Body], first: Integers, second: Integers) -> Bools:
+    """Return whether an axis of one of two boxes separates them by more than the hysteresis, for pairs of rows."""
+    rows = np.unique(np.concatenate([first, second]))
+    values = [
+        (b.center_x, b.center_y, math.cos(b.yaw), math.sin(b.yaw), b.spec.size[0] / 2, b.spec.size[1] / 2)
+        for b in map(bodies.__getitem__, rows.tolist())
+    ]
+    table = np.array(values).reshape(-1, 6)[rows.searchsorted([first, second])]
+    x, y, cos, sin, half_length, half_width = table.transpose(2, 0, 1)
+    dx, dy = x[1] - x[0], y[1] - y[0]
+    turn_cos, turn_sin = abs(cos[0] * cos[1] + sin[0] * sin[1]), abs(cos[0] * sin[1] - sin[0] * cos[1])
+    along = abs(dx * cos + dy * sin) - half_length - turn_cos * half_length[::-1] - turn_sin * half_width[::-1]
+    across = abs(dy * cos - dx * sin) - half_width - turn_sin * half_length[::-1] - turn_cos * half_width[::-1]
+    apart: Bools = (np.maximum(along, across) > PARTED + ROUNDING).any(axis=0)
+    return apart
 
 
 def _shared_point(first: Body, second: Body) -> Vector3:

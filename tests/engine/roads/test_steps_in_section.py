@@ -6,6 +6,7 @@ import random
 
 from eidrive_scenario.library import library_path
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.routing.steady_lanes import SteadyLane
 
 DISTANCES = (1e-9, 0.01, 0.3, 2.0, 7.0, 60.0, 500.0)
 """Lengths of the steps [m]."""
@@ -29,3 +30,29 @@ def test_step_in_section_equals_advance_and_lane_pose_bit_by_bit() -> None:
                 assert network.lane_pose_at(reached.road, reached.lane, reached.s, reached.offset) == within[1]
                 compared += 1
     assert compared > 100
+
+
+def test_steps_to_the_ends_of_steady_parts_equal_advance_bit_by_bit() -> None:
+    """Parts end at lane sections and at curves of the reference line; steps that do not remain within one have none."""
+    draw, compared, ended = random.Random(8), 0, 0
+    for file in sorted(library_path().rglob("*.xodr")):
+        network = RoadNetwork.load(file)
+        for road in network.roads.values():
+            ends = [*road.reference.starts, *road.section_starts, road.length]
+            s = draw.uniform(0.0, road.length)
+            for number in network.lane_ids(road.id, s):
+                here = network.location(road.id, number, s, draw.uniform(-1.0, 1.0))
+                lane = SteadyLane(road, number, 1)
+                for distance in (end - s + change for end in ends for change in (-1e-6, -1e-15, 0.0, 1e-15, 1e-6)):
+                    within = lane.step(s, here.offset, distance)
+                    ended += within is None
+                    if within is not None:
+                        sense = network.driving_direction(road.id, number)
+                        reached = network.advance(here, distance * sense)
+                        assert reached is not None
+                        assert repr(reached) == repr(within[0])
+                        place = (reached.road, reached.lane, reached.s, reached.offset)
+                        assert repr(network.lane_pose_at(*place)) == repr(within[1])
+                        compared += 1
+    assert compared > 1000
+    assert ended > 1000
