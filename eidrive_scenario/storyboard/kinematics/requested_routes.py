@@ -30,10 +30,14 @@ class RequestedRoutes:
         """
         found: dict[str, Array] = {}
         for name, actor in actors.items():
-            route, goal = actor.motion.route, actor.goal
-            request = route if route is not None else None if goal is None else goal.waypoints
+            request: object = actor.motion.route
+            if request is None:
+                goal = actor.goal
+                if goal is None or goal.waypoints is None:
+                    continue
+                request = goal.waypoints
             last = self._last.get(name)
-            if request is None or request is last:
+            if request is last:
                 continue
             self._last[name] = request
             if isinstance(request, Route):
