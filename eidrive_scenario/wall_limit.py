@@ -52,7 +52,7 @@ class Limit:
     armed: bool = True
     """Whether the run is interrupted at the limit; False once its error is being raised."""
     is_reached: bool = False
-    """Whether the run has been interrupted."""
+    """Whether the limit was reached, so that the run must not begin another time step."""
 
     def add_note(self, note: str) -> None:
         """Append a line to the report of the last resort."""

@@ -47,12 +47,12 @@ class Actor:
         self.keeps_controller = keeps_controller
         self.entity = entity
         self._controllers: tuple[model.Controller, ...] = ()
-        self._has_agent_controller = self._lateral = self._longitudinal = self._driven = False
+        self._has_agent_controller = False
         self.motion = Motion(roads)
         self.present = False
         for controller in controllers:
             self.assign(controller)
-        self._lateral = self._longitudinal = self._driven = self._has_agent_controller
+        self._lateral = self._longitudinal = self._has_agent_controller
         self._goal: Goal | None = None
         self._progress: TrajectoryProgress | None = None
         self._trailer: str | None = None
@@ -74,7 +74,6 @@ class Actor:
         """Assign one more controller."""
         self._controllers = (*self._controllers, controller)
         self._has_agent_controller = self._has_agent_controller or is_agent_controller(controller)
-        self._update_driven()
 
     @property
     def lateral(self) -> bool:
@@ -90,10 +89,6 @@ class Actor:
         """Activate or deactivate its own controller in each domain; None leaves a domain unchanged."""
         self._lateral = self._lateral if lateral is None else lateral
         self._longitudinal = self._longitudinal if longitudinal is None else longitudinal
-        self._update_driven()
-
-    def _update_driven(self) -> None:
-        self._driven = self._lateral and self._longitudinal and self._has_agent_controller
 
     @property
     def goal(self) -> Goal | None:
@@ -130,7 +125,7 @@ class Actor:
     @property
     def driven(self) -> bool:
         """Whether its eidrive controller drives it."""
-        return self._driven
+        return self._lateral and self._longitudinal and self._has_agent_controller
 
     def limits(self) -> tuple[float, float, float]:
         """Return maximum speed [m/s], acceleration and deceleration [m/s²]; infinite without Performance."""
@@ -155,7 +150,7 @@ class Actor:
             self.standing_since = None
         elif self.standing_since is None:
             self.standing_since = view.time
-        if self._driven:
+        if self.driven:
             motion.set_observed_state(pose_of(view, row), speed)
         else:
             self._set_at_end_of_road(end_of_road, view.time)

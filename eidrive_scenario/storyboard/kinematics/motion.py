@@ -204,12 +204,7 @@ class Motion(MotionState):
             lane_pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
         self._location = here
         against = self.roads.driving_direction(here.road, here.lane) < 0
-        angle = self._heading + math.pi if against else self._heading
-        x, y, z, h, p, r = lane_pose
-        if p == 0.0 and r == 0.0:
-            h += angle
-        else:
-            x, y, z, h, p, r = lane_pose.turned(angle)
+        x, y, z, h, p, r = lane_pose.turned(self._heading + math.pi if against else self._heading)
         self._pose = Pose(x, y, z if self._lift == 0.0 else z + self._lift, wrap_angle(h), p, r)
 
     def _advance(self, here: LaneLocation, distance: float) -> tuple[LaneLocation, Pose | None]:

@@ -159,8 +159,8 @@ def test_sweep_continues_without_repetition(scenario: Path, tmp_path: Path) -> N
 
 def test_retry_repeats_aborted_runs_only(scenario: Path, tmp_path: Path) -> None:
     """A wall limit that no run meets aborts all; with `retry` they are repeated."""
-    # A short run could end before the thread of the limit starts.
-    scenario.write_text(scenario.read_text().replace('value="0.5"', 'value="60"'))
+    # Half a second could end before the thread of the limit starts.
+    scenario.write_text(scenario.read_text().replace('value="0.5"', 'value="20"'))
     store = tmp_path / "s.db"
     plan = plan_of(scenario, SPEEDS, RunSettings())
     progress, runs = swept(plan, store, wall_limit=1e-4)
