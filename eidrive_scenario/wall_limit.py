@@ -3,8 +3,8 @@
 A watchdog thread interrupts the thread of the run by raising LimitReached in it: through a signal in the main thread,
 which also ends waiting system calls, else between two steps of the interpreter. It repeats that until the run ends,
 as code may catch the exception, and the interpreter ignores exceptions in finalizers and callbacks of weak references:
-each time step of a run raises it, too. Code that never returns to the interpreter cannot be interrupted: a process
-that has a LastResort ends in that case. The run does not depend on the clock before the limit is reached.
+each time step and the end of a run raise it, too. Code that never returns to the interpreter cannot be interrupted: a
+process that has a LastResort ends in that case. The run does not depend on the clock before the limit is reached.
 """
 
 from __future__ import annotations
@@ -51,8 +51,11 @@ class Limit:
     notes: list[str] = field(default_factory=list)
     armed: bool = True
     """Whether the run is interrupted at the limit; False once its error is being raised."""
-    is_reached: bool = False
-    """Whether the limit was reached, so that the run must not begin another time step."""
+    deadline: float = field(init=False)
+    """Instant of the limit by the monotonic clock [s]."""
+
+    def __post_init__(self) -> None:
+        self.deadline = time.monotonic() + self.seconds
 
     def add_note(self, note: str) -> None:
         """Append a line to the report of the last resort."""
@@ -119,9 +122,9 @@ def current_limit() -> Limit | None:
 
 
 def raise_if_limit_reached() -> None:
-    """Raise LimitReached if this thread has been interrupted and runs on."""
+    """Raise LimitReached if the limit of this thread is reached, also if the watchdog thread has not run since."""
     limit = current_limit()
-    if limit is not None and limit.is_reached and limit.armed:
+    if limit is not None and limit.armed and time.monotonic() >= limit.deadline:
         raise LimitReached
 
 
@@ -224,7 +227,6 @@ class _Watchdog:
             self._interrupt()
             if self._ended.wait(POSTPONEMENT):
                 return
-            self.limit.is_reached = True
             if not self._is_postponed and self._ended.wait(min(REPEAT, max(last - time.monotonic(), 0.01))):
                 return
             if time.monotonic() >= last:

@@ -180,6 +180,7 @@ class Simulation:
         with limit_wall_time(wall_limit), self:
             while self._ended is None:
                 self.tick()
+            raise_if_limit_reached()
             result = self.result()
             self._observers.conclude(result)
             return result

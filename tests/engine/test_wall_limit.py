@@ -89,9 +89,6 @@ def test_interruption_in_a_finalizer_aborts_the_run_at_its_next_step(
             times.append(frame.view.time)
             if frame.view.time > 0.0:
                 Interrupted()
-                limit = current_limit()
-                while limit is not None and not limit.is_reached:
-                    time.sleep(0.001)
 
         def close(self) -> None:
             pass
@@ -113,6 +110,16 @@ def test_interruption_in_a_finalizer_aborts_the_run_at_its_next_step(
         thread.join()
     assert times == [0.0, 0.05]
     assert re.search(r"not finished at t = \d+\.\d{3} s after 1 s of wall time", str(errors[0]))
+
+
+def test_run_that_ends_after_its_limit_is_aborted(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the watchdog thread, which may not run before a short run ends."""
+    monkeypatch.setattr(wall_limit._Watchdog, "_watch", lambda watchdog: None)
+    simulation = Simulation(write_scenario(tmp_path / "s.xosc", end=0.0))
+    with pytest.raises(WallLimitError, match=r"after 1e-06 s of wall time"):
+        simulation.run(wall_limit=1e-6)
 
 
 def test_hung_constructor_is_interrupted_while_loading(package: Path, tmp_path: Path) -> None:
