@@ -1,8 +1,9 @@
 """Cost per car and per station over their number, on one core, as a table and a plot.
 
 Scripted cars drive on Town04 (`EIDRIVE_MAPS`), as in `bench_traffic.py`. Stations drive on a straight road and send CAM
-at 10 Hz by IEEE 802.11p, as in `bench_radio.py`: one receives, or all receive and fuse, where the number of messages
-grows with its square. Times are processor times of whole runs without loading.
+at 10 Hz by IEEE 802.11p, as in `bench_radio.py`: one receives, or all receive and fuse. On a road of 2 km the number of
+messages then grows with the square of the number of stations; on one of 100 m per station it grows as the number does.
+Times are processor times of whole runs without loading.
 
     python benchmarks/bench_growth.py [--plot docs/figures/growth.png]
 """
@@ -14,14 +15,16 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from bench_radio import RATE, TICK, complete_run, received_messages
+from bench_radio import LENGTH, RATE, TICK, complete_run, received_messages
 from bench_traffic import town_file, traffic_run
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 CARS, STATIONS = (100, 200, 500, 1000), (20, 50, 100, 200)
-SECONDS = 5.0
-"""Simulated time of a run with cars [s]."""
+CAR_SECONDS, STATION_SECONDS = 5.0, 2.0
+"""Simulated time of a run with cars, and of one with stations [s]."""
+SPACING = 100.0
+"""Length of road per station, if their density does not depend on their number [m]."""
 REPEATS = 2
 
 Cost = Callable[[int], float]
@@ -29,18 +32,12 @@ Cost = Callable[[int], float]
 
 def car_cost(count: int) -> float:
     """Return the time per car and tick [ms]."""
-    return 1e3 * TICK / traffic_run(town_file("Town04"), count, 0, SECONDS, runs=REPEATS) / count
+    return 1e3 * TICK / traffic_run(town_file("Town04"), count, 0, CAR_SECONDS, runs=REPEATS) / count
 
 
-def simulated_time(stations: int) -> float:
-    """Return the simulated time of a run with stations [s]."""
-    return min(100.0 / stations, 2.0)
-
-
-def station_cost(count: int, *, all_listen: bool) -> float:
-    """Return the time per station and tick [ms]; the fewer there are, the longer is the run."""
-    seconds = simulated_time(count)
-    rate = max(complete_run(count, seconds, RATE, all_listen, "random") for _ in range(REPEATS))
+def station_cost(count: int, *, all_listen: bool, length: float = LENGTH) -> float:
+    """Return the time per station and tick [ms]."""
+    rate = max(complete_run(count, STATION_SECONDS, RATE, all_listen, "random", length) for _ in range(REPEATS))
     return 1e3 * TICK / rate / count
 
 
@@ -48,6 +45,10 @@ SERIES: dict[str, tuple[tuple[int, ...], Cost]] = {
     "scripted cars": (CARS, car_cost),
     "stations, one receives": (STATIONS, lambda count: station_cost(count, all_listen=False)),
     "stations, all receive": (STATIONS, lambda count: station_cost(count, all_listen=True)),
+    "stations of equal density, all receive": (
+        STATIONS,
+        lambda count: station_cost(count, all_listen=True, length=SPACING * count),
+    ),
 }
 
 
@@ -82,12 +83,12 @@ def main() -> None:
             continue
         costs[name] = [(count, cost(count)) for count in counts]
         cells = "".join(f"{count:>8}: {value:.4f} ms" for count, value in costs[name])
-        print(f"{name:24}{cells}   growth {costs[name][-1][1] / costs[name][0][1] - 1.0:+.0%}", flush=True)
+        print(f"{name:40}{cells}   growth {costs[name][-1][1] / costs[name][0][1] - 1.0:+.0%}", flush=True)
     cells = "".join(
-        f"{count:>8}: {value / received_messages(count, simulated_time(count), RATE):.4f} ms"
+        f"{count:>8}: {value / received_messages(count, STATION_SECONDS, RATE):.4f} ms"
         for count, value in costs["stations, all receive"]
     )
-    print(f"{'  per received message':24}{cells}")
+    print(f"{'  per received message':40}{cells}")
     if options.plot:
         draw(costs, options.plot)
         print(f"wrote {options.plot}")

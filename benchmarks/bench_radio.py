@@ -109,22 +109,24 @@ def run(stations: int, seconds: float, technology: str, create_events: bool) -> 
 
 @contextmanager
 def complete_simulation(
-    stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str
+    stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str, length: float = LENGTH
 ) -> Iterator[Simulation]:
-    """Yield a loaded run of a generated scenario."""
+    """Yield a loaded run of a generated scenario, whose stations start on `length` meters of a road."""
     channel = (
         f"{{model: radio, jitter: {TICK}, line_of_sight: {sight}, path_loss: {{kind: tr37885, environment: highway}}}}"
     )
     with TemporaryDirectory() as folder:
-        path = write_scenario(Path(folder), stations, rate=rate, all_listen=all_listen)
+        path = write_scenario(Path(folder), stations, rate=rate, all_listen=all_listen, length=length)
         settings = RunSettings(dt=TICK, channel=channel, time_limit=seconds)
         with Simulation(load_for_seed(path, 1, {}), seed=1, settings=settings) as simulation:
             yield simulation
 
 
-def complete_run(stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str) -> float:
+def complete_run(
+    stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str, length: float = LENGTH
+) -> float:
     """Return the simulated time per processor time, without loading and the final statistics."""
-    with complete_simulation(stations, seconds, rate, all_listen, sight) as simulation:
+    with complete_simulation(stations, seconds, rate, all_listen, sight, length) as simulation:
         started = time.process_time()
         end = None
         while end is None:

@@ -6,7 +6,7 @@ from itertools import cycle
 from pathlib import Path
 
 LENGTH = 2000.0
-"""Length over which the cars are spread at the start [m]."""
+"""Default length over which the cars are spread at the start [m]."""
 SPEED = 25.0
 """Speed of the cars [m/s]."""
 EGO = "Car000"
@@ -48,7 +48,9 @@ _START = """
 </Private>"""
 
 
-def write_scenario(folder: Path, stations: int, *, rate: float | None, all_listen: bool) -> Path:
+def write_scenario(
+    folder: Path, stations: int, *, rate: float | None, all_listen: bool, length: float = LENGTH
+) -> Path:
     """Write the scenario and its road to this folder, and return its path.
 
     The cars are scripted, without physics, so that the measurement covers stations and radio. They have an oracle with
@@ -56,17 +58,19 @@ def write_scenario(folder: Path, stations: int, *, rate: float | None, all_liste
 
     rate        of the messages [Hz]; None: by the ETSI generation rules for CAM
     all_listen  whether every station receives from all others, or only the first one
+    length      of the road over which the cars are spread at the start [m]
     """
     road = folder / "straight.xodr"
+    road_length = length + 3.0 * LENGTH
     sides = {
         side: "".join(_LANE.format(id=lane) for lane in lanes)
         for side, lanes in (("left", (2, 1)), ("right", (-1, -2)))
     }
     road.write_text(
         '<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="6" name="straight"/>'
-        f'<road name="straight" length="{4.0 * LENGTH:g}" id="1" junction="-1" rule="RHT"><link/>'
+        f'<road name="straight" length="{road_length:g}" id="1" junction="-1" rule="RHT"><link/>'
         '<type s="0" type="motorway"/><planView>'
-        f'<geometry s="0" x="0" y="0" hdg="0" length="{4.0 * LENGTH:g}"><line/></geometry></planView>'
+        f'<geometry s="0" x="0" y="0" hdg="0" length="{road_length:g}"><line/></geometry></planView>'
         f'<lanes><laneSection s="0"><left>{sides["left"]}</left>'
         '<center><lane id="0" type="none" level="false"/></center>'
         f"<right>{sides['right']}</right></laneSection></lanes></road></OpenDRIVE>"
@@ -85,7 +89,7 @@ def write_scenario(folder: Path, stations: int, *, rate: float | None, all_liste
         for name in names
     )
     starts = "".join(
-        _START.format(name=name, lane=lane, s=LENGTH * (1.5 + number / stations), speed=SPEED)
+        _START.format(name=name, lane=lane, s=1.5 * LENGTH + length * number / stations, speed=SPEED)
         for number, (name, lane) in enumerate(zip(names, cycle((-2, -1, 1, 2)), strict=False))
     )
     scenario = folder / "stations.xosc"

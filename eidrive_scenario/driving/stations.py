@@ -74,6 +74,8 @@ class Stations(DrivingStack):
         self._agents: dict[str, Agent] = {}
         self._next_numbers: dict[str, int] = {}
         """Sequence number of the next message of each removed station."""
+        self._receivers: dict[str, tuple[str, ...]] = {}
+        """Receivers of each sender; empty after each change."""
         self._rigs: dict[str, Rig] = {}
         self._signal_sensors: dict[str, SignalSensor] = {}
         self._overrides: dict[str, ControlOverrides] = {}
@@ -151,6 +153,7 @@ class Stations(DrivingStack):
         settings = self._settings.get(spec.name)
         if settings is None:
             return
+        self._receivers.clear()
         context, station = self._context, ErrorSubject(f"station {spec.name!r}")
         self._rigs[spec.name] = station.call(build_rig, settings, spec, seed=context.seed)
         detector = self._detectors.pop(spec.name, None) or station.call(build_detector, settings)
@@ -176,6 +179,7 @@ class Stations(DrivingStack):
             self._overrides[spec.name] = ControlOverrides(spec, context.dt)
 
     def remove(self, name: str) -> None:
+        self._receivers.clear()
         if name in self._agents:
             self._next_numbers[name] = self._agents[name].next_message_number
         for held in (self._agents, self._min_existence, self._rigs, self._signal_sensors, self._overrides):
@@ -245,20 +249,26 @@ class Stations(DrivingStack):
         """
         if self._channel is None:
             return ()
-        listening = {name: agent for name, agent in self._agents.items() if agent.receives_messages}
-        own_perception = self._own_perception
         outbox = []
         for sender, step in steps.items():
             if step.outbox:
-                receivers = [
-                    name
-                    for name, agent in listening.items()
-                    if agent.receives_from(sender, own_perception=own_perception)
-                ]
+                receivers = self._receivers_of(sender)
                 outbox += [(message, receivers) for message in step.outbox]
         events = self._channel.transmit(outbox, now)
         self._statistics = None
         return self._checked_events(events)
+
+    def _receivers_of(self, sender: str) -> tuple[str, ...]:
+        """Return the present receivers of a station; they are the same until a station or the channel changes."""
+        receivers = self._receivers.get(sender)
+        if receivers is None:
+            own_perception = self._own_perception
+            receivers = self._receivers[sender] = tuple(
+                name
+                for name, agent in self._agents.items()
+                if agent.receives_messages and agent.receives_from(sender, own_perception=own_perception)
+            )
+        return receivers
 
     def final_links(self) -> Sequence[LinkEvent]:
         channel = self._channel or self._retired_channel
@@ -320,5 +330,6 @@ class Stations(DrivingStack):
         self._checked_channel = self._channel if third_party else None
         self._retired_channel = before if self._channel is None else None
         self._statistics = None
+        self._receivers.clear()
         self._channel_profile = profile
         self._channel_name = profile.name if profile is not None else NO_COOPERATION

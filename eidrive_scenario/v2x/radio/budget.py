@@ -79,6 +79,8 @@ class LinkBudget:
         self._rows: dict[str, int] = {}
         self._first = self._second = np.zeros(0, dtype=np.int64)
         self._normals, self._updates, self._places = np.zeros((2, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        self._pairs: list[tuple[str, str]] | None = None
+        """Names of the stations of each pair; None until line of sight is determined by rays."""
         self._set_stations(())
 
     def continue_from(self, previous: LinkBudget) -> None:
@@ -91,7 +93,7 @@ class LinkBudget:
         names = surroundings.names
         if names != self._names:
             self._set_stations(names)
-        return self._at_scalar(surroundings) if 0 < len(self._pairs) <= MAX_SCALAR else self._at_array(surroundings)
+        return self._at_scalar(surroundings) if 0 < len(self._first) <= MAX_SCALAR else self._at_array(surroundings)
 
     def _at_array(self, surroundings: RadioEnvironment) -> Budget:
         from scipy.special import ndtr
@@ -149,7 +151,7 @@ class LinkBudget:
             links.append(link)
         if self._line_of_sight == "rays" and surroundings.sight is not None and links:
             near = [pair for pair, link in enumerate(links) if link.distance < self._reach]
-            sight = surroundings.sight([self._pairs[pair] for pair in near])
+            sight = surroundings.sight(self._names_of(near))
             for ray, (pair, state, top) in enumerate(
                 zip(near, sight.states.tolist(), sight.heights.tolist(), strict=True)
             ):
@@ -206,7 +208,7 @@ class LinkBudget:
         """Index of the pair of two rows; the number of pairs on the diagonal."""
         self._pair_at[first, second] = self._pair_at[second, first] = np.arange(len(first))
         self._normals, self._updates, self._places = normals, updates, places
-        self._pairs = [(names[a], names[b]) for a, b in zip(first.tolist(), second.tolist(), strict=True)]
+        self._pairs = None
 
         def keys(purpose: str) -> Keys:
             own = np.array([key(self._seed, purpose, name) for name in names], dtype=np.uint64)
@@ -214,6 +216,14 @@ class LinkBudget:
 
         self._keys = np.stack([keys("shadowing"), keys("blockage")])
         self._sight_keys = keys("sight")
+
+    def _names_of(self, pairs: Sequence[int]) -> Sequence[tuple[str, str]]:
+        """Return the names of the stations of these pairs."""
+        if self._pairs is None:
+            names, ends = self._names, zip(self._first.tolist(), self._second.tolist(), strict=True)
+            self._pairs = [(names[a], names[b]) for a, b in ends]
+        known = self._pairs
+        return known if len(pairs) == len(known) else [known[pair] for pair in pairs]
 
     def _link_geometry(
         self, surroundings: RadioEnvironment, positions: Array, distance: Array
@@ -231,8 +241,7 @@ class LinkBudget:
             states[hidden], tops[hidden], vehicles[hidden] = NLOSV, upper[hidden] + 0.1, 1
         elif self._line_of_sight == "rays" and surroundings.sight is not None and count:
             near = np.flatnonzero(distance < self._reach)
-            pairs = self._pairs if len(near) == count else [self._pairs[pair] for pair in near.tolist()]
-            sight = surroundings.sight(pairs)
+            sight = surroundings.sight(self._names_of(near.tolist()))
             states[near], tops[near] = sight.states, sight.heights
             for ray, names in sight.blockers.items():
                 pair = int(near[ray])

@@ -74,7 +74,7 @@ class RadioChannel(QueuedChannel):
         self._losses = LossProcess(profile.loss, seed)
         self._draws = LinkRandom(seed)
         self._rows: dict[str, int] = {}
-        self._receivers: dict[str, tuple[list[str], Integers]] = {}
+        self._receivers: dict[str, tuple[tuple[str, ...], Integers]] = {}
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
         self._access = self._new_access(())
         self._access.fading = self._fading
@@ -171,9 +171,9 @@ class RadioChannel(QueuedChannel):
     def _rows_of(self, sender: str, receivers: Sequence[str]) -> Integers:
         """Return the rows of present receivers. They are cached, because the receivers of a sender rarely change."""
         cached = self._receivers.get(sender)
-        if cached is None or cached[0] != list(receivers):
+        if cached is None or (cached[0] is not receivers and cached[0] != tuple(receivers)):
             rows = np.array([self._rows[name] for name in receivers if name in self._rows], dtype=np.int64)
-            cached = self._receivers[sender] = (list(receivers), rows)
+            cached = self._receivers[sender] = (tuple(receivers), rows)
         return cached[1]
 
     def _row(self, name: str) -> int:
