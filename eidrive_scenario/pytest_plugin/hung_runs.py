@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
+import subprocess
 import sys
 import tempfile
 from contextlib import suppress
@@ -24,6 +26,8 @@ from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 USUAL_LIMIT = 1800.0
 """Default wall limit of each run [s]."""
+WAIT = 5.0
+"""Maximum duration from the end of the output of a worker to that of its process [s]."""
 _WORKER_KEY = "eidrive_hung_runs"
 _reports = pytest.StashKey[Path]()
 """Folder of the reports of workers."""
@@ -82,8 +86,12 @@ def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
 
         limit = node.config.stash[_limit] or 0.0
         text = "\n".join([str(describe_dump(limit, text)), *notes, "", text])
-    elif not text and notes:
-        text = "\n".join(["the process of the run ended: it was killed, or native code crashed", *notes])
+    elif not text:
+        end = _end_of(node)
+        if notes:
+            text = "\n".join([f"the process of the run {end}", *notes])
+        else:
+            report.longrepr = f"the process of the test {end}\n\n{report.longrepr}"
     if crashitem.partition("::")[0].endswith(".xosc"):
         report.when = "setup"
     if not text:
@@ -92,6 +100,20 @@ def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
     add_notes(record, dict.fromkeys([*text.splitlines(), *notes]))
     report.eidrive, report.eidrive_is_crash = record.as_report(), True  # type: ignore[attr-defined]
     report.longrepr = f"{text}\n\n{report.longrepr}"
+
+
+def _end_of(node: Any) -> str:
+    """Return how the process of a worker ended."""
+    try:
+        code = node.gateway._io.popen.wait(WAIT)
+    except (AttributeError, subprocess.TimeoutExpired):  # a worker on another machine, or another version of execnet
+        return "ended: it was killed, or native code crashed"
+    if code >= 0:
+        return f"ended with exit code {code}"
+    try:
+        return f"was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was ended by signal {-code}"
 
 
 def wall_limit_of(config: pytest.Config) -> float | None:

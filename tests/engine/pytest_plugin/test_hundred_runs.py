@@ -75,7 +75,7 @@ def test_broken_runs_are_reported_as_what_they_are(junit: Path) -> None:
     assert "max_speed: " in fails[1]
     assert "limit 1 m/s" in fails[1]
     assert "invalid.xosc:" in invalid[1]
-    assert "the process of the run ended: it was killed" in killed[1]
+    assert "the process of the run was ended by SIGKILL" in killed[1]
     assert "crashed while running 'xosc/killed.xosc::xosc/killed[seed=1]'" in killed[1]
     for _, text in (endless, fails, killed):
         assert "reproduce: eidrive run" in text

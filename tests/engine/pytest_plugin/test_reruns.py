@@ -75,4 +75,26 @@ def test_killed_worker_with_reruns_does_not_affect_other_runs(
     result = pytester.runpytest_subprocess("xosc", "-n", "2", "--reruns", "1", "-p", "no:cacheprovider")
     outcomes = result.parseoutcomes()
     assert (outcomes["passed"], outcomes["errors"]) == (3, 1)
-    result.stdout.fnmatch_lines(["*the process of the run ended: it was killed, or native code crashed"])
+    result.stdout.fnmatch_lines(["*the process of the run was ended by SIGKILL"])
+
+
+def test_ended_worker_is_reported_with_signal_or_exit_code(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import os, signal
+
+        def test_exits():
+            os._exit(7)
+
+        def test_aborts():
+            os.kill(os.getpid(), signal.SIGABRT)
+
+        def test_passes():
+            pass
+        """
+    )
+    result = pytester.runpytest_subprocess("-n", "2", "-p", "no:cacheprovider", "-p", "no:faulthandler")
+    result.assert_outcomes(passed=1, failed=2)
+    result.stdout.fnmatch_lines_random(
+        ["the process of the test ended with exit code 7", "the process of the test was ended by SIGABRT"]
+    )
