@@ -14,6 +14,7 @@ from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
 from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
 from eidrive_scenario.driving.control.overrides import ControlOverrides
+from eidrive_scenario.driving.detector_batches import prepare_detectors
 from eidrive_scenario.driving.planning.area_checks import areas_off_road
 from eidrive_scenario.driving.report_fusion import fuse_reports
 from eidrive_scenario.driving.resolved_stations import resolved_stations
@@ -209,6 +210,7 @@ class Stations(DrivingStack):
             antennas = [(agent.spec, agent.settings.antenna_height) for agent in self._agents.values()]
             self._channel.update_environment(radio_environment(world, view, antennas, self._context.roads))
         self._readings = readings = read_stations(self._rigs, self._signal_sensors, world, view, inputs.signals)
+        prepare_detectors(self._agents, readings)
         now, own_perception = view.time, self._own_perception
         intervals = {name: self._min_message_interval(name) for name in self._agents}
         sensed = {

@@ -55,6 +55,8 @@ class Detector(ABC):
     """Type of the property `detector_settings`; None if the detector has no settings."""
     is_finite_by_construction: ClassVar[bool] = False
     """Whether a built-in detector only copies finite numbers, so that its results are not checked."""
+    processes_batches: bool = False
+    """Whether `prepare_batch` of a built-in detector has an effect."""
     library_versions: Mapping[str, str] = MappingProxyType({})
     """Versions of the libraries that compute the detections, by name; part of the resolved settings."""
     image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
@@ -69,6 +71,13 @@ class Detector(ABC):
 
     def setup(self, context: DetectorContext) -> None:  # noqa: B027 - an optional hook
         """Store the context before the first reading."""
+
+    @classmethod  # noqa: B027 - an optional hook
+    def prepare_batch(cls, detectors: Sequence[Detector], readings: Sequence[Readings]) -> None:
+        """Compute at once what `detect` of several stations needs for these readings of one tick.
+
+        Only built-in detectors are prepared. The next `detect` returns the same as without.
+        """
 
     @abstractmethod
     def detect(self, readings: Readings) -> Detections:

@@ -49,7 +49,7 @@ from eidrive_scenario.perception.learned.weight_files import (
 )
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
+from eidrive_scenario.sensing.readings import CameraReading, LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.settings import Settings
 
@@ -126,6 +126,9 @@ class LearnedDetector(Detector):
         check_weights_exist(path)
         self.library_versions = runtime_versions(select_runtime(path, self.settings.runtime, self.settings.device))
         self._network: ImageNetwork | None = None
+        self.processes_batches = self.settings.device == "cuda"
+        self._prepared: Mapping[str, ImageDetections] = {}
+        """Detections in the next images, by camera, after `prepare_batch`."""
         self._map_context = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
@@ -146,6 +149,25 @@ class LearnedDetector(Detector):
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
 
+    @classmethod
+    def prepare_batch(cls, detectors: Sequence[Detector], readings: Sequence[Readings]) -> None:
+        """Find the objects in the images of all stations; images of equal networks form one batch."""
+        batches: dict[str, list[tuple[LearnedDetector, str, CameraReading]]] = {}
+        networks: dict[str, ImageNetwork] = {}
+        for detector, of_station in zip(detectors, readings, strict=True):
+            assert isinstance(detector, LearnedDetector)
+            detector.load_weights()
+            network, detector._prepared = detector._network, {}
+            assert network is not None
+            if network.identity is not None:
+                networks[network.identity] = network
+                batch = batches.setdefault(network.identity, [])
+                batch += [(detector, camera, image) for camera, image in of_station.cameras.items()]
+        for identity, batch in batches.items():
+            found = networks[identity].find_in_all([image for _, _, image in batch])
+            for (detector, camera, _), one in zip(batch, found, strict=True):
+                detector._prepared = {**detector._prepared, camera: one}
+
     def detect(self, readings: Readings) -> Detections:
         """Return the road users in the images of all cameras with a reading."""
         self.load_weights()
@@ -163,7 +185,11 @@ class LearnedDetector(Detector):
         return objects
 
     def _process(self, network: ImageNetwork, readings: Readings) -> StationDetections:
-        images = {camera: network.find_in(reading) for camera, reading in readings.cameras.items()}
+        prepared, self._prepared = self._prepared, {}
+        images = {
+            camera: prepared[camera] if camera in prepared else network.find_in(reading)
+            for camera, reading in readings.cameras.items()
+        }
         signals = self._lights.read(images, readings.cameras)
         parts = [self._lift_image(found, readings, camera) for camera, found in images.items()]
         return StationDetections(images, signals, merge_duplicates(parts, readings.time))

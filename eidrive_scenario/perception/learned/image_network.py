@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -33,6 +34,14 @@ class Candidates:
     classes: Integers
 
 
+class _Scaled(NamedTuple):
+    """Image in the size of the network input, its scales (2,) in x and y, and its offset (2,) in that input [px]."""
+
+    pixels: NDArray[np.uint8]
+    scale: Array
+    corner: Array
+
+
 class ImageNetwork(ABC):
     """Detector of objects in images of any size, which are scaled to the input size.
 
@@ -55,21 +64,35 @@ class ImageNetwork(ABC):
         """Return the objects in the image of a camera."""
         return self.find(reading.rgb)
 
+    def find_in_all(self, readings: Sequence[CameraReading]) -> list[ImageDetections]:
+        """Return the objects in the image of each camera, as `find_in` does."""
+        return [self.find_in(reading) for reading in readings]
+
     def find(self, image: NDArray[np.uint8]) -> ImageDetections:
         """Return the objects in an image (H, W, 3), red green blue. Boxes without an area in the image are removed."""
-        height, width = image.shape[:2]
+        return self._find_all([image])[0]
+
+    def _find_all(self, images: Sequence[NDArray[np.uint8]]) -> list[ImageDetections]:
+        scaled = [self._scaled(image) for image in images]
+        candidates = self.candidates_of([one.pixels for one in scaled])
+        return [self._detections(*one) for one in zip(images, scaled, candidates, strict=True)]
+
+    def _scaled(self, image: NDArray[np.uint8]) -> _Scaled:
         if self.letterbox:
-            scaled, scale, corner = letterboxed(image, self.input_size)
-        else:
-            scaled, corner = resized(image, self.input_size), np.zeros(2)
-            scale = np.array([self.input_size[0] / width, self.input_size[1] / height])
-        candidates = _finite(self.candidates(scaled))
+            return _Scaled(*letterboxed(image, self.input_size))
+        height, width = image.shape[:2]
+        scale = np.array([self.input_size[0] / width, self.input_size[1] / height])
+        return _Scaled(resized(image, self.input_size), scale, np.zeros(2))
+
+    def _detections(self, image: NDArray[np.uint8], scaled: _Scaled, candidates: Candidates) -> ImageDetections:
+        height, width = image.shape[:2]
+        candidates = _finite(candidates)
         if len(candidates.scores) > MOST_CANDIDATES:
             best = np.argsort(-candidates.scores, kind="stable")[:MOST_CANDIDATES]
             candidates = Candidates(candidates.boxes[best], candidates.scores[best], candidates.classes[best])
         groups = self._groups[candidates.classes]
         kept = suppress(candidates.boxes, candidates.scores, groups, LARGEST_OVERLAP)
-        boxes = (candidates.boxes[kept] - np.tile(corner, 2)) / np.tile(scale, 2)
+        boxes = (candidates.boxes[kept] - np.tile(scaled.corner, 2)) / np.tile(scaled.scale, 2)
         boxes[:, 0::2] = boxes[:, 0::2].clip(0.0, width)
         boxes[:, 1::2] = boxes[:, 1::2].clip(0.0, height)
         visible = (boxes[:, 2:] > boxes[:, :2]).all(axis=1)
@@ -80,6 +103,10 @@ class ImageNetwork(ABC):
     @abstractmethod
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
         """Return all boxes of at least the minimum confidence in an image of the input size."""
+
+    def candidates_of(self, images: Sequence[NDArray[np.uint8]]) -> list[Candidates]:
+        """Return the boxes in each image of the input size, as `candidates` does."""
+        return [self.candidates(image) for image in images]
 
 
 def _finite(candidates: Candidates) -> Candidates:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -22,8 +22,10 @@ from eidrive_scenario.perception.learned.weight_files import read_weights
 from eidrive_scenario.perception.learned.weights import Weights, read, suitable
 from eidrive_scenario.sensing.readings import CameraReading
 
-Infer = Callable[[NDArray[np.uint8]], list[Floats]]
-"""Function from an image (H, W, 3) of the input size to all outputs of a network."""
+Infer = Callable[[Sequence[NDArray[np.uint8]]], list[list[Floats]]]
+"""Function from images (H, W, 3) of the input size to all outputs of a network for each."""
+GPU_BATCH = 4
+"""Images that a GPU processes at once: as fast as one image, because the number of kernels limits both."""
 
 
 class OwnNetwork(ImageNetwork):
@@ -54,15 +56,35 @@ class OwnNetwork(ImageNetwork):
     def find_in(self, reading: CameraReading) -> ImageDetections:
         """Return the objects in the image of a camera; an image whose detections are stored is not drawn."""
         memory = image_memory.active()
-        digest = None if memory is None else reading.image_digest
-        if memory is None or digest is None:
+        if memory is None or reading.image_digest is None:
             return self.find(reading.rgb)
-        key = self.identity, reading.size, digest
+        key = self._key_of(reading)
         found = memory.images.get(key)
         if found is None:
             found = self.find(reading.rgb)
             memory.images.add(key, found)
         return found
+
+    def find_in_all(self, readings: Sequence[CameraReading]) -> list[ImageDetections]:
+        """Return the objects in the image of each camera; images whose detections are not stored form one batch."""
+        memory = image_memory.active()
+        if memory is None:
+            return self._find_all([reading.rgb for reading in readings])
+        keys = [self._key_of(reading) for reading in readings]
+        found = [memory.images.get(key) for key in keys]
+        missing = [row for row, known in enumerate(found) if known is None]
+        fresh = self._find_all([readings[row].rgb for row in missing])
+        for row, one in zip(missing, fresh, strict=True):
+            image_memory.read_only(one.boxes, one.scores)
+            memory.images.add(keys[row], one)
+            found[row] = one
+        return [one for one in found if one is not None]
+
+    def _key_of(self, reading: CameraReading) -> image_memory.Key:
+        digest = reading.image_digest
+        if digest is None:
+            return image_memory.key_of(self.identity, reading.rgb)
+        return self.identity, reading.size, digest
 
     def find(self, image: NDArray[np.uint8]) -> ImageDetections:
         memory = image_memory.active()
@@ -77,7 +99,14 @@ class OwnNetwork(ImageNetwork):
         return found
 
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
-        outputs = self._infer(image)
+        return self._candidates(self._infer([image])[0])
+
+    def candidates_of(self, images: Sequence[NDArray[np.uint8]]) -> list[Candidates]:
+        if len(images) == 1:
+            return [self.candidates(images[0])]
+        return [self._candidates(outputs) for outputs in self._infer(images)]
+
+    def _candidates(self, outputs: list[Floats]) -> Candidates:
         if self._anchors is None:
             return ssd_candidates(ssd_scales(outputs), self.confidence)
         return yolo_candidates(self._anchors, yolo_scales(outputs), self.confidence)
@@ -93,11 +122,11 @@ def _loaded(path: Path, digest: str, runtime: Runtime, threads: int, device: Dev
 
         with suitable(path):
             network = trainable(weights)
-        return weights, TorchNetwork(network, threads, device)
+        return weights, TorchNetwork(network, threads, device, GPU_BATCH if device == "cuda" else 1)
     with suitable(path):
         content = weights.onnx()
     compute = load_onnx(runtime, path, threads, content)
-    return weights, lambda image: compute(_planes(image))
+    return weights, lambda images: [compute(_planes(image)) for image in images]
 
 
 def _planes(image: NDArray[np.uint8]) -> Floats:

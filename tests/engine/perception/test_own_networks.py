@@ -20,7 +20,7 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.perception.learned import detector, runtime_selection
 from eidrive_scenario.perception.learned.detector import SHIPPED, LearnedSettings, YoloDetector, build_network
-from eidrive_scenario.perception.learned.own_network import OwnNetwork
+from eidrive_scenario.perception.learned.own_network import Infer, OwnNetwork
 from eidrive_scenario.perception.learned.runtime_selection import Runtime, is_installed, select_runtime
 from eidrive_scenario.perception.learned.weights import read
 from eidrive_scenario.settings import parse_settings
@@ -42,8 +42,8 @@ def installed(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
         monkeypatch.setattr(module, "is_installed", lambda name: name in names)
 
 
-def noise() -> NDArray[np.uint8]:
-    return np.random.default_rng(7).integers(0, 256, (384, 512, 3), dtype=np.uint8)
+def noise(seed: int = 7) -> NDArray[np.uint8]:
+    return np.random.default_rng(seed).integers(0, 256, (384, 512, 3), dtype=np.uint8)
 
 
 @NETWORKS
@@ -72,7 +72,7 @@ def test_runtime_outputs_equal_trained_network_of_torch(name: str, runtime: Runt
     with torch.inference_mode():
         pixels = torch.from_numpy(noise().transpose(2, 0, 1)[None] / np.float32(255.0))
         expected = [output.numpy() for output in trained.eval().raw_outputs(pixels)]
-    outputs = OwnNetwork(path, runtime)._infer(noise())
+    outputs = OwnNetwork(path, runtime)._infer([noise()])[0]
     for found, wanted in zip(outputs, expected, strict=True):
         np.testing.assert_allclose(found, wanted, atol=1e-3)
 
@@ -85,7 +85,7 @@ def test_runtime_returns_equal_bits_in_separate_processes(runtime: Runtime) -> N
         "from pathlib import Path\n"
         "from eidrive_scenario.perception.learned.own_network import OwnNetwork\n"
         "image = np.random.default_rng(7).integers(0, 256, (384, 512, 3), dtype=np.uint8)\n"
-        "outputs = OwnNetwork(Path(sys.argv[1]), sys.argv[2])._infer(image)\n"
+        "outputs = OwnNetwork(Path(sys.argv[1]), sys.argv[2])._infer([image])[0]\n"
         "print(hashlib.sha256(b''.join(output.tobytes() for output in outputs)).hexdigest())\n"
         "print('torch' in sys.modules, 'openvino_telemetry' in sys.modules)\n"
     )
@@ -94,7 +94,7 @@ def test_runtime_returns_equal_bits_in_separate_processes(runtime: Runtime) -> N
     digest, imported = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n", 1)
     network = OwnNetwork(path, runtime)
     for _ in range(2):
-        outputs = network._infer(noise())
+        outputs = network._infer([noise()])[0]
         assert hashlib.sha256(b"".join(output.tobytes() for output in outputs)).hexdigest() == digest
     assert imported.split() == [str(runtime == "torch"), "False"]
 
@@ -173,12 +173,45 @@ def test_device_cuda_without_gpu_raises_error(monkeypatch: pytest.MonkeyPatch) -
         build_network("ssd", LearnedSettings(device="cuda"))
 
 
+def assert_independent_of_the_batch(infer: Infer) -> None:
+    """Assert that the outputs for an image are equal bits alone, among others, and in any order."""
+    images = [noise(seed) for seed in range(6)]
+    alone = [infer([image])[0] for image in images]
+    assert infer([]) == []
+    for order in ([0, 1], [2, 1, 0], [5, 4, 3, 2, 1, 0], [1, 1, 1]):
+        together = infer([images[number] for number in order])
+        for number, outputs in zip(order, together, strict=True):
+            for found, expected in zip(outputs, alone[number], strict=True):
+                np.testing.assert_array_equal(found, expected)
+
+
+@NETWORKS
+def test_outputs_do_not_depend_on_other_images_of_the_batch(name: str) -> None:
+    pytest.importorskip("torch", reason="needs the extra 'learned'")
+    from eidrive_scenario.perception.learned.torch_network import TorchNetwork
+    from eidrive_scenario.perception.learned.torch_weights import trainable
+
+    batched, single = (TorchNetwork(trainable(read(SHIPPED / f"{name}.npz")), 1, batch=batch) for batch in (4, 1))
+    assert_independent_of_the_batch(batched)
+    for found, expected in zip(batched([noise()])[0], single([noise()])[0], strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+
+
+@NETWORKS
+def test_outputs_of_a_gpu_do_not_depend_on_other_images(name: str) -> None:
+    torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
+    if not torch.cuda.is_available():
+        pytest.skip("torch finds no GPU")
+    assert_independent_of_the_batch(OwnNetwork(SHIPPED / f"{name}.npz", "torch", device="cuda")._infer)
+
+
 def test_device_cuda_detects_the_same_objects() -> None:
     torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
     if not torch.cuda.is_available():
         pytest.skip("torch finds no GPU")
     outputs = [
-        OwnNetwork(SHIPPED / "yolov5.npz", "torch", device=device)._infer(noise()) for device in ("cpu", "cuda", "cuda")
+        OwnNetwork(SHIPPED / "yolov5.npz", "torch", device=device)._infer([noise()])[0]
+        for device in ("cpu", "cuda", "cuda")
     ]
     for on_cpu, first, second in zip(*outputs, strict=True):
         np.testing.assert_allclose(first, on_cpu, atol=1e-3)
