@@ -17,7 +17,7 @@ from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table
 from eidrive_scenario.fusion.report_history import ReportHistory
-from eidrive_scenario.fusion.tracks import Rows, join_rows, predict_tracks
+from eidrive_scenario.fusion.tracks import TRACK, predict_tracks, rows_of
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
@@ -86,12 +86,13 @@ class CovarianceIntersectionFusion(FusionMethod):
                 fused.update(zip(part, found, strict=True))
         return [fused[place] for place in range(len(methods))]
 
-    def _tracks(self, reports: Sequence[Report]) -> tuple[Rows, Integers]:
-        """Return the tracks of the stations of these reports in order of their names, and the rank of each station."""
+    def _select(self, reports: Sequence[Report]) -> tuple[Integers, Integers]:
+        """Return the rows of the tracks of the stations of these reports in order of their names, and the ranks of the
+        stations."""
         names = tuple([report.station for report in reports])
         if names != self._order[0]:
             self._order = names, tuple(sorted(set(names)))
-        return self._history.tracks(self._order[1])
+        return self._history.select(self._order[1])
 
 
 def _fuse_batch(
@@ -102,9 +103,13 @@ def _fuse_batch(
     ReportHistory.process([method._history for method in methods])
     for method in methods:
         method._history.evict_stale(now)
-    rows, ranks = zip(*(method._tracks(held) for method, held in zip(methods, reports, strict=True)), strict=True)
-    tracks = join_rows(rows)
-    tracks["receiver"] = np.repeat(np.arange(len(methods)), [len(part) for part in rows])
+    rows, ranks = zip(*(method._select(held) for method, held in zip(methods, reports, strict=True)), strict=True)
+    counts = [len(part) for part in rows]
+    tracks: Table = np.empty(sum(counts), TRACK)
+    ends = np.cumsum(counts).tolist()
+    for method, part, end in zip(methods, rows, ends, strict=True):
+        method._history.copy_rows(part, rows_of(tracks)[end - len(part) : end])
+    tracks["receiver"] = np.repeat(np.arange(len(methods)), counts)
     tracks["station"] = np.concatenate(ranks)
     recent = now - tracks["seen"] <= settings.max_age + TIME_TOLERANCE
     if not recent.all():

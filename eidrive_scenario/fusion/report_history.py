@@ -6,23 +6,28 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import msgspec
 import numpy as np
 
 from eidrive_scenario.arrays import Integers
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import AssociationGate
-from eidrive_scenario.fusion.tracks import TRACK, Rows, join_rows, rows_of, update_tracks
+from eidrive_scenario.fusion.pairs import AssociationGate, Table, ranges
+from eidrive_scenario.fusion.tracks import TRACK, Rows, rows_of, update_tracks
 
 _NO_ROWS = rows_of(np.zeros(0, TRACK))
+_SPARE = 16
+"""Minimum number of free rows of a table after it is enlarged."""
 
 
 class _Entry(msgspec.Struct, frozen=True, gc=False):
-    """Report of one station, and the tracks of the station after it."""
+    """Report of one station, and the tracks of the station after it: rows `start` to `end` of `rows`."""
 
     report: Report
     rows: Rows
+    start: int
+    end: int
 
 
 @dataclass(slots=True)
@@ -34,38 +39,16 @@ class _History:
     begin: float = -math.inf
     latest: float = -math.inf
     """Time of the last processed report [s]."""
-    rows: Rows = field(default_factory=lambda: _NO_ROWS)
-    """Tracks of the station after the last processed report."""
-    place: tuple[int, int] | None = None
-    """First and last row of the tracks in the table of the receiving station; None outside the table."""
+    start: int = 0
+    """First row of the tracks after the last processed report, in the table of the receiving station."""
+    end: int = 0
+    """Row after the last of these tracks."""
 
-    def due(self) -> Sequence[Report]:
-        """Return the unprocessed reports in order, after rollback of the tracks to the first of them."""
-        if len(self.new) == 1 and self.latest < self.new[0].detections.time < math.inf:
-            return [self.new.pop()]
-        reports = [entry.report for entry in self.entries]
-        kept = len(reports)
-        for report in self.new:
-            time = report.detections.time
-            if not self.begin < time < math.inf:
-                continue
-            place = bisect_left(reports, time, key=lambda held: held.detections.time)
-            again = place < len(reports) and reports[place].detections.time == time
-            reports[place : place + again] = [report]
-            kept = min(kept, place)
-        self.new.clear()
-        if kept < len(self.entries):
-            del self.entries[kept:]
-            last = self.entries[-1] if self.entries else None
-            self.latest = self.begin if last is None else last.report.detections.time
-            self.rows = _NO_ROWS if last is None else last.rows
-        return reports[kept:]
-
-    def add_entry(self, report: Report, rows: Rows, span: float) -> None:
+    def add_entry(self, report: Report, rows: Rows, start: int, end: int, span: float) -> None:
         """Store the tracks after a report, and delete reports that are older by more than `span` [s]."""
         entries, time = self.entries, report.detections.time
-        entries.append(_Entry(report, rows))
-        self.latest, self.rows = time, rows
+        entries.append(_Entry(report, rows, start, end))
+        self.latest = time
         while len(entries) > 1 and entries[1].report.detections.time < time - span:
             del entries[0]
             self.begin = entries[0].report.detections.time
@@ -89,11 +72,13 @@ class ReportHistory:
         """Histories with unprocessed reports."""
         self._next_eviction = math.inf
         """Time up to which no station is evicted [s]."""
-        self._order: tuple[str, ...] = ()
         self._rows = _NO_ROWS
-        self._ranks: Integers = np.zeros(0, np.int64)
-        self._complete = False
-        """Whether the table has the rows of all tracks of the stations in `_order`."""
+        """Table with the tracks of each station in consecutive rows; other rows are free."""
+        self._used = 0
+        """Number of rows up to the last one that may belong to a station."""
+        self._order: tuple[str, ...] = ()
+        self._selection: tuple[Integers, Integers] | None = None
+        """Result of `select` for the stations in `_order`; None after a change of the rows."""
 
     @property
     def stations(self) -> frozenset[str]:
@@ -105,7 +90,7 @@ class ReportHistory:
         history = self._histories.get(report.station)
         if history is None:
             history = self._histories[report.station] = _History()
-            self._complete = False
+            self._selection = None
         history.new.append(report)
         self._updated[report.station] = history
 
@@ -121,44 +106,31 @@ class ReportHistory:
         for station, history in list(self._histories.items()):
             if history.latest < oldest:
                 del self._histories[station]
-                self._complete = False
+                self._selection = None
         latest = min([history.latest for history in self._histories.values()], default=math.inf)
         self._next_eviction = latest + 2.0 * self.span
 
-    def tracks(self, stations: tuple[str, ...]) -> tuple[Rows, Integers]:
-        """Return the tracks of these stations in this order, and the index of the station of each (N,).
+    def tracks(self, stations: tuple[str, ...]) -> Rows:
+        """Return the tracks (N,) of these stations in this order.
 
-        Each station has one row per object, at its newest processed report. The rows are valid until the next
-        `process`.
+        Each station has one row per object, at its newest processed report.
         """
-        if not self._complete or stations != self._order:
-            self._arrange(stations)
-        return self._rows, self._ranks
+        return self._rows.take(self.select(stations)[0])
 
-    def _arrange(self, stations: tuple[str, ...]) -> None:
-        """Build the table of these stations."""
-        for history in self._histories.values():
-            history.place = None
-        present = [
-            (rank, self._histories[station]) for rank, station in enumerate(stations) if station in self._histories
-        ]
-        start = 0
-        for _, history in present:
-            end = start + len(history.rows)
-            history.place, start = (start, end), end
-        self._order, self._complete = stations, True
-        self._rows = np.concatenate([_NO_ROWS, *[history.rows for _, history in present]])
-        self._ranks = np.repeat([rank for rank, _ in present], [len(history.rows) for _, history in present])
+    def select(self, stations: tuple[str, ...]) -> tuple[Integers, Integers]:
+        """Return rows (N,) of the table with the tracks of these stations in this order, and the index of the station
+        of each. They are valid until the next `process`."""
+        if self._selection is None or stations != self._order:
+            histories = self._histories
+            known = [(rank, histories[station]) for rank, station in enumerate(stations) if station in histories]
+            starts, ends = _ends_of([history for _, history in known])
+            number, rows = ranges(starts, ends, np.arange(self._used))
+            self._order, self._selection = stations, (rows, np.array([rank for rank, _ in known], np.int64)[number])
+        return self._selection
 
-    def _refresh(self, history: _History) -> None:
-        """Write the tracks of a station to the table, which is incomplete if their number changed."""
-        if history.place is None or not self._complete:
-            return
-        start, end = history.place
-        if len(history.rows) == end - start:
-            self._rows[start:end] = history.rows
-        else:
-            self._complete = False
+    def copy_rows(self, rows: Integers, out: Rows) -> None:
+        """Copy rows (N,) of the table to `out` (N,)."""
+        self._rows.take(rows, out=out, mode="clip")  # the mode `raise` copies twice
 
     @staticmethod
     def process(histories: Sequence[ReportHistory]) -> None:
@@ -166,44 +138,118 @@ class ReportHistory:
 
         The result equals that of a separate call for each.
         """
-        due: list[tuple[int, _History, Sequence[Report]]] = []
+        receivers: list[int] = []
+        updated: list[_History] = []
+        reports: list[Report] = []
+        several: list[tuple[int, _History, Sequence[Report]]] = []
         for receiver, owner in enumerate(histories):
+            oldest = math.inf
             for history in owner._updated.values():
-                if reports := history.due():
-                    due.append((receiver, history, reports))
-                owner._next_eviction = min(owner._next_eviction, history.latest + 2.0 * owner.span)
+                new = history.new
+                if len(new) == 1 and history.latest < new[0].detections.time < math.inf:
+                    receivers.append(receiver)
+                    updated.append(history)
+                    reports.append(new.pop())
+                elif due := owner._due(history):
+                    receivers.append(receiver)
+                    updated.append(history)
+                    reports.append(due[0])
+                    if len(due) > 1:
+                        several.append((receiver, history, due))
+                if history.latest < oldest:
+                    oldest = history.latest
+            owner._next_eviction = min(owner._next_eviction, oldest + 2.0 * owner.span)
             owner._updated.clear()
-        changed = due
-        while due:
-            first = histories[0]
-            _advance(
-                [receiver for receiver, _, _ in due],
-                [history for _, history, _ in due],
-                [reports[0] for _, _, reports in due],
-                first._gate,
-                first.span,
-            )
-            due = [(receiver, history, reports[1:]) for receiver, history, reports in due if len(reports) > 1]
-        for receiver, history, _ in changed:
-            histories[receiver]._refresh(history)
+        place = 0
+        while reports:
+            _advance(histories, receivers, updated, reports)
+            place += 1
+            several = [(receiver, history, due) for receiver, history, due in several if len(due) > place]
+            receivers = [receiver for receiver, _, _ in several]
+            updated = [history for _, history, _ in several]
+            reports = [due[place] for _, _, due in several]
+
+    def _due(self, history: _History) -> Sequence[Report]:
+        """Return the unprocessed reports of a station in order, after rollback of its tracks to the first of them."""
+        reports = [entry.report for entry in history.entries]
+        kept = len(reports)
+        for report in history.new:
+            time = report.detections.time
+            if not history.begin < time < math.inf:
+                continue
+            place = bisect_left(reports, time, key=lambda held: held.detections.time)
+            again = place < len(reports) and reports[place].detections.time == time
+            reports[place : place + again] = [report]
+            kept = min(kept, place)
+        history.new.clear()
+        if kept < len(history.entries):
+            del history.entries[kept:]
+            last = history.entries[-1] if history.entries else None
+            history.latest = history.begin if last is None else last.report.detections.time
+            self._store(history, _NO_ROWS if last is None else last.rows[last.start : last.end])
+        return reports[kept:]
+
+    def _store(self, history: _History, tracks: Rows) -> None:
+        """Write the tracks of a station to the table, to other rows if their number has changed."""
+        if history.end - history.start != len(tracks):
+            history.start = history.end = 0
+            self._selection = None
+            if self._used + len(tracks) > len(self._rows):
+                self._enlarge(len(tracks))
+            history.start, history.end = self._used, self._used + len(tracks)
+            self._used = history.end
+        self._rows[history.start : history.end] = tracks
+
+    def _enlarge(self, count: int) -> None:
+        """Replace the table by one with at least `count` free rows, without free rows between those of stations."""
+        histories = list(self._histories.values())
+        starts, ends = _ends_of(histories)
+        _, rows = ranges(starts, ends, np.arange(self._used))
+        used = len(rows)
+        table = np.zeros(2 * (used + count) + _SPARE, TRACK).view(_NO_ROWS.dtype)
+        self.copy_rows(rows, table[:used])
+        self._rows, self._used, self._selection = table, used, None
+        end = 0
+        for history in histories:
+            start, end = end, end + history.end - history.start
+            history.start, history.end = start, end
+
+
+def _ends_of(histories: Sequence[_History]) -> tuple[Integers, Integers]:
+    """Return the first row of the tracks of each station, and the one after the last."""
+    starts = np.array([history.start for history in histories], np.int64)
+    return starts, np.array([history.end for history in histories], np.int64)
 
 
 def _advance(
+    owners: Sequence[ReportHistory],
     receivers: Sequence[int],
     histories: Sequence[_History],
     reports: Sequence[Report],
-    gate: AssociationGate,
-    span: float,
 ) -> None:
-    """Process one report of each station."""
-    before = [history.rows for history in histories]
-    tracks = join_rows(before)
-    counts = [len(rows) for rows in before]
-    tracks["receiver"] = np.repeat(receivers, counts)
-    tracks["station"] = np.repeat(np.arange(len(reports)), counts)
+    """Process one report of each station; `receivers` ascend."""
+    starts, ends = _ends_of(histories)
+    station, rows = ranges(starts, ends, np.arange(max(owner._used for owner in owners)))
+    receiver = np.asarray(receivers)[station]
+    limits = list(pairwise(np.searchsorted(receiver, np.arange(len(owners) + 1)).tolist()))
+    tracks: Table = np.empty(len(rows), TRACK)
+    for owner, (first, last) in zip(owners, limits, strict=True):
+        if first < last:
+            owner.copy_rows(rows[first:last], rows_of(tracks)[first:last])
+    tracks["receiver"], tracks["station"] = receiver, station
+    gate, span = owners[0]._gate, owners[0].span
     tracks = update_tracks(tracks, receivers, reports, gate, span)
-    ends = np.searchsorted(tracks["station"], np.arange(len(reports)), "right").tolist()
-    rows, start = rows_of(tracks), 0
-    for history, report, end in zip(histories, reports, ends, strict=True):
-        history.add_entry(report, rows[start:end], span)
+    bounds = np.searchsorted(tracks["station"], np.arange(len(reports) + 1))
+    after, start = rows_of(tracks), 0
+    for history, report, end in zip(histories, reports, bounds[1:].tolist(), strict=True):
+        history.add_entry(report, after, start, end, span)
         start = end
+    same = np.diff(bounds) == ends - starts
+    of_owner = pairwise(np.searchsorted(receivers, np.arange(len(owners) + 1)).tolist())
+    for owner, (first, last), (begin, end) in zip(owners, limits, of_owner, strict=True):
+        if same[begin:end].all():
+            if begin < end:
+                owner._rows[rows[first:last]] = after[bounds[begin] : bounds[end]]
+            continue
+        for place in range(begin, end):
+            owner._store(histories[place], after[bounds[place] : bounds[place + 1]])

@@ -54,6 +54,8 @@ class OwnBody:
         self._places: deque[_Place] = deque(maxlen=math.ceil(duration / dt) + 2)
         self._has_trailers = False
         """Whether a stored place may have trailers."""
+        self._vicinity = 0.0, 0.0, math.inf
+        """Last center of the body, and the distance from it within which all stored outlines are [m]."""
         self._tracks: dict[str, int] = {}
         """Object id of the ego body at each station."""
 
@@ -72,6 +74,8 @@ class OwnBody:
         self._places.append(_Place(ego.time, (x, y, z, ego.yaw), body, trailers, driven))
         if trailers:
             self._has_trailers = True
+        reach = driven - self._places[0].driven + self._half_diagonal
+        self._vicinity = x, y, math.inf if self._has_trailers else reach
 
     def place(self, time: float) -> tuple[float, float, float, float]:
         """Return center, height [m] and heading [rad] of the body at the last instant up to `time`, or the first."""
@@ -109,11 +113,8 @@ class OwnBody:
 
     def _is_far(self, x: float, y: float) -> bool:
         """Return True only if a point [m] is on no stored outline."""
-        if self._has_trailers:
-            return False
-        last = self._places[-1]
-        reach = last.driven - self._places[0].driven + self._half_diagonal
-        return math.hypot(x - last.pose[0], y - last.pose[1]) > reach
+        center_x, center_y, reach = self._vicinity
+        return math.hypot(x - center_x, y - center_y) > reach
 
     def without_perceived(
         self,

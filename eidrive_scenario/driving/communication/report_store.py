@@ -76,8 +76,12 @@ class ReportStore:
         own_perception   whether the channel carries the detections of a station back to itself
         """
         name, regions, points, lifetimes = self._name, self._regions, self._points, self._lifetimes
+        clock, own_body, usual_lifetime = self._clock, self._own_body, self._usual_lifetime
+        is_exact = clock.error(now) == 0.0 and pose_covariance is None
         for received in inbox:
-            message = self._clock.with_local_timestamps(received.message, now)
+            message = received.message
+            if not is_exact:
+                message = clock.with_local_timestamps(message, now)
             sender, perceived, complete = message.sender, message.kind == "cpm", message.objects is None
             own = sender == name
             if own and not (own_perception and perceived):
@@ -85,18 +89,23 @@ class ReportStore:
             if regions is not None:
                 regions.add_message(message)
             if points is not None and message.points is not None and not own:
-                points.add_points(sender, message.points, self._own_body.box(message.points.time))
+                points.add_points(sender, message.points, own_body.box(message.points.time))
                 continue
-            detections = _numbered(message)
+            detections = message.detections if complete else _numbered(message)
             state: StationState | None = message.state
-            if not own:
-                detections = self._without_own_body(message, detections, pose_covariance)
-                state = relative_state(state, ego, pose_covariance)
-            elif state is not None:
-                state = replace(state, pose_covariance=None)
+            if own:
+                if state is not None:
+                    state = replace(state, pose_covariance=None)
+            else:
+                if perceived:
+                    detections = self._without_own_body(message, detections, pose_covariance)
+                else:
+                    detections = own_body.without(detections)
+                if not is_exact:
+                    state = relative_state(state, ego, pose_covariance)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
-            lifetime = self._usual_lifetime if complete and perceived else self._long_lifetime
-            if lifetimes.get(station, self._usual_lifetime) != lifetime:
+            lifetime = usual_lifetime if complete and perceived else self._long_lifetime
+            if lifetimes.get(station, usual_lifetime) != lifetime:
                 lifetimes[station] = lifetime
                 self._next_deletion = -math.inf
             self.add(
@@ -127,11 +136,16 @@ class ReportStore:
 
     def _delete_old(self, now: float) -> None:
         """Delete reports that exceed their lifetime."""
-        ends = {station: self._end_of_life(station, held) for station, held in self._reports.items()}
-        for station, end in ends.items():
+        oldest, expired = math.inf, []
+        for station, held in self._reports.items():
+            end = self._end_of_life(station, held)
             if end < now - TIME_TOLERANCE:
-                del self._reports[station]
-        self._next_deletion = min([ends[station] for station in self._reports], default=math.inf)
+                expired.append(station)
+            elif end < oldest:
+                oldest = end
+        for station in expired:
+            del self._reports[station]
+        self._next_deletion = oldest
 
     def _assembled_detections(self, message: Message, pose_covariance: Array | None) -> Detections:
         """Return all known objects of the sender of a message that lists a part of them."""

@@ -94,7 +94,7 @@ def test_fuse_late_report_contributes_to_the_velocity(report: Make, fuse: Fuse) 
 def processed_rows(history: ReportHistory, station: str = "A") -> bytes:
     """Return the tracks of a station after all reports."""
     ReportHistory.process([history])
-    return history.tracks((station,))[0].tobytes()
+    return history.tracks((station,)).tobytes()
 
 
 def test_report_history_ignores_reports_older_than_all_stored_ones(report: Make) -> None:
@@ -122,7 +122,7 @@ def test_report_history_has_bounded_size(report: Make) -> None:
         history.add_report(report("A", 0.05 * tick, [(0.5 * tick, 0.0)], covariance=0.01))
         processed_rows(history)
     assert len(history._histories["A"].entries) <= 22
-    assert len(history.tracks(("A",))[0]) == 1
+    assert len(history.tracks(("A",))) == 1
 
 
 def test_evict_stale_does_not_change_the_fused_objects(report: Make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,7 +154,7 @@ def test_evict_stale_does_not_change_the_fused_objects(report: Make, monkeypatch
 
     evicting, fusion = fuse_all()
     assert len(fusion._history.stations) < 12
-    assert len(fusion._history.tracks(tuple(sorted(fusion._history.stations)))[0]) < 12
+    assert len(fusion._history.tracks(tuple(sorted(fusion._history.stations)))) < 12
     monkeypatch.setattr(ReportHistory, "evict_stale", lambda history, now: None)
     retaining, fusion = fuse_all()
     assert len(fusion._history.stations) == 60
