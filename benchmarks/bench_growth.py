@@ -25,7 +25,7 @@ CAR_SECONDS, STATION_SECONDS = 5.0, 2.0
 """Simulated time of a run with cars, and of one with stations [s]."""
 SPACING = 100.0
 """Length of road per station, if their density does not depend on their number [m]."""
-REPEATS = 2
+REPEATS = 5
 
 Cost = Callable[[int], float]
 
