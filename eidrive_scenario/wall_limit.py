@@ -32,6 +32,8 @@ POSTPONEMENT = 0.01
 """Time to the next interruption if one cannot be raised [s]."""
 GRACE = 3.0
 """Time from the first interruption to the last resort [s]."""
+CLOSING = 30.0
+"""Time in which an interrupted run has to close its files before the last resort [s]."""
 _SIGNAL: int | None = getattr(signal, "SIGUSR2", None)
 
 
@@ -50,12 +52,17 @@ class Limit:
     seconds: float
     notes: list[str] = field(default_factory=list)
     armed: bool = True
-    """Whether the run is interrupted at the limit; False once its error is being raised."""
+    """Whether the run is interrupted at the limit; see `disarm`."""
     deadline: float = field(init=False)
     """Instant of the limit by the monotonic clock [s]."""
 
     def __post_init__(self) -> None:
         self.deadline = time.monotonic() + self.seconds
+
+    def disarm(self) -> None:
+        """End the interruptions, as the error of the run is being raised: it may now take longer to close its files."""
+        self.armed = False
+        _dump_later(CLOSING + GRACE)
 
     def add_note(self, note: str) -> None:
         """Append a line to the report of the last resort."""
@@ -96,6 +103,12 @@ def set_last_resort(resort: LastResort | None) -> LastResort | None:
     global _last_resort
     before, _last_resort = _last_resort, resort
     return before
+
+
+def _dump_later(seconds: float) -> None:
+    """Let the process end after this time [s] if no thread can run by then."""
+    if _last_resort is not None and _last_resort.dump is not None:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=_last_resort.dump)
 
 
 def limit_wall_time(seconds: float | None) -> AbstractContextManager[Limit | None]:
@@ -198,9 +211,7 @@ class _Watchdog:
         """Watch the run from now on."""
         if self._by_signal and _SIGNAL is not None:
             self._before = signal.signal(_SIGNAL, self._interrupted)
-        if _last_resort is not None and _last_resort.dump is not None:
-            deadline = self.limit.seconds + 2.0 * GRACE
-            faulthandler.dump_traceback_later(deadline, exit=True, file=_last_resort.dump)
+        _dump_later(self.limit.seconds + 2.0 * GRACE)
         self._thread.start()
 
     def stop(self) -> None:
@@ -221,7 +232,7 @@ class _Watchdog:
     def _watch(self) -> None:
         if self._ended.wait(self.limit.seconds):
             return
-        last = time.monotonic() + GRACE
+        last, is_closing = time.monotonic() + GRACE, False
         while not self._ended.is_set():
             self._is_postponed = False
             self._interrupt()
@@ -229,6 +240,8 @@ class _Watchdog:
                 return
             if not self._is_postponed and self._ended.wait(min(REPEAT, max(last - time.monotonic(), 0.01))):
                 return
+            if not self.limit.armed and not is_closing:
+                last, is_closing = time.monotonic() + CLOSING, True
             if time.monotonic() >= last:
                 self._resort()
                 last = math.inf

@@ -63,7 +63,7 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
         limit = current_limit()
         seconds = 0.0 if limit is None else limit.seconds
         if limit is not None:
-            limit.armed = False
+            limit.disarm()
         raise _wall_limit_error(calls, seconds, time, observers) from error
     if isinstance(error, InvalidResult):
         raise ExtensionError(_place_of_method(error, calls, time), encodable(str(error))) from error.__cause__

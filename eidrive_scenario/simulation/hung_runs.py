@@ -29,11 +29,14 @@ _DUMPED = re.compile(r'^  File "(.+)", line (\d+) in (.+)$', re.MULTILINE)
 
 def describe_hung_run(limit: Limit, frame: FrameType | None) -> WallLimitError:
     """Return the error of a run that executes this frame, and close the files of its observers."""
-    for one, _ in traceback.walk_stack(frame):
-        simulation = one.f_locals.get("self")
-        if isinstance(simulation, Simulation) and hasattr(simulation, "world"):
-            return simulation.describe_hang(limit.seconds, frame)
-    return wall_limit_error(frame, limit.seconds)
+    try:
+        for one, _ in traceback.walk_stack(frame):
+            simulation = one.f_locals.get("self")
+            if isinstance(simulation, Simulation) and hasattr(simulation, "world"):
+                return simulation.describe_hang(limit.seconds, frame)
+        return wall_limit_error(frame, limit.seconds)
+    except Exception:  # the thread of the run may change what is read here, and the report must not be lost
+        return WallLimitError(limit.seconds)
 
 
 def describe_dump(limit: float, dump: str) -> WallLimitError:

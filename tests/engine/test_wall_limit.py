@@ -21,7 +21,7 @@ from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import Frame, read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
-from eidrive_scenario.simulation.hung_runs import describe_dump
+from eidrive_scenario.simulation.hung_runs import describe_dump, describe_hung_run
 from eidrive_scenario.wall_limit import LastResort, Limit, current_limit, limit_wall_time, set_last_resort
 
 pytestmark = pytest.mark.timeout(600)
@@ -216,6 +216,59 @@ def test_interruption_waits_until_notes_are_saved() -> None:
     finally:
         set_last_resort(before)
     assert saved == ["a note"]
+
+
+@pytest.mark.parametrize("is_main", [True, False])
+@pytest.mark.parametrize(("closing", "ends"), [(0.2, 1), (LONG, 0)])
+def test_interrupted_run_has_more_time_to_close_its_files(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_main: bool, closing: float, ends: int
+) -> None:
+    """An observer takes longer to close than uninterruptible code has before the last resort."""
+    monkeypatch.setattr(wall_limit, "GRACE", 0.5)
+    monkeypatch.setattr(wall_limit, "CLOSING", closing)
+
+    class ClosesSlowly:
+        def observe(self, frame: Frame) -> None:
+            pass
+
+        def close(self) -> None:
+            until = time.monotonic() + 1.5
+            while time.monotonic() < until and not resorts:
+                time.sleep(0.01)
+            closed.append(True)
+
+    resorts: list[Limit] = []
+    closed: list[bool] = []
+    errors: list[WallLimitError] = []
+
+    def run() -> None:
+        scenario = write_scenario(tmp_path / "s.xosc", detector="hangs")
+        simulation = Simulation(scenario, observers=[ClosesSlowly()])
+        with pytest.raises(WallLimitError) as caught:
+            simulation.run(wall_limit=1.0)
+        errors.append(caught.value)
+
+    before = set_last_resort(LastResort(end=lambda limit, frame: resorts.append(limit)))
+    try:
+        if is_main:
+            run()
+        else:
+            thread = threading.Thread(target=run)
+            thread.start()
+            thread.join()
+    finally:
+        set_last_resort(before)
+    assert (len(resorts), closed) == (ends, [True])
+    assert errors[0].place is not None
+    assert not watchdogs()
+
+
+def test_report_of_a_run_that_cannot_be_described_names_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object) -> None:
+        raise RuntimeError("changed during iteration")
+
+    monkeypatch.setattr("eidrive_scenario.simulation.hung_runs.wall_limit_error", fail)
+    assert "after 5 s of wall time" in str(describe_hung_run(Limit(5.0), sys._getframe()))
 
 
 def test_limits_that_end_with_their_blocks_leave_none() -> None:
