@@ -205,7 +205,8 @@ class Motion(MotionState):
         self._location = here
         against = self.roads.driving_direction(here.road, here.lane) < 0
         x, y, z, h, p, r = lane_pose.turned(self._heading + math.pi if against else self._heading)
-        self._pose = Pose(x, y, z if self._lift == 0.0 else z + self._lift, wrap_angle(h), p, r)
+        # twice as fast as the constructor of the named tuple
+        self._pose = tuple.__new__(Pose, (x, y, z if self._lift == 0.0 else z + self._lift, wrap_angle(h), p, r))
 
     def _advance(self, here: LaneLocation, distance: float) -> tuple[LaneLocation, Pose | None]:
         """Return the location at a distance along lane and route [m] or at the end of the lane, where the actor stops.
