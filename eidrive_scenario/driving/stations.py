@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from msgspec.structs import replace
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
 from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
+from eidrive_scenario.driving.communication.run_channel import RunChannel
 from eidrive_scenario.driving.control.overrides import ControlOverrides
 from eidrive_scenario.driving.detector_batches import prepare_detectors
 from eidrive_scenario.driving.planning.area_checks import areas_off_road
@@ -31,21 +30,15 @@ from eidrive_scenario.driving.station_declarations import (
 from eidrive_scenario.driving.station_readings import read_stations
 from eidrive_scenario.driving.step import AgentStep, StationPerception
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError
-from eidrive_scenario.library import library_path
+from eidrive_scenario.errors import Diagnostic, ErrorSubject
 from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.requests import Overrides
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
-from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.channel_checks import check_delivered, check_events, check_interval, check_statistics
-from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
-from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
-from eidrive_scenario.v2x.statistics.link_events import LinkEvents
-from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics, message_counts
+from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
@@ -59,15 +52,7 @@ class Stations(DrivingStack):
 
     def __init__(self, context: StackContext) -> None:
         self._context = context
-        self._channel: Channel | None = None
-        self._checked_channel: Channel | None = None
-        """The channel, if its results are checked: that of a third party."""
-        self._retired_channel: Channel | None = None
-        """The last channel after cooperation was switched off: its statistics remain part of the result."""
-        self._statistics: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
-        """Time and value of the last statistics of the channel: those of many links are expensive."""
-        self._channel_name = NO_COOPERATION
-        self._channel_profile: ChannelProfile | None = None
+        self._channel = RunChannel(context.seed)
         self._readings: Mapping[str, Readings] = {}
         self._perceived_view: WorldView | None = None
         self._perceived: Mapping[str, StationPerception] = {}
@@ -98,7 +83,7 @@ class Stations(DrivingStack):
         """Versions of the libraries that compute the detections of any station, by name."""
         self._encoders = declared_encoders(scenario, self._settings)
         if context.channel is not None:
-            self._set_channel(context.channel, origin="--channel", line=None, scope=scenario.scope)
+            self._channel.select(context.channel, origin="--channel", line=None, scope=scenario.scope)
 
     @property
     def settings(self) -> Mapping[str, AgentSettings]:
@@ -128,7 +113,7 @@ class Stations(DrivingStack):
 
     @property
     def channel_name(self) -> str:
-        return self._channel_name
+        return self._channel.name
 
     @property
     def readings(self) -> Mapping[str, Readings]:
@@ -139,7 +124,7 @@ class Stations(DrivingStack):
 
     def resolved_settings(self) -> StackSettings:
         return replace(
-            resolved_stations(self._settings, self._channel_name, self._channel_profile),
+            resolved_stations(self._settings, self._channel.name, self._channel.profile),
             versions=self._library_versions,
         )
 
@@ -148,7 +133,7 @@ class Stations(DrivingStack):
         yield from areas_off_road(context.scenario, self._settings, context.roads)
         yield from short_detector_latencies(self._settings, context.dt)
         if context.channel is not None:
-            yield from short_channel_delay(self._channel_profile, context.dt, "--channel")
+            yield from short_channel_delay(self._channel.profile, context.dt, "--channel")
 
     def add(self, spec: ActorSpec) -> None:
         settings = self._settings.get(spec.name)
@@ -192,8 +177,9 @@ class Stations(DrivingStack):
         """Select a channel, unless an option of the run fixes it."""
         if self._context.channel is not None:
             return iter(())
-        self._set_channel(profile, origin=source, line=line, scope=scope)
-        return short_channel_delay(self._channel_profile, self._context.dt, source, line)
+        self._channel.select(profile, origin=source, line=line, scope=scope)
+        self._receivers.clear()
+        return short_channel_delay(self._channel.profile, self._context.dt, source, line)
 
     def perceive(self, world: World, view: WorldView, inputs: StackInputs) -> Mapping[str, StationPerception]:
         """Read all sensors, deliver messages, and let every agent perceive: once for each view."""
@@ -205,18 +191,17 @@ class Stations(DrivingStack):
         self._readings = {}
         if not self._agents:
             return {}
-        if self._channel is not None:
-            self._statistics = None
+        if self._channel.active is not None:
             antennas = [(agent.spec, agent.settings.antenna_height) for agent in self._agents.values()]
             self._channel.update_environment(radio_environment(world, view, antennas, self._context.roads))
         self._readings = readings = read_stations(self._rigs, self._signal_sensors, world, view, inputs.signals)
         prepare_detectors(self._agents, readings)
-        now, own_perception = view.time, self._own_perception
-        intervals = {name: self._min_message_interval(name) for name in self._agents}
+        now, channel, own_perception = view.time, self._channel, self._channel.own_perception
+        intervals = {name: channel.min_message_interval(name) for name in self._agents}
         sensed = {
             name: agent.sense(
                 readings[name],
-                self._deliver(name, now),
+                channel.deliver(name, now),
                 now,
                 inputs.goals.get(name),
                 message_interval=intervals[name],
@@ -249,22 +234,20 @@ class Stations(DrivingStack):
 
         A message without receivers occupies the medium as well.
         """
-        if self._channel is None:
+        if self._channel.active is None:
             return ()
         outbox = []
         for sender, step in steps.items():
             if step.outbox:
                 receivers = self._receivers_of(sender)
                 outbox += [(message, receivers) for message in step.outbox]
-        events = self._channel.transmit(outbox, now)
-        self._statistics = None
-        return self._checked_events(events)
+        return self._channel.transmit(outbox, now)
 
     def _receivers_of(self, sender: str) -> tuple[str, ...]:
         """Return the present receivers of a station; they are the same until a station or the channel changes."""
         receivers = self._receivers.get(sender)
         if receivers is None:
-            own_perception = self._own_perception
+            own_perception = self._channel.own_perception
             receivers = self._receivers[sender] = tuple(
                 name
                 for name, agent in self._agents.items()
@@ -273,65 +256,11 @@ class Stations(DrivingStack):
         return receivers
 
     def final_links(self) -> Sequence[LinkEvent]:
-        channel = self._channel or self._retired_channel
-        return () if channel is None else self._checked_events(channel.drain_events())
-
-    def _checked_events(self, events: Sequence[LinkEvent]) -> Sequence[LinkEvent]:
-        if self._checked_channel is not None:
-            check_events(self._checked_channel, events)
-        return events if isinstance(events, LinkEvents) else tuple(events)
+        return self._channel.final_links()
 
     def metrics(self, now: float) -> dict[str, float]:
         """Return the counts of messages over all links."""
-        if self._channel is None and self._retired_channel is None:
-            return {}
-        return message_counts(self.link_statistics(now).values())
+        return self._channel.metrics(now)
 
     def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
-        channel = self._channel or self._retired_channel
-        if channel is None:
-            return {}
-        if self._statistics is None or self._statistics[0] != now:
-            self._statistics = now, channel.statistics(now)
-            if not is_built_in(type(channel)):
-                check_statistics(channel, self._statistics[1])
-        return self._statistics[1]
-
-    def _min_message_interval(self, sender: str) -> float:
-        """Return the minimum time between two messages of a station under congestion control [s]."""
-        if self._channel is None:
-            return 0.0
-        interval = self._channel.min_message_interval(sender)
-        if self._checked_channel is not None:
-            check_interval(self._checked_channel, interval)
-        return interval
-
-    def _deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
-        if self._channel is None:
-            return ()
-        delivered = self._channel.deliver(receiver, now)
-        if self._checked_channel is not None:
-            check_delivered(self._checked_channel, delivered, now)
-        return delivered
-
-    @property
-    def _own_perception(self) -> bool:
-        """Whether the channel carries the detections of a station back to itself."""
-        return self._channel is not None and self._channel.own_perception
-
-    def _set_channel(
-        self, source: str | Path | Mapping[str, Any], *, origin: str, line: int | None, scope: Scope | None
-    ) -> None:
-        profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
-        before = self._channel or self._retired_channel
-        try:
-            self._channel = build_channel(profile, self._context.seed, previous=before)
-        except SettingError as error:
-            raise error.at(origin, line) from error
-        third_party = self._channel is not None and not is_built_in(type(self._channel))
-        self._checked_channel = self._channel if third_party else None
-        self._retired_channel = before if self._channel is None else None
-        self._statistics = None
-        self._receivers.clear()
-        self._channel_profile = profile
-        self._channel_name = profile.name if profile is not None else NO_COOPERATION
+        return self._channel.link_statistics(now)

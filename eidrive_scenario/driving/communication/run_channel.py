@@ -1,0 +1,124 @@
+"""Channel between the stations of a run, which the scenario can replace."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.library import library_path
+from eidrive_scenario.openscenario.values.parameters import Scope
+from eidrive_scenario.registry import is_built_in
+from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
+from eidrive_scenario.v2x.channel_checks import check_delivered, check_events, check_interval, check_statistics
+from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
+from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics, message_counts
+
+
+class RunChannel:
+    """Channel of a run; the results of one of a third party are checked.
+
+    active   channel in use; None without cooperation
+    name     of its profile
+    profile  settings of it; None without cooperation
+    """
+
+    def __init__(self, seed: int) -> None:
+        self.active: Channel | None = None
+        self.name = NO_COOPERATION
+        self.profile: ChannelProfile | None = None
+        self._seed = seed
+        self._checked: Channel | None = None
+        """The channel, if its results are checked: that of a third party."""
+        self._retired: Channel | None = None
+        """The last channel after cooperation was switched off: its statistics remain part of the result."""
+        self._statistics: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
+        """Time and value of the last statistics: those of many links are expensive."""
+
+    def select(
+        self, source: str | Path | Mapping[str, Any], *, origin: str, line: int | None, scope: Scope | None
+    ) -> None:
+        """Replace the channel by that of a profile, which continues the statistics.
+
+        Raise SettingError, with origin and line, if the profile is invalid or cannot continue the channel.
+        """
+        profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
+        before = self.active or self._retired
+        try:
+            self.active = build_channel(profile, self._seed, previous=before)
+        except SettingError as error:
+            raise error.at(origin, line) from error
+        third_party = self.active is not None and not is_built_in(type(self.active))
+        self._checked = self.active if third_party else None
+        self._retired = before if self.active is None else None
+        self._statistics = None
+        self.profile = profile
+        self.name = profile.name if profile is not None else NO_COOPERATION
+
+    @property
+    def own_perception(self) -> bool:
+        """Whether the channel carries the detections of a station back to itself."""
+        return self.active is not None and self.active.own_perception
+
+    def update_environment(self, environment: RadioEnvironment) -> None:
+        """Set antenna positions and obstacles of this tick."""
+        if self.active is not None:
+            self._statistics = None
+            self.active.update_environment(environment)
+
+    def min_message_interval(self, sender: str) -> float:
+        """Return the minimum time between two messages of a station under congestion control [s]."""
+        if self.active is None:
+            return 0.0
+        interval = self.active.min_message_interval(sender)
+        if self._checked is not None:
+            check_interval(self._checked, interval)
+        return interval
+
+    def deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
+        """Return the messages that a station has received since the last call."""
+        if self.active is None:
+            return ()
+        delivered = self.active.deliver(receiver, now)
+        if self._checked is not None:
+            check_delivered(self._checked, delivered, now)
+        return delivered
+
+    def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
+        """Transmit messages to their receivers; return the outcomes that are known."""
+        if self.active is None:
+            return ()
+        events = self.active.transmit(outbox, now)
+        self._statistics = None
+        return self._checked_events(events)
+
+    def final_links(self) -> Sequence[LinkEvent]:
+        """Return the outcomes that no `transmit` has returned."""
+        channel = self.active or self._retired
+        return () if channel is None else self._checked_events(channel.drain_events())
+
+    def metrics(self, now: float) -> dict[str, float]:
+        """Return the counts of messages over all links; nothing if there was never a channel."""
+        if self.active is None and self._retired is None:
+            return {}
+        return message_counts(self.link_statistics(now).values())
+
+    def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
+        """Return the statistics by sender and receiver."""
+        channel = self.active or self._retired
+        if channel is None:
+            return {}
+        if self._statistics is None or self._statistics[0] != now:
+            self._statistics = now, channel.statistics(now)
+            if not is_built_in(type(channel)):
+                check_statistics(channel, self._statistics[1])
+        return self._statistics[1]
+
+    def _checked_events(self, events: Sequence[LinkEvent]) -> Sequence[LinkEvent]:
+        if self._checked is not None:
+            check_events(self._checked, events)
+        return events if isinstance(events, LinkEvents) else tuple(events)
