@@ -17,7 +17,7 @@ from statistics import median
 import numpy as np
 import torch
 
-from eidrive_scenario.perception.learned.detector import SHIPPED
+from eidrive_scenario.perception.learned.network_loading import SHIPPED
 from eidrive_scenario.perception.learned.networks.blocks import fold
 from eidrive_scenario.perception.learned.torch_devices import prepare
 from eidrive_scenario.perception.learned.torch_weights import trainable

@@ -17,15 +17,10 @@ from typing import Any
 import cv2
 
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
-from eidrive_scenario.perception.learned.detector import (
-    SHIPPED,
-    LearnedDetector,
-    LearnedSettings,
-    SsdDetector,
-    YoloDetector,
-    build_network,
-)
+from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
+from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.world.weather import Weather, load_weather
 from training.image_evaluation import (
     center_errors,

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
-from eidrive_scenario.perception.learned.detector import LearnedDetector, LearnedSettings
+from eidrive_scenario.perception.learned.detector import LearnedDetector
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.settings import LearnedSettings
 from training.dataset import Dataset, shows_enough, write
 from training.labels import Label
 from training.render_data import PER_WORLD, Shot, render, table

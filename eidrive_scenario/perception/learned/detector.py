@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from msgspec.structs import astuple, replace
-from pydantic import Field, model_validator
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.geometry.duplicates import without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_settings
@@ -22,85 +19,24 @@ from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.visibility import in_camera
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned import image_memory
-from eidrive_scenario.perception.learned.classes import misspelt, object_category
-from eidrive_scenario.perception.learned.external_network import ExternalNetwork, Layout
+from eidrive_scenario.perception.learned.classes import object_category
 from eidrive_scenario.perception.learned.image_memory import Key, StationDetections
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
-from eidrive_scenario.perception.learned.own_network import OwnNetwork
+from eidrive_scenario.perception.learned.network_loading import build_network, weights_path
 from eidrive_scenario.perception.learned.runtime_selection import (
-    Device,
-    Runtime,
-    is_installed,
-    missing_runtime,
     runtime_versions,
     select_runtime,
 )
+from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weight_files import (
-    DEFAULT_CONFIDENCE,
-    MAX_CLASSES,
-    MAX_SIDE,
-    ONNX_SUFFIX,
-    OWN_SUFFIX,
-    TORCHSCRIPT_SUFFIX,
     check_weights_exist,
-    refused_torchscript,
-    torchscript_is_allowed,
 )
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.settings import Settings
-
-SHIPPED = Path(__file__).parents[1] / "weights"
-EXTERNAL_SUFFIXES = (ONNX_SUFFIX, TORCHSCRIPT_SUFFIX)
-
-Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
-"""Width or height of a network input [px]."""
-
-
-class LearnedSettings(Settings):
-    """Settings of the property `detector_settings`.
-
-    weights      path relative to the working directory: .npz as training/train.py writes it, an ONNX model (.onnx) or a
-                 TorchScript model (.pt), which is loaded only with permission of the user; None: the shipped weights
-    classes, input_size, layout   of an .onnx or .pt: its classes in order, width and height of its input [px], and the
-                 layout of its outputs, if the shape does not determine it
-    letterbox    of an .onnx or .pt: whether images keep their aspect ratio, with gray margins; otherwise stretched
-    confidence   minimum score of a box; None: the optimum of the shipped weights, and 0.35 for others
-    runtime      library that executes the network; `auto`: the fastest one that is installed
-    device       `cuda` executes .npz and .pt by torch on a GPU
-    threads      of the computation of the network on the CPU, in the whole process
-    """
-
-    weights: str | None = None
-    classes: Annotated[tuple[str, ...], Field(max_length=MAX_CLASSES)] | None = None
-    input_size: tuple[Side, Side] | None = None
-    layout: Layout | None = None
-    letterbox: bool = False
-    confidence: float | None = Field(default=None, gt=0.0, lt=1.0)
-    runtime: Literal["auto", Runtime] = "auto"
-    device: Device = "cpu"
-    threads: Annotated[int, Field(ge=1, le=256)] = 1
-
-    @model_validator(mode="after")
-    def _check_consistency(self) -> LearnedSettings:
-        suffix = Path(self.weights or OWN_SUFFIX).suffix or OWN_SUFFIX
-        if suffix in EXTERNAL_SUFFIXES:
-            if not self.classes or self.input_size is None:
-                raise ValueError(f"weights: {suffix} files require `classes: [...]` and `input_size: [width, height]`")
-            for name in self.classes:
-                suggestion = misspelt(name)
-                if suggestion is not None:
-                    raise ValueError(f"classes: class {name!r} is unknown (did you mean {suggestion!r}?)")
-            if not any(object_category(name) for name in self.classes):
-                raise ValueError("classes: none is a road user (expected for example car, truck, bus or pedestrian)")
-        elif self.weights is not None and suffix != OWN_SUFFIX:
-            raise ValueError(f"weights: unknown file type (got {suffix!r}; expected .npz, .onnx or .pt)")
-        elif self.classes is not None or self.input_size is not None or self.layout is not None or self.letterbox:
-            raise ValueError("`classes`, `input_size`, `layout` and `letterbox` apply to weights .onnx and .pt only")
-        return self
 
 
 class LearnedDetector(Detector):
@@ -255,45 +191,6 @@ class SsdDetector(LearnedDetector):
     """Detector `ssd`."""
 
     network: ClassVar[Literal["yolov5", "ssd"]] = "ssd"
-
-
-def weights_path(name: str, settings: LearnedSettings) -> Path:
-    """Return the path of the weights that the settings of this detector select."""
-    return SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
-
-
-def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
-    """Return the network that the settings select.
-
-    Raise SettingError if its weights are missing or not suitable, or are TorchScript without permission of the user,
-    and if the runtime or the device is not available.
-    """
-    path = weights_path(name, settings)
-    check_weights_exist(path)
-    allow_torchscript = torchscript_is_allowed(allow_torchscript)
-    if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
-        raise refused_torchscript(path)
-    runtime = select_runtime(path, settings.runtime, settings.device)
-    if not is_installed(runtime):
-        raise missing_runtime(runtime)
-    if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
-        return ExternalNetwork(
-            path,
-            settings.classes,
-            settings.input_size,
-            settings.confidence or DEFAULT_CONFIDENCE,
-            settings.layout,
-            settings.threads,
-            settings.letterbox,
-            runtime=runtime,
-            device=settings.device,
-            allow_torchscript=allow_torchscript,
-        )
-    network = OwnNetwork(path, runtime, settings.confidence, settings.threads, settings.device)
-    if network.name != name:
-        message = f"weights {quoted(str(path))} are of another network (got {network.name!r}; expected {name!r})"
-        raise SettingError(Diagnostic(message, f"use the detector {network.name!r}"))
-    return network
 
 
 def most_certain(estimates: Sequence[Detections]) -> Detections:

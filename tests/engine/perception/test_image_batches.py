@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned import image_memory
-from eidrive_scenario.perception.learned.detector import LearnedDetector, LearnedSettings, YoloDetector
+from eidrive_scenario.perception.learned.detector import LearnedDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_memory import ImageMemory
 from eidrive_scenario.perception.learned.image_network import Candidates
 from eidrive_scenario.perception.learned.own_network import OwnNetwork
+from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, Readings
 from eidrive_scenario.simulation import RunSettings, run_file
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from eidrive_scenario.content_digest import content_digest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.learned import image_memory
-from eidrive_scenario.perception.learned.detector import LearnedDetector, LearnedSettings, SsdDetector, YoloDetector
+from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_memory import ImageMemory, RecentResults, StationDetections
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
+from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.camera import CameraImage, Radiance
@@ -31,7 +32,7 @@ def memory() -> Iterator[ImageMemory]:
 
 
 def network(confidence: float | None = None) -> ImageNetwork:
-    from eidrive_scenario.perception.learned.detector import build_network
+    from eidrive_scenario.perception.learned.network_loading import build_network
 
     return build_network("yolov5", LearnedSettings(confidence=confidence))
 

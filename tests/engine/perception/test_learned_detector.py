@@ -16,15 +16,9 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, misspelt, object_category
-from eidrive_scenario.perception.learned.detector import (
-    SHIPPED,
-    LearnedDetector,
-    LearnedSettings,
-    SsdDetector,
-    YoloDetector,
-    build_network,
-    merge_duplicates,
-)
+from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector, merge_duplicates
+from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
+from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig

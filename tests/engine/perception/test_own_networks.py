@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.perception.learned import detector, runtime_selection
-from eidrive_scenario.perception.learned.detector import SHIPPED, LearnedSettings, YoloDetector, build_network
+from eidrive_scenario.perception.learned import network_loading, runtime_selection
+from eidrive_scenario.perception.learned.detector import YoloDetector
+from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.own_network import Infer, OwnNetwork
 from eidrive_scenario.perception.learned.runtime_selection import Runtime, is_installed, select_runtime
+from eidrive_scenario.perception.learned.settings import LearnedSettings
 from eidrive_scenario.perception.learned.weights import read
 from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
@@ -38,7 +40,7 @@ def need(runtime: Runtime) -> None:
 
 def installed(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
     """Let these runtimes appear to be the installed ones."""
-    for module in (runtime_selection, detector):
+    for module in (runtime_selection, network_loading):
         monkeypatch.setattr(module, "is_installed", lambda name: name in names)
 
 

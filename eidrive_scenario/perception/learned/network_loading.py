@@ -1,0 +1,62 @@
+"""Networks of the detectors `yolov5` and `ssd`, from their settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.perception.learned.external_network import ExternalNetwork
+from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.perception.learned.own_network import OwnNetwork
+from eidrive_scenario.perception.learned.runtime_selection import is_installed, missing_runtime, select_runtime
+from eidrive_scenario.perception.learned.settings import EXTERNAL_SUFFIXES, LearnedSettings
+from eidrive_scenario.perception.learned.weight_files import (
+    DEFAULT_CONFIDENCE,
+    OWN_SUFFIX,
+    TORCHSCRIPT_SUFFIX,
+    check_weights_exist,
+    refused_torchscript,
+    torchscript_is_allowed,
+)
+
+SHIPPED = Path(__file__).parents[1] / "weights"
+"""Folder of the weights of this project."""
+
+
+def weights_path(name: str, settings: LearnedSettings) -> Path:
+    """Return the path of the weights that the settings of this detector select."""
+    return SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
+
+
+def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
+    """Return the network that the settings select.
+
+    Raise SettingError if its weights are missing or not suitable, or are TorchScript without permission of the user,
+    and if the runtime or the device is not available.
+    """
+    path = weights_path(name, settings)
+    check_weights_exist(path)
+    allow_torchscript = torchscript_is_allowed(allow_torchscript)
+    if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
+        raise refused_torchscript(path)
+    runtime = select_runtime(path, settings.runtime, settings.device)
+    if not is_installed(runtime):
+        raise missing_runtime(runtime)
+    if path.suffix in EXTERNAL_SUFFIXES and settings.classes is not None and settings.input_size is not None:
+        return ExternalNetwork(
+            path,
+            settings.classes,
+            settings.input_size,
+            settings.confidence or DEFAULT_CONFIDENCE,
+            settings.layout,
+            settings.threads,
+            settings.letterbox,
+            runtime=runtime,
+            device=settings.device,
+            allow_torchscript=allow_torchscript,
+        )
+    network = OwnNetwork(path, runtime, settings.confidence, settings.threads, settings.device)
+    if network.name != name:
+        message = f"weights {quoted(str(path))} are of another network (got {network.name!r}; expected {name!r})"
+        raise SettingError(Diagnostic(message, f"use the detector {network.name!r}"))
+    return network
