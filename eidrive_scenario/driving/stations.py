@@ -251,7 +251,7 @@ class Stations(DrivingStack):
             receivers = self._receivers[sender] = tuple(
                 name
                 for name, agent in self._agents.items()
-                if agent.receives_messages and agent.receives_from(sender, own_perception=own_perception)
+                if agent.receives_from(sender, own_perception=own_perception)
             )
         return receivers
 

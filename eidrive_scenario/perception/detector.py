@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class Detector(ABC):
         """Store the context before the first reading."""
 
     @classmethod  # noqa: B027 - an optional hook
-    def prepare_batch(cls, detectors: Sequence[Detector], readings: Sequence[Readings]) -> None:
+    def prepare_batch(cls, detectors: Sequence[Self], readings: Sequence[Readings]) -> None:
         """Compute at once what `detect` of several stations needs for these readings of one tick.
 
         Only built-in detectors are prepared. The next `detect` returns the same as without.

@@ -33,8 +33,6 @@ class RoadAttributes:
         self.signals: Mapping[str, Signal] = road_map.signals
         self.controllers: Mapping[str, SignalController] = road_map.controllers
         self.objects: tuple[RoadObject, ...] = road_map.objects
-        self._directions: dict[tuple[str, int], int] = {}
-        """Driving directions by road and lane, as far as they were determined."""
 
     def road(self, road_id: str) -> Road:
         """Return the road with this id. Raise PositionError if it does not exist."""
@@ -45,10 +43,7 @@ class RoadAttributes:
 
     def driving_direction(self, road_id: str, lane_id: int) -> int:
         """Return +1 if traffic of the lane drives in the direction of s, else -1."""
-        known = self._directions.get((road_id, lane_id))
-        if known is None:
-            known = self._directions[road_id, lane_id] = driving_direction(self.road(road_id), lane_id)
-        return known
+        return driving_direction(self.road(road_id), lane_id)
 
     def lane_ids(self, road_id: str, s: float, *, drivable: bool = False) -> tuple[int, ...]:
         """Return the lane ids at s from left to right, without lane 0. With `drivable`, return only lanes for cars."""

@@ -128,20 +128,14 @@ class Storyboard:
             if controller_model.actor.present and not controller_model.actor.driven:
                 controller_model.step()
         towed = {back.name for _, back in towed_pairs}
-        total = 0.0
         for name, actor in self.context.actors.items():
             if not actor.present or name in towed:
                 continue
             if not actor.driven:
-                place = actor.motion.step(self.dt)
+                commands.placements[name] = actor.motion.step(self.dt)
             elif actor.motion.teleported:
-                place = actor.motion.placement()
-            else:
-                continue
-            commands.placements[name] = place
-            total += place.x + place.y + place.z + place.yaw + place.speed
-        if total - total != 0.0:  # NaN or infinite
-            _check_placements(commands.placements)
+                commands.placements[name] = actor.motion.placement()
+        _check_placements(commands.placements)
         for front, back in towed_pairs:
             if front.present and back.present:
                 displacement = next_displacement(front, view, self.dt)
@@ -190,6 +184,11 @@ class Storyboard:
 
 def _check_placements(placements: Mapping[str, Placement]) -> None:
     """Raise SimulationError for the first placement that is not finite, which pybullet does not check."""
+    total = 0.0
+    for place in placements.values():
+        total += place.x + place.y + place.z + place.yaw + place.speed
+    if total - total == 0.0:  # neither NaN nor infinite
+        return
     for name, placement in placements.items():
         if not all(map(math.isfinite, (placement.x, placement.y, placement.z, placement.yaw, placement.speed))):
             raise SimulationError(f"actor {name!r}: invalid placement (got {placement}; expected finite numbers)")

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from faulty_extensions import line_of, write_scenario
+from threads import run_in_thread
 
 from eidrive_scenario import wall_limit
 from eidrive_scenario.errors import InputError, WallLimitError
@@ -100,12 +101,7 @@ def test_interruption_in_a_finalizer_aborts_the_run_at_its_next_step(
             simulation.run(wall_limit=1.0)
         errors.append(caught.value)
 
-    if is_main:
-        run()
-    else:
-        thread = threading.Thread(target=run)
-        thread.start()
-        thread.join()
+    run_in_thread(run, is_main=is_main)
     assert times == [0.0, 0.05]
     assert re.search(r"not finished at t = \d+\.\d{3} s after 1 s of wall time", str(errors[0]))
 

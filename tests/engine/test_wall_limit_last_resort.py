@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from pathlib import Path
 
 import pytest
 from faulty_extensions import write_scenario
+from threads import run_in_thread
 
 import eidrive_scenario
 from eidrive_scenario import wall_limit
@@ -78,12 +78,7 @@ def test_interrupted_run_has_more_time_to_close_its_files(
 
     before = set_last_resort(LastResort(end=lambda limit, frame: resorts.append(limit)))
     try:
-        if is_main:
-            run()
-        else:
-            thread = threading.Thread(target=run)
-            thread.start()
-            thread.join()
+        run_in_thread(run, is_main=is_main)
     finally:
         set_last_resort(before)
     assert (len(resorts), closed) == (ends, [True])

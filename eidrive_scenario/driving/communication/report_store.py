@@ -76,12 +76,8 @@ class ReportStore:
         own_perception   whether the channel carries the detections of a station back to itself
         """
         name, regions, points, lifetimes = self._name, self._regions, self._points, self._lifetimes
-        clock, own_body, usual_lifetime = self._clock, self._own_body, self._usual_lifetime
-        is_exact = clock.error(now) == 0.0 and pose_covariance is None
         for received in inbox:
-            message = received.message
-            if not is_exact:
-                message = clock.with_local_timestamps(message, now)
+            message = self._clock.with_local_timestamps(received.message, now)
             sender, perceived, complete = message.sender, message.kind == "cpm", message.objects is None
             own = sender == name
             if own and not (own_perception and perceived):
@@ -89,23 +85,18 @@ class ReportStore:
             if regions is not None:
                 regions.add_message(message)
             if points is not None and message.points is not None and not own:
-                points.add_points(sender, message.points, own_body.box(message.points.time))
+                points.add_points(sender, message.points, self._own_body.box(message.points.time))
                 continue
-            detections = message.detections if complete else _numbered(message)
+            detections = _numbered(message)
             state: StationState | None = message.state
-            if own:
-                if state is not None:
-                    state = replace(state, pose_covariance=None)
-            else:
-                if perceived:
-                    detections = self._without_own_body(message, detections, pose_covariance)
-                else:
-                    detections = own_body.without(detections)
-                if not is_exact:
-                    state = relative_state(state, ego, pose_covariance)
+            if not own:
+                detections = self._without_own_body(message, detections, pose_covariance)
+                state = relative_state(state, ego, pose_covariance)
+            elif state is not None:
+                state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
-            lifetime = usual_lifetime if complete and perceived else self._long_lifetime
-            if lifetimes.get(station, usual_lifetime) != lifetime:
+            lifetime = self._usual_lifetime if complete and perceived else self._long_lifetime
+            if lifetimes.get(station, self._usual_lifetime) != lifetime:
                 lifetimes[station] = lifetime
                 self._next_deletion = -math.inf
             self.add(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from msgspec.structs import astuple, replace
@@ -86,12 +86,11 @@ class LearnedDetector(Detector):
                 self._patterns[name] = pattern_from_settings(sensor)
 
     @classmethod
-    def prepare_batch(cls, detectors: Sequence[Detector], readings: Sequence[Readings]) -> None:
+    def prepare_batch(cls, detectors: Sequence[Self], readings: Sequence[Readings]) -> None:
         """Find the objects in the images of all stations; images of equal networks form one batch."""
-        batches: dict[str, list[tuple[LearnedDetector, str, CameraReading]]] = {}
+        batches: dict[str, list[tuple[Self, str, CameraReading]]] = {}
         networks: dict[str, ImageNetwork] = {}
         for detector, of_station in zip(detectors, readings, strict=True):
-            assert isinstance(detector, LearnedDetector)
             detector.load_weights()
             network, detector._prepared = detector._network, {}
             assert network is not None

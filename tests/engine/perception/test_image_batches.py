@@ -52,7 +52,7 @@ def readings_of(time: float, **cameras: CameraReading) -> Readings:
     return Readings(time, EgoState(time, np.zeros(3), 0.0, 0.0, 0.0, 5.0, 0.0, 0.0), cameras=cameras)
 
 
-def detector(**settings: float) -> LearnedDetector:
+def detector(**settings: float) -> YoloDetector:
     return YoloDetector(LearnedSettings(**settings))  # type: ignore[arg-type]
 
 
