@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,3 +11,8 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+
+def of_each(function: Callable[[float], float], values: Array) -> Array:
+    """Return the values (N,) of a function of `math`, whose bits differ from those of array functions."""
+    return np.fromiter(map(function, values.tolist()), float, len(values))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.world.physics.bodies import Body
+from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.physics.body_batch import MANY, BodyBatch
+from eidrive_scenario.world.physics.body_group import BodyGroup, SingleBodies
 from eidrive_scenario.world.physics.rays import GROUND, NOTHING
 from eidrive_scenario.world.view import FEW, Contact, WorldView
 
@@ -23,7 +24,7 @@ class ActorTable:
                    handle -1, is NOTHING
     """
 
-    bodies: tuple[Body, ...]
+    bodies: BodyGroup
     names: tuple[str, ...]
     categories: tuple[str, ...]
     rows: Mapping[str, int]
@@ -34,7 +35,7 @@ class ActorTable:
     """`row_of_handle` as a list."""
 
     @classmethod
-    def of(cls, bodies: Mapping[str, Body], highest_handle: int) -> ActorTable:
+    def of(cls, bodies: Mapping[str, Body], highest_handle: int, dt: float) -> ActorTable:
         """Return the table of bodies by name. `highest_handle` is that of other bodies in pybullet."""
         order = tuple(bodies.values())
         size = np.array([body.spec.size for body in order], dtype=float).reshape(-1, 3)
@@ -43,10 +44,11 @@ class ActorTable:
         highest = max([highest_handle, *(body.handle for body in order)])
         row_of_handle = np.full(highest + 2, GROUND, dtype=np.int64)
         row_of_handle[-1] = NOTHING
+        scripted = sum(isinstance(body, ScriptedBody) for body in order)
         for row, body in enumerate(order):
             row_of_handle[body.handle] = row
         return cls(
-            bodies=order,
+            bodies=BodyBatch(order, dt) if scripted >= MANY else SingleBodies(order),
             names=tuple(bodies),
             categories=tuple(body.spec.category for body in order),
             rows={name: row for row, name in enumerate(bodies)},
@@ -65,9 +67,7 @@ class ActorTable:
         unseen_by: Mapping[str, tuple[str, ...]],
     ) -> WorldView:
         """Return the view of the current poses and motion."""
-        states = [body.state for body in self.bodies]
-        table = np.fromiter(chain.from_iterable(states), float, 14 * len(states)).reshape(-1, 14)
-        table.flags.writeable = False
+        states, table = self.bodies.states()
         view = WorldView(
             time=time,
             tick=tick,
@@ -88,7 +88,7 @@ class ActorTable:
             unseen_by=unseen_by,
         )
         view.__dict__.update(rows=self.rows, states=states, kinematics=table[:, 0:9])
-        if len(self.bodies) <= FEW:
-            view.__dict__["plain_boxes"] = [body.box for body in self.bodies]
+        if len(states) <= FEW:
+            view.__dict__["plain_boxes"] = [body.box for body in self.bodies.current()]
             view.__dict__["is_upright"] = not any([state.pitch or state.roll for state in states])
         return view

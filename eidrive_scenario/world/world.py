@@ -123,6 +123,7 @@ class World:
         if driven == (name in self._driven):
             return
         self._contacts.find_added(self._bodies)
+        self._update_attributes()
         order = list(self._bodies)
         placement = Placement(body.x, body.y, body.z, body.yaw, body.pitch, body.roll, body.speed)
         body.remove()
@@ -184,17 +185,14 @@ class World:
         if not (placements.keys() <= present and controls.keys() <= present):
             self._body(min({*placements, *controls} - present))
         self._contacts.find_added(self._bodies)
-        for name, body in self._bodies.items():
-            placement = placements.get(name)
-            if isinstance(body, ScriptedBody):
-                if placement is None:
-                    body.rest()
-                else:
-                    body.place(placement)
-            elif placement is not None:
-                self._driven[name].teleport(placement)
-        self._couplings.update(self._bodies)
-        touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
+        self._actors.bodies.place(placements)
+        for name, driven in self._driven.items():
+            if name in placements:
+                driven.teleport(placements[name])
+        if self._couplings.any_affected:
+            self._update_attributes()
+            self._couplings.update(self._bodies)
+        touches = self._physics.tick(self._actors.bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
         self._contacts.step(self._actors.bodies, touches)
@@ -209,6 +207,7 @@ class World:
 
     def distance(self, first: str, second: str) -> float:
         """Return the distance between the boxes of two actors [m], 0 in contact. Raise SimulationError."""
+        self._update_attributes()
         return box_distance(self._body(first).box, self._body(second).box)
 
     def raycast(
@@ -274,6 +273,7 @@ class World:
     def image(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> scene.UndrawnImage:
         """Return the same image before it is drawn. It shows the current time, also if it is drawn later."""
         self._visuals = self._visuals or scene.Visuals(self._scenery)
+        self._update_attributes()
         shown, fixed = scene.DisplayState(self.time, self._signals, self._appearances), np.array(pose, dtype=float)
         return self._visuals.image(self._bodies.values(), ignore, fixed, pinhole, self._weather, shown)
 
@@ -300,12 +300,18 @@ class World:
         self._physics.changed()
         self._physics.scenery_changed()
         self._free_space.scenery_changed()
+        self._update_attributes()
         self._table = None
+
+    def _update_attributes(self) -> None:
+        """Update the attributes of bodies that move together, before those of single bodies are used."""
+        if self._table is not None:
+            self._table.bodies.current()
 
     @property
     def _actors(self) -> ActorTable:
         if self._table is None:
-            self._table = ActorTable.of(self._bodies, self._scenery.highest_handle)
+            self._table = ActorTable.of(self._bodies, self._scenery.highest_handle, self.dt)
         return self._table
 
     def _refresh(self) -> None:

@@ -8,7 +8,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from eidrive_scenario.arrays import Array, Bools, Integers
+from eidrive_scenario.arrays import Array, Integers
 
 Piece = tuple[float, float, float, float, float]
 """Start s of a piece and its coefficients a, b, c, d; ds counts from that start."""
@@ -27,6 +27,7 @@ class Polynomials:
             ordered[0] = (0.0, *ordered[0][1:])
         if not ordered or ordered[0][0] > 0.0:
             ordered.insert(0, (0.0, 0.0, 0.0, 0.0, 0.0))
+        ordered = _without_repetitions(ordered)
         self.pieces: list[Piece] = ordered
         self.starts = [piece[0] for piece in ordered]
         single = len(ordered) == 1 and ordered[0][2:] == (0.0, 0.0, 0.0)
@@ -80,6 +81,15 @@ class Polynomials:
         return Polynomials([first, *((p[0] - origin, *p[1:]) for p in self.pieces if p[0] > origin)])
 
 
+def _without_repetitions(pieces: Sequence[Piece]) -> list[Piece]:
+    """Return pieces without those that continue the constant value of the piece before."""
+    kept = [pieces[0]]
+    for piece in pieces[1:]:
+        if not piece[1:] == (kept[-1][1], 0.0, 0.0, 0.0) == kept[-1][1:]:
+            kept.append(piece)
+    return kept
+
+
 def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:
     """Return the exact sum of factor times function over the union of their pieces."""
     starts = sorted({start for _, function in terms for start in function.starts})
@@ -89,8 +99,6 @@ def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:
         for factor, function in terms:
             pa, pb, pc, pd = function.coefficients_at(start)
             a, b, c, d = a + factor * pa, b + factor * pb, c + factor * pc, d + factor * pd
-        if pieces and (c, d) == pieces[-1][3:] == (0.0, 0.0) and b == pieces[-1][2] == 0.0 and a == pieces[-1][1]:
-            continue
         pieces.append((start, a, b, c, d))
     return Polynomials(pieces)
 
@@ -112,8 +120,6 @@ class PolynomialTable:
         owner = np.repeat(np.arange(len(functions)), counts)
         reached = pieces[:, 0] <= limit
         pieces, owner = pieces[reached], owner[reached]
-        new = _begins_function_or_value(pieces, owner)
-        pieces, owner = pieces[new], owner[new]
         self._borders = (self.base[owner] + np.maximum(pieces[:, 0], 0.0))[1:]
         """Starts of all pieces but the first one, on the common axis."""
         self._pieces = pieces
@@ -158,15 +164,6 @@ class PolynomialTable:
     def is_zero(self) -> bool:
         """True if all functions are 0 everywhere."""
         return self._constant and not self._a.any()
-
-
-def _begins_function_or_value(pieces: Array, owner: Integers) -> Bools:
-    """Return whether each piece is the first of its function or differs from its predecessor, unlike a constant."""
-    new = np.ones(len(pieces), dtype=bool)
-    constant, bits = (pieces[:, 2:] == 0.0).all(axis=1), np.ascontiguousarray(pieces[:, 1]).view(np.int64)
-    same = (bits[1:] == bits[:-1]) & constant[1:] & constant[:-1] & (owner[1:] == owner[:-1])
-    new[1:] = ~same
-    return new
 
 
 def spread(spans: Sequence[float]) -> Array:

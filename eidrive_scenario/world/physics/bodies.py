@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
@@ -134,14 +135,15 @@ class ScriptedBody(Body):
     def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
         super().__init__(client, spec, placement, dt)
         self._create(spec.offset, (self.x, self.y, self.z), UNMOVED, UNMOVED, SCRIPTED, DRIVEN)
-        self._from: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
-        self._resting = False
+        self.from_pose: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
+        """Pose x y z yaw pitch roll at the start of the last step."""
+        self.is_resting = False
         """Whether it did not move in the last step, and had stopped before."""
         self._resting_state: ActorState | None = None
 
     @property
     def state(self) -> ActorState:
-        if not self._resting:
+        if not self.is_resting:
             return super().state
         if self._resting_state is None:
             self._resting_state = super().state
@@ -152,7 +154,7 @@ class ScriptedBody(Body):
         """Maximum displacement of any part in the current step [m]."""
         if not self.moved:
             return 0.0
-        x, y, z, yaw, pitch, _ = self._from
+        x, y, z, yaw, pitch, _ = self.from_pose
         turn = abs(wrap_angle(self.yaw - yaw)) + abs(self.pitch - pitch)
         return math.dist((x, y, z), (self.x, self.y, self.z)) + turn * 2.0 * self.radius
 
@@ -168,17 +170,17 @@ class ScriptedBody(Body):
         p, dt = placement, self._dt
         speed = p.speed
         after = px, py, pz, pyaw, _, _ = p.x, p.y, p.z, p.yaw, p.pitch, p.roll
-        if self._resting and speed == 0.0 and self._from == after:
+        if self.is_resting and speed == 0.0 and self.from_pose == after:
             return
         x, y, z, yaw = self.x, self.y, self.z, self.yaw
-        self._from = before = (x, y, z, yaw, self.pitch, self.roll)
+        self.from_pose = before = (x, y, z, yaw, self.pitch, self.roll)
         was_moving = self.yaw_rate != 0.0 or self.velocity != STILL
         self._pose(*after)
         self.speed = speed
         self.moved = before != after
         along = self._along_heading(speed)
         if p.teleport:
-            self._from = after
+            self.from_pose = after
             self.velocity = self.velocity_before = along
             self.acceleration, self.yaw_rate = STILL, 0.0
         else:
@@ -191,18 +193,42 @@ class ScriptedBody(Body):
             self.yaw_rate = wrap_angle(pyaw - yaw) / dt if pyaw != yaw else 0.0
         is_moving = self.moved or self.velocity != STILL
         self.stale = self.stale or was_moving or is_moving
-        self._resting, self._resting_state = not is_moving and self.acceleration == STILL, None
+        self.is_resting, self._resting_state = not is_moving and self.acceleration == STILL, None
+
+    def end_step(
+        self,
+        state: ActorState,
+        center: Vector3,
+        heading: tuple[float, float],
+        from_pose: tuple[float, ...],
+        velocity_before: Vector3,
+        moved: bool,
+        stale: bool,
+        is_resting: bool,
+    ) -> None:
+        """Set all values after a step that was computed elsewhere; `heading` is its cosine and sine."""
+        self.x, self.y, self.z, self.yaw, self.pitch, self.roll = state[:6]
+        self.velocity, self.acceleration, self.yaw_rate, self.speed = state[6:9], state[9:12], state[12], state[13]
+        self.center_x, self.center_y, self.center_z = center
+        self._cos, self._sin = heading
+        self.from_pose, self.velocity_before, self.moved = from_pose, velocity_before, moved
+        self.stale, self.is_resting, self._resting_state = stale, is_resting, None
 
     def sync_pose(self) -> None:
         """Move the rigid body to the pose of the actor."""
+        pose = self.x, self.y, self.z, self.yaw, self.pitch, self.roll
+        self.move_rigid_body(pose, self.velocity, self.yaw_rate)
+
+    def move_rigid_body(self, pose: Sequence[float], velocity: Sequence[float], yaw_rate: float) -> None:
+        """Move the rigid body to a pose x y z yaw pitch roll, which may be more recent than that of the actor."""
         self.stale = False
-        turn = quaternion(self.yaw, self.pitch, self.roll)
-        bullet.resetBasePositionAndOrientation(self.handle, (self.x, self.y, self.z), turn, self.client)
-        bullet.resetBaseVelocity(self.handle, self.velocity, (0.0, 0.0, self.yaw_rate), self.client)
+        x, y, z, yaw, pitch, roll = pose
+        bullet.resetBasePositionAndOrientation(self.handle, (x, y, z), quaternion(yaw, pitch, roll), self.client)
+        bullet.resetBaseVelocity(self.handle, velocity, (0.0, 0.0, yaw_rate), self.client)
 
     def pass_through(self, share: float) -> None:
         """Move the rigid body to a point between its last and next pose, for a collision in between."""
-        x, y, z, yaw, pitch, roll = self._from
+        x, y, z, yaw, pitch, roll = self.from_pose
         turn = quaternion(
             yaw + share * wrap_angle(self.yaw - yaw),
             pitch + share * (self.pitch - pitch),

@@ -25,6 +25,11 @@ class Couplings:
         self._apart: dict[Pair, tuple[int, int]] = {}
         """Handles of the bodies that do not collide with each other."""
 
+    @property
+    def any_affected(self) -> bool:
+        """Whether `update` has pairs to process."""
+        return bool(self.pairs or self._apart)
+
     def attached(self, name: str) -> frozenset[str]:
         """Return the actors that are connected to an actor directly or by others, without the actor itself."""
         if not self.pairs:
@@ -37,8 +42,6 @@ class Couplings:
 
     def update(self, bodies: Mapping[str, Body]) -> None:
         """Set which bodies collide; those of a disconnected trailer and its vehicle only after they have parted."""
-        if not self.pairs and not self._apart:
-            return
         for pair in sorted(self.pairs | self._apart.keys(), key=sorted):
             if not pair <= bodies.keys():
                 self._apart.pop(pair, None)

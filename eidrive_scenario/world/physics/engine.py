@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import repeat
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.actor import Control, Vector3
 from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.physics.body_group import BodyGroup
 from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.physics.contacts import Touch, relative_speed
 from eidrive_scenario.world.physics.driven_body import DrivenBody
@@ -80,16 +82,16 @@ class Physics:
         """Reset caches after scenery was added."""
         self._free.clear()
 
-    def refresh(self, bodies: Iterable[Body]) -> None:
+    def refresh(self, bodies: BodyGroup) -> None:
         """Update the search structure of pybullet, which setting poses does not update."""
         if not self._searchable:
-            _settle(bodies)
+            bodies.settle()
             bullet.performCollisionDetection(self._client)
             self._searchable = True
 
     def tick(
         self,
-        bodies: Mapping[str, Body],
+        bodies: BodyGroup,
         driven: Mapping[str, DrivenBody],
         controls: Mapping[str, Control],
         friction: float,
@@ -104,25 +106,25 @@ class Physics:
         passing, watched = self._within_reach(bodies, driven)
         touches: Touches = {}
         if watched:
-            _settle(bodies.values())
-            self._step_through(bodies, passing, watched, demands, touches)
+            bodies.settle()
+            self._step_through(bodies.members, passing, watched, demands, touches)
         for name, body in driven.items():
             if name not in watched:
                 body.coast(demands[name], self._substeps)
         if watched:
-            self.refresh(bodies.values())
+            self.refresh(bodies)
         return touches
 
     def _step_through(
         self,
-        bodies: Mapping[str, Body],
+        bodies: Sequence[Body],
         passing: Sequence[ScriptedBody],
         watched: Mapping[str, DrivenBody],
         demands: Mapping[str, Demand],
         touches: Touches,
     ) -> None:
         """Compute the steps in pybullet."""
-        owners = {body.handle: (row, body) for row, body in enumerate(bodies.values())}
+        owners = {body.handle: (row, body) for row, body in enumerate(bodies)}
         for number in range(self._substeps):
             for scripted in passing:
                 scripted.pass_through(number / self._substeps)
@@ -138,7 +140,7 @@ class Physics:
             body.read_back()
 
     def _within_reach(
-        self, bodies: Mapping[str, Body], driven: Mapping[str, DrivenBody]
+        self, bodies: BodyGroup, driven: Mapping[str, DrivenBody]
     ) -> tuple[list[ScriptedBody], dict[str, DrivenBody]]:
         """Return scripted bodies near a driven one, and driven ones near any other body or a building.
 
@@ -146,30 +148,37 @@ class Physics:
         """
         passing: dict[str, ScriptedBody] = {}
         watched: dict[str, DrivenBody] = {}
-        travels = {name: body.travel + self._slack for name, body in bodies.items()}
-        if not any(self._may_meet(body, bodies, travels) for body in driven.values()):
+        impact = _MAX_IMPACT * self._dt
+        movers = list(driven.values())
+        neighbors = bodies.neighbors(movers, 2.0 * (self._slack + impact))
+        travels: dict[str, float] = {}
+        for others in neighbors:
+            for other in others:
+                if other.name not in travels:
+                    travels[other.name] = other.travel + self._slack
+        if not any(map(self._may_meet, movers, neighbors, repeat(travels))):
             return [], watched
-        reaches = {name: body.radius + travels[name] + _MAX_IMPACT * self._dt for name, body in bodies.items()}
-        for name, body in driven.items():
-            x, y, own = body.center_x, body.center_y, reaches[name]
-            near = self._is_near_static(name, x, y, own)
-            for other_name, other in bodies.items():
-                dx, dy, reach = other.center_x - x, other.center_y - y, own + reaches[other_name]
+        for body, others in zip(movers, neighbors, strict=True):
+            x, y, own = body.center_x, body.center_y, body.radius + travels[body.name] + impact
+            near = self._is_near_static(body.name, x, y, own)
+            for other in others:
+                reach = own + (other.radius + travels[other.name] + impact)
+                dx, dy = other.center_x - x, other.center_y - y
                 if dx * dx + dy * dy <= reach * reach and other is not body:
                     near = True
                     if isinstance(other, ScriptedBody) and other.moved:
-                        passing[other_name] = other
+                        passing[other.name] = other
             if near:
-                watched[name] = body
+                watched[body.name] = body
         return list(passing.values()), watched
 
-    def _may_meet(self, body: DrivenBody, bodies: Mapping[str, Body], travels: Mapping[str, float]) -> bool:
+    def _may_meet(self, body: DrivenBody, others: Iterable[Body], travels: Mapping[str, float]) -> bool:
         """Return whether a driven body may have a contact in this tick."""
         x, y, radius, own = body.center_x, body.center_y, body.radius, travels[body.name]
         if self._is_near_static(body.name, x, y, radius + own):
             return True
-        for name, other in bodies.items():
-            way = own + travels[name]
+        for other in others:
+            way = own + travels[other.name]
             dx, dy, reach = other.center_x - x, other.center_y - y, radius + other.radius + way
             if dx * dx + dy * dy <= reach * reach and other is not body and box_distance(body.box, other.box) <= way:
                 return True
@@ -207,9 +216,3 @@ class Physics:
             if pair not in touches:
                 speed = relative_speed(before[body.handle], before.get(handle, other.velocity))
                 touches[pair] = Touch(position, speed)
-
-
-def _settle(bodies: Iterable[Body]) -> None:
-    for body in bodies:
-        if body.stale:
-            body.sync_pose()

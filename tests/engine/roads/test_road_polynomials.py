@@ -28,6 +28,16 @@ def test_first_piece_near_zero_extends_to_zero() -> None:
     assert table.value(np.array([1]), np.array([0.0])) == pytest.approx([2.0])
 
 
+def test_pieces_that_repeat_a_constant_value_are_one_piece() -> None:
+    """CARLA writes lane offset and superelevation of most roads as several pieces of the value 0."""
+    flat = Polynomials([(s, 0.0, 0.0, 0.0, 0.0) for s in (0.0, 0.31, 1.34)])
+    assert flat.is_zero
+    assert flat.pieces == [(0.0, 0.0, 0.0, 0.0, 0.0)]
+    bump = [(0.0, 1.0, 0.0, 0.0, 0.0), (2.0, 1.0, 0.5, 0.0, 0.0), (4.0, 2.0, 0.0, 0.0, 0.0), (6.0, 2.0, 0.0, 0.0, 0.0)]
+    assert Polynomials(bump).pieces == bump[:3]
+    assert [Polynomials(bump).value(s) for s in (1.0, 3.0, 5.0, 7.0)] == [1.0, 1.5, 2.0, 2.0]
+
+
 def test_shifted_function_has_the_same_values() -> None:
     shifted = STEPS.shifted(7.0)
     for s in (0.0, 2.9, 3.0, 6.0):

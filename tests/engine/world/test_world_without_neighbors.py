@@ -13,7 +13,8 @@ from sample_car import CarFactory
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.physics.bodies import ScriptedBody
+from eidrive_scenario.world.physics.body_group import BodyGroup
 from eidrive_scenario.world.physics.driven_body import DrivenBody
 from eidrive_scenario.world.physics.engine import Physics
 
@@ -39,7 +40,7 @@ def wild_ride(tick: int) -> Control:
 
 
 def watch_all(
-    physics: Physics, bodies: Mapping[str, Body], driven: Mapping[str, DrivenBody]
+    physics: Physics, bodies: BodyGroup, driven: Mapping[str, DrivenBody]
 ) -> tuple[list[ScriptedBody], dict[str, DrivenBody]]:
     return [], dict(driven)
 
@@ -73,7 +74,7 @@ def test_cars_use_pybullet_only_near_others(car: CarFactory, monkeypatch: pytest
     find = Physics._within_reach
 
     def noted(
-        physics: Physics, bodies: Mapping[str, Body], driven: Mapping[str, DrivenBody]
+        physics: Physics, bodies: BodyGroup, driven: Mapping[str, DrivenBody]
     ) -> tuple[list[ScriptedBody], dict[str, DrivenBody]]:
         found = find(physics, bodies, driven)
         watched.append(bool(found[1]))

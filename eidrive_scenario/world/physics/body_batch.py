@@ -1,0 +1,203 @@
+"""Bodies of a world of which many are scripted and move together in arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import chain
+
+import numpy as np
+from msgspec.structs import astuple
+
+from eidrive_scenario.arrays import Array, Bools, Integers, of_each
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.world.actor import Placement
+from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.physics.body_group import BodyGroup
+from eidrive_scenario.world.physics.footprints import Footprints, near_rows
+from eidrive_scenario.world.view import ActorState
+
+MANY = 100
+"""Number of scripted bodies from which they move together."""
+
+_FIELDS = len(Placement.__struct_fields__)
+
+
+class BodyBatch(BodyGroup):
+    """Bodies of which the scripted ones move together.
+
+    `place` computes the same bits as `ScriptedBody.place`: arithmetic in arrays, but sine and cosine by `math`, as
+    those of arrays round differently. Attributes of scripted bodies are then outdated until `current` is called.
+    """
+
+    def __init__(self, bodies: Sequence[Body], dt: float) -> None:
+        super().__init__(bodies)
+        self._dt = dt
+        scripted = {row: body for row, body in enumerate(bodies) if isinstance(body, ScriptedBody)}
+        self._scripted = list(scripted.values())
+        self._names = [body.name for body in self._scripted]
+        self._rows = np.array(list(scripted), dtype=np.intp)
+        self._others = {row: body for row, body in enumerate(bodies) if row not in scripted}
+        self._offset = np.array([body.spec.offset for body in self._scripted]).T
+        self._half_size = np.array([(body.spec.size[0] / 2, body.spec.size[1] / 2) for body in bodies]).T
+        self._radius = np.array([body.radius for body in bodies])
+        self._state: Array = np.array([body.state for body in self._scripted])
+        self._from = np.array([body.from_pose for body in self._scripted])
+        self._resting: Bools = np.array([body.is_resting for body in self._scripted])
+        self._stale: Bools = np.array([body.stale for body in self._scripted])
+        self._before: Array = np.array([body.velocity_before for body in self._scripted])
+        self._center = self._state[:, 0:3]
+        self._cos = self._sin = self._state[:, 3]
+        self._moved = self._resting
+        self._is_outdated = False
+
+    @np.errstate(over="ignore", invalid="ignore")  # as for single floats
+    def place(self, placements: Mapping[str, Placement]) -> None:
+        old, dt = self._state, self._dt
+        wanted = self._placements(placements)
+        pose, after, speed, old_velocity = old[:, :6], wanted[:, :6], wanted[:, 6], old[:, 6:9]
+        teleports, across = wanted[:, 7] != 0.0, wanted[:, 8] != 0.0
+        yaw, pitch = after[:, 3], after[:, 4]
+        cos, sin = of_each(math.cos, yaw), of_each(math.sin, yaw)
+        pitched: Integers = np.flatnonzero(pitch)
+        velocity = _along_heading(speed, cos, sin, pitch, pitched)
+        sideways = np.flatnonzero(across & ~teleports)
+        if len(sideways):
+            covered = (after[sideways, :3] - pose[sideways, :3]) / dt
+            ahead = _along_heading(np.ones(len(cos)), cos, sin, pitch, pitched)[sideways]
+            vx, vy, vz = (covered * ahead).T
+            excess = speed[sideways] - (vx + vy + vz)
+            velocity[sideways] = covered + excess[:, None] * ahead
+        moved = (pose != after).any(axis=1)
+        acceleration = (velocity - old_velocity) / dt
+        yaw_rate = np.where(yaw != pose[:, 3], wrap_angle(yaw - pose[:, 3]) / dt, 0.0)
+        acceleration[teleports], yaw_rate[teleports] = 0.0, 0.0
+        before = np.where(teleports[:, None], velocity, old_velocity)
+        start = np.where(teleports[:, None], after, pose)
+        moving = moved | velocity.any(axis=1)
+        stays = self._resting & (speed == 0.0) & (self._from == after).all(axis=1)
+        state = np.concatenate([after, velocity, acceleration, yaw_rate[:, None], speed[:, None]], axis=1)
+        if stays.any():
+            state[stays], before[stays], start[stays] = old[stays], self._before[stays], self._from[stays]
+        x, y, z = after[:, :3].T
+        ahead_x, left_y, up_z = self._offset
+        self._center = np.stack([x + cos * ahead_x - sin * left_y, y + sin * ahead_x + cos * left_y, z + up_z], axis=1)
+        self._cos, self._sin, self._moved = cos, sin, moved
+        self._stale |= (old[:, 12] != 0.0) | old_velocity.any(axis=1) | moving
+        self._resting = stays | ~(moving | acceleration.any(axis=1))
+        self._state, self._before, self._from = state, before, start
+        self._is_outdated = True
+
+    def current(self) -> Sequence[Body]:
+        if self._is_outdated:
+            self._is_outdated = False
+            self._write_back(np.arange(len(self._scripted)))
+        return self._bodies
+
+    def _update(self, rows: Collection[int]) -> None:
+        """Set the attributes of the bodies of some rows to the current values."""
+        if self._is_outdated and rows:
+            self._write_back(np.flatnonzero(np.isin(self._rows, list(rows))))
+
+    def _write_back(self, members: Integers) -> None:
+        """Set the attributes of some scripted bodies."""
+        columns = (
+            [tuple.__new__(ActorState, state) for state in self._state[members].tolist()],
+            self._center[members].tolist(),
+            zip(self._cos[members].tolist(), self._sin[members].tolist(), strict=True),
+            map(tuple, self._from[members].tolist()),
+            map(tuple, self._before[members].tolist()),
+            self._moved[members].tolist(),
+            self._stale[members].tolist(),
+            self._resting[members].tolist(),
+        )
+        for member, *values in zip(members.tolist(), *columns, strict=True):
+            self._scripted[member].end_step(*values)
+
+    def settle(self) -> None:
+        members = np.flatnonzero(self._stale)
+        states = dict(zip(self._rows[members].tolist(), self._state[members].tolist(), strict=True))
+        # In the order of the bodies, on which the order of contacts in pybullet depends.
+        for row in sorted([*states, *self._others]):
+            body = self._bodies[row]
+            if isinstance(body, ScriptedBody):
+                state = states[row]
+                body.move_rigid_body(state[:6], state[6:9], state[12])
+            elif body.stale:
+                body.sync_pose()
+        self._stale[:] = False
+
+    def states(self) -> tuple[list[ActorState], Array]:
+        table = self._state
+        if self._others:
+            table = np.empty((len(self._bodies), table.shape[1]))
+            table[self._rows] = self._state
+            for row, body in self._others.items():
+                table[row] = body.state
+        table.flags.writeable = False
+        return [tuple.__new__(ActorState, row) for row in table.tolist()], table
+
+    def any_moved(self) -> bool:
+        return bool(self._moved.any()) or any(body.moved for body in self._others.values())
+
+    def moved_names(self) -> set[str]:
+        names = {self._names[row] for row in np.flatnonzero(self._moved).tolist()}
+        return names.union(body.name for body in self._others.values() if body.moved)
+
+    def neighbors(self, of: Sequence[Body], margin: float) -> list[Sequence[Body]]:
+        x, y = self._centers()
+        reach = self._radius.copy()
+        reach[self._rows] += self._travel()
+        for row, body in self._others.items():
+            reach[row] += body.travel
+        found = list(near_rows(x, y, reach, of, margin))
+        self._update(set(chain.from_iterable(found)))
+        return [[self._bodies[row] for row in rows] for rows in found]
+
+    def _travel(self) -> Array:
+        """Return `ScriptedBody.travel`, but for rounding."""
+        covered = self._state[:, :5] - self._from[:, :5]
+        turn = np.abs(wrap_angle(covered[:, 3])) + np.abs(covered[:, 4])
+        way: Array = np.sqrt(np.sum(covered[:, :3] ** 2, axis=1))
+        way += turn * 2.0 * self._radius[self._rows]
+        return way
+
+    def near_pairs(self, gap: float) -> Iterator[tuple[Body, Body]]:
+        pairs = self._footprints().near_pairs(gap)
+        self._update(set(chain.from_iterable(pairs)))
+        for row, other in pairs:
+            yield self._bodies[row], self._bodies[other]
+
+    def _footprints(self) -> Footprints:
+        x, y = self._centers()
+        cos, sin = np.empty((2, len(self._bodies)))
+        moved = np.empty(len(self._bodies), dtype=bool)
+        cos[self._rows], sin[self._rows], moved[self._rows] = self._cos, self._sin, self._moved
+        for row, body in self._others.items():
+            cos[row], sin[row], moved[row] = math.cos(body.yaw), math.sin(body.yaw), body.moved
+        half_length, half_width = self._half_size
+        return Footprints(x, y, cos, sin, half_length, half_width, self._radius, moved)
+
+    def _centers(self) -> Array:
+        """Return x and y of the centers of all boxes (2, N)."""
+        centers = np.empty((2, len(self._bodies)))
+        centers[:, self._rows] = self._center[:, :2].T
+        for row, body in self._others.items():
+            centers[:, row] = body.center_x, body.center_y
+        return centers
+
+    def _placements(self, placements: Mapping[str, Placement]) -> Array:
+        """Return the placements of the scripted bodies as rows; that of a body without one is its pose, at rest."""
+        found = list(map(placements.get, self._names))
+        rows = [astuple(placement or Placement(*self._state[row, :6].tolist())) for row, placement in enumerate(found)]
+        return np.fromiter(chain.from_iterable(rows), float, _FIELDS * len(rows)).reshape(-1, _FIELDS)
+
+
+def _along_heading(speed: Array, cos: Array, sin: Array, pitch: Array, pitched: Integers) -> Array:
+    """Return velocities (N, 3) of speeds along headings; `pitched` are the rows with a pitch."""
+    level, rise = speed, np.zeros(len(speed))
+    if len(pitched):
+        level = speed.copy()
+        level[pitched] = speed[pitched] * of_each(math.cos, pitch[pitched])
+        rise[pitched] = -speed[pitched] * of_each(math.sin, pitch[pitched])
+    return np.stack([level * cos, level * sin, rise], axis=1)
