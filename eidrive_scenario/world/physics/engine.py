@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import repeat
+from itertools import chain, repeat
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.geometry import box_distance
@@ -151,11 +151,8 @@ class Physics:
         impact = _MAX_IMPACT * self._dt
         movers = list(driven.values())
         neighbors = bodies.neighbors(movers, 2.0 * (self._slack + impact))
-        travels: dict[str, float] = {}
-        for others in neighbors:
-            for other in others:
-                if other.name not in travels:
-                    travels[other.name] = other.travel + self._slack
+        nearby = dict.fromkeys(chain.from_iterable(neighbors))
+        travels = {other.name: other.travel + self._slack for other in nearby}
         if not any(map(self._may_meet, movers, neighbors, repeat(travels))):
             return [], watched
         for body, others in zip(movers, neighbors, strict=True):
