@@ -62,8 +62,8 @@ def _considered(view: WorldView, own: frozenset[str], near: Array | None) -> Int
     if not len(near):
         return rows[:0]
     reach = LOOK_AHEAD + np.hypot(view.size[rows, 0], view.size[rows, 1])
-    square = np.sum((view.position[rows, None, :2] - near[None]) ** 2, axis=2)
-    return np.asarray(rows[np.any(square < reach[:, None] ** 2, axis=1)])
+    dx, dy = (view.position[rows, axis, None] - near[:, axis] for axis in (0, 1))
+    return np.asarray(rows[np.any(dx * dx + dy * dy < reach[:, None] ** 2, axis=1)])
 
 
 def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Occupants, set[int]]:
