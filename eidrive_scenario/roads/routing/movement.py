@@ -281,10 +281,9 @@ def _along(
             ds = remaining / stretch
         else:
             stretch = _stretch(road, section, lane, s, offset)
+            ds = min(min(remaining, STRIDE) / stretch, reach)
+            stretch = _stretch(road, section, lane, s + 0.5 * direction * ds, offset)
             ds = min(remaining, STRIDE) / stretch
-            if ds < reach or stretch != 1.0:
-                stretch = _stretch(road, section, lane, s + 0.5 * direction * min(ds, reach), offset)
-                ds = min(remaining, STRIDE) / stretch
         if ds < reach:
             s += direction * ds
             remaining -= ds * stretch
