@@ -114,7 +114,7 @@ class BodyBatch(BodyGroup):
         for member, *values in zip(members.tolist(), *columns, strict=True):
             self._scripted[member].end_step(*values)
 
-    def settle(self) -> None:
+    def sync_poses(self) -> None:
         members = np.flatnonzero(self._stale)
         states = dict(zip(self._rows[members].tolist(), self._state[members].tolist(), strict=True))
         # In the order of the bodies, on which the order of contacts in pybullet depends.

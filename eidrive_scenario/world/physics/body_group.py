@@ -38,7 +38,7 @@ class BodyGroup(ABC):
         """Return all bodies with their current attributes."""
 
     @abstractmethod
-    def settle(self) -> None:
+    def sync_poses(self) -> None:
         """Move the rigid bodies whose poses are outdated to the poses of the actors."""
 
     @abstractmethod
@@ -83,7 +83,7 @@ class SingleBodies(BodyGroup):
     def current(self) -> Sequence[Body]:
         return self._bodies
 
-    def settle(self) -> None:
+    def sync_poses(self) -> None:
         for body in self._bodies:
             if body.stale:
                 body.sync_pose()

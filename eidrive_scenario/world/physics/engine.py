@@ -85,7 +85,7 @@ class Physics:
     def refresh(self, bodies: BodyGroup) -> None:
         """Update the search structure of pybullet, which setting poses does not update."""
         if not self._searchable:
-            bodies.settle()
+            bodies.sync_poses()
             bullet.performCollisionDetection(self._client)
             self._searchable = True
 
@@ -106,7 +106,7 @@ class Physics:
         passing, watched = self._within_reach(bodies, driven)
         touches: Touches = {}
         if watched:
-            bodies.settle()
+            bodies.sync_poses()
             self._step_through(bodies.members, passing, watched, demands, touches)
         for name, body in driven.items():
             if name not in watched:
