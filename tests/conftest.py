@@ -1,0 +1,22 @@
+"""Stacks of crashes: pytest sessions within tests redirect those of faulthandler to files that no longer exist."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+
+import pytest
+
+_ERROR_OUTPUT = pytest.StashKey[int]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep the error output of the session, before the output of tests is captured."""
+    config.stash[_ERROR_OUTPUT] = os.dup(2)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Write the stack of a crash to the error output of the session again."""
+    if item.config.pluginmanager.has_plugin("faulthandler"):
+        faulthandler.enable(file=item.config.stash[_ERROR_OUTPUT])
