@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -62,7 +63,7 @@ def openvino_network(path: Path, threads: int, content: bytes) -> Compute:
 
     Networks of third parties are not executed, as their models may name further files with tensors.
     """
-    core = _openvino().Core()
+    core = _openvino_core()
     settings = {
         "INFERENCE_NUM_THREADS": threads,
         "NUM_STREAMS": 1,
@@ -81,6 +82,16 @@ def openvino_network(path: Path, threads: int, content: bytes) -> Compute:
             return [np.array(request.get_output_tensor(number).data) for number in range(len(compiled.outputs))]
 
     return compute
+
+
+@cache
+def _openvino_core() -> Any:
+    """Return the core of OpenVINO of this process, which is never freed.
+
+    Its plugin for CPUs sets the stack for signals of the thread that loads it, and frees the memory of this stack with
+    the core. If another thread freed the core, the next signal, such as Ctrl-C, would end the process by SIGSEGV.
+    """
+    return _openvino().Core()
 
 
 def _openvino() -> Any:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,12 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.perception.learned import runtime_selection
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
-from eidrive_scenario.perception.learned.runtime_selection import runtime_versions, select_runtime
+from eidrive_scenario.perception.learned.runtime_selection import (
+    Runtime,
+    is_installed,
+    runtime_versions,
+    select_runtime,
+)
 from eidrive_scenario.perception.learned.runtimes import Compute, load_onnx
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
@@ -187,3 +194,29 @@ def test_resolved_settings_with_onnx_weights_state_runtime(tmp_path: Path) -> No
 def resolved_versions(path: Path) -> dict[str, str]:
     with Simulation(load_for_seed(path, 1, {}), seed=1, settings=RunSettings()) as simulation:
         return dict(simulation.resolved.versions)
+
+
+@pytest.mark.parametrize("runtime", ["onnxruntime", "openvino", "opencv"])
+def test_process_can_be_interrupted_after_another_thread_freed_a_network(runtime: Runtime) -> None:
+    """OpenVINO sets a stack for signals of its thread, and frees the memory of this stack with its core."""
+    if not is_installed(runtime):
+        pytest.skip(f"needs {runtime}")
+    program = """
+import faulthandler, gc, signal, sys, threading
+from pathlib import Path
+from eidrive_scenario.perception.learned.runtimes import load_onnx
+
+faulthandler.enable()
+signal.signal(signal.SIGINT, signal.default_int_handler)
+networks = [load_onnx(sys.argv[1], Path(sys.argv[2]), 1)]
+thread = threading.Thread(target=lambda: (networks.clear(), gc.collect()))
+thread.start()
+thread.join()
+try:
+    signal.raise_signal(signal.SIGINT)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    command = [sys.executable, "-c", program, runtime, str(RED_BOXES)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (0, "interrupted\n"), ended.stderr
