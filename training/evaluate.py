@@ -3,7 +3,7 @@
 The detectors are evaluated on at least 1,000 held-out images, which are rendered if they are missing, and on the scenes
 of the library: average precision at overlap 0.5 with detections sorted over the whole set; recall by class, distance
 and weather; causes of misses; traffic lights; errors of lifted centers by distance; recall against fog and darkness;
-size and time. Writes reports/detection.md, .json and .png.
+size and time; average precision by runtime. Writes reports/detection.md, .json and .png.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from training.image_evaluation import (
 from training.light_scenes import light_scenes
 from training.light_scores import light_table, readings
 from training.misses import misses
+from training.runtime_scores import runtime_table
 from training.scenes import StationScene, library_scenes, random_scenes
 from training.scoring import VEHICLES, EvaluatedImage, Part, score
 from training.sweeps import plot_sweeps, sweeps
@@ -71,6 +72,7 @@ def evaluate(options: argparse.Namespace) -> None:
     add([_size_and_time(networks, scenes[0])])
     evaluated = {name: evaluate_dataset(sensitive_networks[name], dataset, networks[name].confidence) for name in names}
     add([*tables_of(evaluated, "Held-out images"), misses(evaluated, dataset)])
+    add([runtime_table(names, dataset, options.runtime_pictures, LOW)])
     in_library = {name: evaluate_scenes(sensitive_networks[name], scenes, networks[name].confidence) for name in names}
     add(tables_of(in_library, "Library scenes"))
     lights = light_scenes(options.seed, "lights held_out", options.light_worlds, options.processes)
@@ -139,6 +141,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--pictures", type=int, default=1200, help="number of held-out images; rendered once")
+    parser.add_argument("--runtime-pictures", type=int, default=240, help="number of these images for each runtime")
     parser.add_argument("--light-worlds", type=int, default=80, help="places with six images of traffic lights each")
     parser.add_argument("--worlds", type=int, default=30, help="places of random scenes with lidar")
     parser.add_argument("--sweep-worlds", type=int, default=20, help="number of scenes per weather of the curves")

@@ -38,11 +38,14 @@ def held_out(folder: Path, seed: int, images: int, processes: int) -> Dataset:
     return Dataset.load(folder)
 
 
-def evaluate_dataset(network: ImageNetwork, dataset: Dataset, confidence: float) -> list[EvaluatedImage]:
-    """Return the detections of a network in the images of a dataset."""
+def evaluate_dataset(
+    network: ImageNetwork, dataset: Dataset, confidence: float, images: Sequence[int] | None = None
+) -> list[EvaluatedImage]:
+    """Return the detections of a network in the images of a dataset, all or those of these rows."""
     to_find = dataset.to_find()
+    selected = range(len(dataset)) if images is None else images
     evaluated = []
-    for number, image in enumerate(dataset.images()):
+    for number, image in zip(selected, dataset.images(selected), strict=True):
         rows = dataset.objects(number)
         objects = Objects(
             boxes=dataset.box[rows].astype(float),

@@ -1,4 +1,4 @@
-"""Tables of `make eval`: accuracy of traffic light states, and causes of missed vehicles."""
+"""Tables of `make eval`: accuracy of traffic light states, causes of missed vehicles, and scores by runtime."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
+from numpy.typing import NDArray
 
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.learned.settings import LearnedSettings
+from training import runtime_scores
 from training.dataset import Dataset, encode, write
 from training.light_scores import Reading, light_table
 from training.misses import CAUSES, causes, misses
@@ -36,6 +40,7 @@ def dataset(folder: Path) -> Dataset:
         "size": np.full((2, 2), (100, 80)),
         "visual_range": np.array([200.0, 10_000.0]),
         "sun_elevation": np.array([40.0, -20.0]),
+        "weather": np.array(["fog", "night"]),
         "picture": np.array([row[0] for row in rows]),
         "number": np.array([row[1] for row in rows]),
         "box": np.array([row[2] for row in rows], dtype=np.float32),
@@ -98,3 +103,44 @@ def test_light_table_counts_correct_and_incorrect_states() -> None:
     assert by_name["15 to 25 m"] == ["0.50", "0.25", "4"]
     assert by_name["occluded"] == ["0.50", "0.00", "2"]
     assert f"## {title}" in as_markdown([(title, head, rows)])
+
+
+class LeftCar:
+    """Detector of the car at (30, 30), in some images only."""
+
+    confidence = 0.5
+
+    def __init__(self, images: int, score: float) -> None:
+        self.images, self.score = images, score
+
+    def find(self, image: NDArray[np.uint8]) -> ImageDetections:
+        assert image.shape == (80, 100, 3)
+        self.images -= 1
+        boxes = np.array([[30.0, 30.0, 50.0, 50.0]])[: self.images + 1]
+        return ImageDetections(boxes, np.full(len(boxes), self.score), ("car",) * len(boxes))
+
+
+def test_runtime_table_compares_classes_with_torch_and_repetitions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Torch detects two of eight cars, ONNX Runtime one; the scores of the latter increase from network to network."""
+    built: list[str] = []
+
+    def build(name: str, settings: LearnedSettings) -> LeftCar:
+        built.append(settings.runtime)
+        onnx = settings.runtime == "onnxruntime"
+        return LeftCar(1 if onnx else 2, 0.5 + (0.01 * len(built) if onnx else 0.0))
+
+    monkeypatch.setattr(runtime_scores, "build_network", build)
+    monkeypatch.setattr(runtime_scores, "is_installed", {"torch", "onnxruntime"}.__contains__)
+    title, head, rows = runtime_scores.runtime_table(["yolov5"], dataset(tmp_path), 240, 0.01)
+    assert title == "Runtimes: 2 held-out images"
+    by_runtime = {row[1].split()[0]: dict(zip(head, row, strict=True)) for row in rows}
+    assert set(by_runtime) == {"torch", "onnxruntime"}
+    found = by_runtime["onnxruntime"]
+    assert (found["class"], found["largest difference"]) == ("car", "0.125000")
+    assert found["mean AP50"] in {"0.062", "0.063"}  # of cars and pedestrians
+    assert found["equal when repeated"] == "no"
+    assert by_runtime["torch"]["largest difference"] == "0.000000"
+    assert by_runtime["torch"]["equal when repeated"] == "yes"
+    assert built == ["onnxruntime", "onnxruntime", "torch", "torch"]
