@@ -24,8 +24,12 @@ from eidrive_scenario.simulation.driven_entities import drive_entities
 from eidrive_scenario.simulation.planner_option import select_planner
 from eidrive_scenario.simulation.run import RunSettings
 from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world import World
 from eidrive_scenario.world.weather import Weather, load_weather
+
+LONGEST_STEP = 0.1
+"""Time step above which a run has a warning [s]: the shortest interval between messages of ETSI's generation rules."""
 
 
 class RunSetup(msgspec.Struct, frozen=True):
@@ -94,7 +98,9 @@ def set_up_run(
     declarations = [*criteria, *(one for several in declared.values() for one in several), *added]
     all_criteria = [one.build() for one in declarations]
     progress = progress_warnings(scenario, all_criteria, frozenset(driving.possible_drivers))
-    warnings = tuple(map(str, [*replaced, *_warnings(scenario, roads, driving), *progress]))
+    warnings = tuple(
+        map(str, [*replaced, *_warnings(scenario, roads, driving), *progress, *_step_warnings(settings.dt)])
+    )
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
     if weather is not None:
         world.set_weather(weather)
@@ -123,3 +129,13 @@ def _warnings(scenario: Scenario, roads: RoadNetwork | None, stack: DrivingStack
     yield from unsupported_criteria(scenario)
     yield from roads.map_warnings if roads is not None else ()
     yield from stack.warnings()
+
+
+def _step_warnings(dt: float) -> Iterator[Diagnostic]:
+    """Yield a warning if the time step [s] is longer than the functions of a station need."""
+    if dt > LONGEST_STEP + TIME_TOLERANCE:
+        yield Diagnostic(
+            f"the time step is {dt:g} s: stations perceive, plan and send at most once per step, and contacts of "
+            "scripted actors between two steps are not detected",
+            f"give a dt of at most {LONGEST_STEP:g} s",
+        )

@@ -48,7 +48,7 @@ def substeps_per_tick(dt: float, physics_rate: float) -> int:
     count = round(exact)
     if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
         message = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
-        raise SettingError(Diagnostic(message, "choose dt and the rate so that this is an integer of at least 1"))
+        raise SettingError(Diagnostic(message, f"give a dt that is a multiple of {1.0 / physics_rate:g} s"))
     return count
 
 

@@ -244,6 +244,20 @@ def test_run_with_long_time_step_ends(eidrive: Eidrive) -> None:
     result = eidrive("run", "coop/scenario_1", "--no-record", "--dt", "100", "--time-limit", "1000")
     assert result.exit_code == 1
     assert "end: stop trigger at 100.00 s" in result.stdout
+    assert "warning: the time step is 100 s: stations perceive, plan and send at most once per step" in result.stderr
+
+
+def test_time_step_up_to_interval_of_messages_has_no_warning(eidrive: Eidrive) -> None:
+    """Three steps of 0.1 s, and 0.15 s, are multiples of a physics step."""
+    short = ("run", "coop/scenario_1", "--no-record", "--time-limit", "0.3", "--dt")
+    assert eidrive(*short, "0.1").stderr == ""
+    assert "give a dt of at most 0.1 s" in eidrive(*short, "0.15").stderr
+
+
+def test_time_step_below_physics_step_is_error_that_names_multiple(eidrive: Eidrive) -> None:
+    result = eidrive("run", "coop/scenario_1", "--no-record", "--dt", "0.002")
+    assert result.exit_code == 2
+    assert "a tick of 0.002 s is 0.4 physics steps at 200 Hz; give a dt that is a multiple of 0.005 s" in result.stderr
 
 
 def test_show_prints_ratio_to_real_time(capsys: pytest.CaptureFixture[str]) -> None:

@@ -111,7 +111,7 @@ def test_substeps_per_tick_of_a_multiple(dt: float, rate: float, count: int) -> 
 
 @pytest.mark.parametrize(("dt", "rate"), [(0.033, 200.0), (0.001, 200.0), (0.0, 200.0)])
 def test_substeps_per_tick_of_a_fraction_is_an_error(dt: float, rate: float) -> None:
-    with pytest.raises(SettingError, match="is an integer of at least 1"):
+    with pytest.raises(SettingError, match=r"is a multiple of 0\.005 s"):
         World(dt=dt, physics_rate=rate)
 
 
