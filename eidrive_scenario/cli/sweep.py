@@ -196,11 +196,17 @@ def sweep(
 
 
 def _print_summary(progress: SweepProgress, store: Path) -> None:
-    """Print the number of runs by status, and the most frequent reasons of runs without a verdict."""
+    """Print the number of runs by status, that of runs with warnings, and the most frequent reasons of runs without a
+    verdict."""
+    from eidrive_scenario.experiments.sweeps.results import describe_warned
+
     counts = ", ".join(f"{count} {status}" for status, count in sorted(progress.counts.items()))
     stored = ", ".join(f"{count} {status}" for status, count in sorted(progress.stored.items()))
     kept = f", {progress.kept} already in the store ({stored})" if stored else ""
     typer.echo(f"{progress.done} runs in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}")
+    count, command = progress.warned
+    if count:
+        print_warnings([describe_warned(count, progress.done, command)])
     for (status, message), count in progress.errors.most_common(REASONS):
         typer.echo(f"{count} {status}: {message}", err=True)
     if not progress.is_complete:
@@ -228,6 +234,7 @@ def results(
         mixed_versions,
         stored_runs,
         summaries,
+        warned,
         write_csv,
         write_parquet,
     )
@@ -239,8 +246,9 @@ def results(
     found = list(stored_runs(stores))
     names = None if by is None else [name.strip() for name in by.split(",")]
     rows = summaries(found, by=names, interval=interval, confidence=confidence)
-    warnings = (indistinct(found), mixed_versions(found))
-    print_warnings([f"{warning}; a new store keeps them apart" for warning in warnings if warning])
+    mixed = (indistinct(found), mixed_versions(found))
+    warnings = (*(f"{one}; a new store keeps them apart" for one in mixed if one), warned(found))
+    print_warnings([warning for warning in warnings if warning])
     if csv is not None:
         write_csv(found, csv)
     if parquet is not None:

@@ -97,6 +97,18 @@ def mixed_versions(runs: Iterable[StoredRun]) -> str:
     return f"the success rates mix runs of different versions: {'; '.join(texts)}" if texts else ""
 
 
+def warned(runs: Sequence[StoredRun]) -> str:
+    """Return the number of runs with warnings, and the command that prints those of the first; empty without any."""
+    commands = [run.command for run in runs if run.result.get("warnings")]
+    return describe_warned(len(commands), len(runs), commands[0]) if commands else ""
+
+
+def describe_warned(count: int, total: int, command: str) -> str:
+    """Return that `count` of `total` runs have warnings, and the command that prints those of the first, if known."""
+    text = f"{count} of {total} runs {'has' if count == 1 else 'have'} warnings"
+    return f"{text}; to print those of the first: {command}" if command else text
+
+
 def summaries(
     runs: Iterable[StoredRun], *, by: Sequence[str] | None = None, interval: str = "anytime", confidence: float = 0.95
 ) -> list[PointSummary]:

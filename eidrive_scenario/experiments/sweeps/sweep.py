@@ -37,17 +37,21 @@ class SweepProgress:
     stored  number of runs that the store already had, by status
     counts  number of runs of this call by status
     errors  number of runs of this call without a verdict, by status and first line of the message, the first hundred
+    warned  number of runs of this call with warnings, and the command of the first of them
     """
 
     total: int
     stored: Counter[str] = field(default_factory=Counter)
     counts: Counter[str] = field(default_factory=Counter)
     errors: Counter[tuple[str, str]] = field(default_factory=Counter)
+    warned: tuple[int, str] = (0, "")
     start: float = field(default_factory=time.perf_counter)
 
     def count(self, run: StoredRun) -> None:
         """Count a run that has ended."""
         self.counts[run.status] += 1
+        if run.result.get("warnings"):
+            self.warned = self.warned[0] + 1, self.warned[1] or run.command
         reason = run.status, run.error.partition("\n")[0]
         if run.status not in JUDGED and (reason in self.errors or len(self.errors) < MOST_REASONS):
             self.errors[reason] += 1

@@ -271,3 +271,24 @@ def test_export_over_a_store_is_refused(eidrive: Eidrive, store: Path, option: s
     assert result.exit_code == 2
     assert f"{option} would overwrite an input file" in result.stderr
     assert store.read_bytes() == before
+
+
+def test_sweep_and_results_name_runs_with_warnings(eidrive: Eidrive, tmp_path: Path) -> None:
+    """A time step above 0.1 s is a warning of each run."""
+    options = ("--vary", "dt=0.05,0.5", "--seeds", "1,2", "--vary", "time_limit=0.5")
+    swept = eidrive("sweep", "coop/scenario_1", *options, "--store", tmp_path / "s.db")
+    command = "eidrive run coop/scenario_1 --seed 1 --dt 0.5 --time-limit 0.5"
+    expected = f"warning: 2 of 4 runs have warnings; to print those of the first: {command}"
+    assert expected in swept.stderr
+    assert expected in eidrive("results", tmp_path / "s.db").stderr
+    assert "warning: the time step is 0.5 s" in eidrive(*command.split()[1:], "--no-record").stderr
+    again = eidrive("sweep", "coop/scenario_1", *options, "--store", tmp_path / "s.db")
+    assert "warnings" not in again.stderr, "no run of this call"
+
+
+def test_results_of_runs_without_a_command_count_warnings(eidrive: Eidrive, tmp_path: Path) -> None:
+    with ResultStore.open(tmp_path / "s.db", {"numpy": "2"}) as opened:
+        opened.add(replace(RUNS[0], result={**RUNS[0].result, "warnings": 2}, command=""))
+        opened.add(replace(RUNS[1], result={**RUNS[1].result, "warnings": 0}))
+        opened.add(RUNS[3])
+    assert eidrive("results", tmp_path / "s.db").stderr == "warning: 1 of 3 runs has warnings\n"
