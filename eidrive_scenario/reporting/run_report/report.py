@@ -25,6 +25,8 @@ MOST_LISTED = 1000
 """Maximum number of runs whose verdicts are listed; those that did not pass come first."""
 MOST_SETTINGS = 200
 """Maximum number of runs of a page with all settings of each; other runs have their command."""
+MOST_WARNINGS = 100
+"""Maximum number of different warnings of a page; the most frequent ones come first."""
 SHOWN = 4
 """Maximum number of metrics in the overview."""
 _UNITS = {"count": "", "impact_speed": "m/s"}
@@ -98,6 +100,8 @@ def write_report(
         ),
         omitted=omitted,
         unjudged=unjudged,
+        warned=sum(bool(run.warnings) for run in counted),
+        warnings=_warnings(counted),
     )
 
 
@@ -106,6 +110,20 @@ def _listed(counted: Sequence[ReportedRun], runs: Sequence[ReportedRun]) -> set[
     if len(runs) <= MOST_LISTED:
         return {id(run) for run in runs}
     return {id(run) for run in sorted(counted, key=lambda run: run.passed)[:MOST_LISTED]}
+
+
+def _warnings(runs: Sequence[ReportedRun]) -> list[str]:
+    """Return a line for each different warning, with the number of its runs and the command of one."""
+    counts = Counter(warning for run in runs for warning in dict.fromkeys(run.warnings))
+    commands: dict[str, str] = {}
+    for run in runs:
+        for warning in run.warnings:
+            commands.setdefault(warning, run.command)
+    return [
+        f"{count} run{'' if count == 1 else 's'}: {warning}"
+        + f" (such as {commands[warning]})" * bool(commands[warning])
+        for warning, count in counts.most_common(MOST_WARNINGS)
+    ]
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:

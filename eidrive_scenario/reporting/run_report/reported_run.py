@@ -47,6 +47,7 @@ class ReportedRun(BaseModel):
     end_reason: str
     criteria: tuple[ReportedCriterion, ...] = ()
     metrics: dict[str, float | None] = {}
+    warnings: tuple[str, ...] = ()
     trace_hash: str = ""
     simulated_s: float = 0.0
     run: int | None = None

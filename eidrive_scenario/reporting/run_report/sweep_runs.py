@@ -74,8 +74,9 @@ def _kept_result(run: StoredRun, store: Path) -> tuple[Path, Mapping[str, Any]] 
 
 
 def _as_result(run: StoredRun) -> dict[str, Any]:
-    """Return a row in the format of `--json`, which has neither the reasons nor the units of criteria."""
+    """Return a row in the format of `--json`, without reasons and units of criteria, and texts of warnings."""
     row = run.result
+    count = row.get("warnings")
     settings = json.loads(run.settings) if run.settings else {}
     names = [name.removesuffix(".passed") for name in row if name.endswith(".passed")]
     criteria = [
@@ -92,6 +93,7 @@ def _as_result(run: StoredRun) -> dict[str, Any]:
         "end_reason": row.get("end_reason"),
         "criteria": criteria,
         "metrics": {name: value for name, value in row.items() if _is_metric(name, value)},
+        "warnings": [f"{count} warning{'' if count == 1 else 's'}, printed by the command of the run"] if count else [],
         "parameters": settings.get("parameters", {}),
         "settings": settings,
         "settings_sha256": row.get("settings_sha256", ""),

@@ -71,6 +71,40 @@ def test_report_counts_run_at_time_limit_as_unfinished(tmp_path: Path) -> None:
     assert text == "1 did not finish"
 
 
+def warnings_of(page: Path) -> list[str]:
+    """Return the summary and the lines of the section about warnings."""
+    sections = html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//details")
+    return [
+        " ".join(str(part.text).split())
+        for section in sections
+        if "warnings" in str(section.findtext("summary"))
+        for part in section
+    ]
+
+
+def test_report_lists_each_warning_once_with_number_and_command_of_runs(tmp_path: Path) -> None:
+    """A warning counts once for each run; the copy of a run does not count."""
+    often, rare = "the time step is <0.5> s", "an event never started"
+    runs = [
+        result(1, "none", True, warnings=[rare, often, often], command="eidrive run a --seed 1"),
+        result(2, "none", True, warnings=[often], command="eidrive run a --seed 2"),
+        result(3, "none", True, warnings=[]),
+    ]
+    runs = [{**run, "settings_sha256": f"{number:064}"} for number, run in enumerate(runs)]
+    page = write_report([*runs, runs[1]], tmp_path)
+    assert warnings_of(page) == [
+        "2 runs have warnings",
+        f"2 runs: {often} (such as eidrive run a --seed 1)",
+        f"1 run: {rare} (such as eidrive run a --seed 1)",
+    ]
+    assert warnings_of(write_report(runs[2:], tmp_path / "none")) == []
+
+
+def test_report_of_result_with_invalid_warnings_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="warnings"):
+        write_report([result(1, "none", True, warnings=3)], tmp_path)
+
+
 def test_report_omits_null_metrics(tmp_path: Path) -> None:
     results = [result(1, "ideal", True, metrics={"ttc": None}), result(2, "ideal", True, metrics={"ttc": 1.5})]
     assert rows(write_report(results, tmp_path))[0][-1] == "1.50"

@@ -113,6 +113,16 @@ def test_record_without_out_is_invalid_input(eidrive: Eidrive, scenario: Path, t
     assert "--record without --out has no effect" in done.stderr
 
 
+def test_warnings_of_runs_without_files_are_counted(tmp_path: Path) -> None:
+    """A store has the number of warnings of each run, not their texts."""
+    runs = [row(number, True, Speed=number) for number in (1, 2, 3)]
+    for run, count in zip(runs, (1, 1, 0), strict=True):
+        run.result["warnings"] = count
+    text = page_of(tmp_path, runs).text_content()
+    assert "2 runs have warnings" in text
+    assert f"2 runs: 1 warning, printed by the command of the run (such as {runs[0].command})" in text
+
+
 def test_missing_files_of_kept_runs_leave_the_numbers(tmp_path: Path) -> None:
     kept = row(1, True, Speed=5)
     kept.result["folder"] = "gone"
