@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -23,7 +22,6 @@ from eidrive_scenario.perception.learned.weight_files import read_weights
 from eidrive_scenario.perception.learned.weights import Weights, read, suitable
 from eidrive_scenario.sensing.readings import CameraReading
 
-S = TypeVar("S")
 Infer = Callable[[Sequence[NDArray[np.uint8]]], list[list[Floats]]]
 """Function from images (H, W, 3) of the input size to all outputs of a network for each."""
 GPU_BATCH = 4
@@ -57,29 +55,26 @@ class OwnNetwork(ImageNetwork):
 
     def find_in(self, reading: CameraReading) -> ImageDetections:
         """Return the objects in the image of a camera; an image whose detections are stored is not drawn."""
-        return self.find_in_all([reading])[0]
+        memory = image_memory.active()
+        if memory is None or reading.image_digest is None:
+            return self.find(reading.rgb)
+        key = self._key_of(reading)
+        found = memory.images.get(key)
+        if found is None:
+            found = self.find(reading.rgb)
+            memory.images.add(key, found)
+        return found
 
     def find_in_all(self, readings: Sequence[CameraReading]) -> list[ImageDetections]:
         """Return the objects in the image of each camera; images whose detections are not stored form one batch."""
-        return self._find_unless_stored(readings, self._key_of, lambda reading: reading.rgb)
-
-    def find(self, image: NDArray[np.uint8]) -> ImageDetections:
-        return self._find_unless_stored([image], partial(image_memory.key_of, self.identity), lambda image: image)[0]
-
-    def _find_unless_stored(
-        self,
-        sources: Sequence[S],
-        key_of: Callable[[S], image_memory.Key],
-        draw: Callable[[S], NDArray[np.uint8]],
-    ) -> list[ImageDetections]:
-        """Return the objects in the image of each source, by its key from the memory of this process if it has one."""
         memory = image_memory.active()
         if memory is None:
-            return self._find_all([draw(source) for source in sources])
-        keys = [key_of(source) for source in sources]
+            return self._find_all([reading.rgb for reading in readings])
+        keys = [self._key_of(reading) for reading in readings]
         found = [memory.images.get(key) for key in keys]
         missing = [row for row, known in enumerate(found) if known is None]
-        for row, one in zip(missing, self._find_all([draw(sources[row]) for row in missing]), strict=True):
+        fresh = self._find_all([readings[row].rgb for row in missing])
+        for row, one in zip(missing, fresh, strict=True):
             image_memory.read_only(one.boxes, one.scores)
             memory.images.add(keys[row], one)
             found[row] = one
@@ -90,6 +85,18 @@ class OwnNetwork(ImageNetwork):
         if digest is None:
             return image_memory.key_of(self.identity, reading.rgb)
         return self.identity, reading.size, digest
+
+    def find(self, image: NDArray[np.uint8]) -> ImageDetections:
+        memory = image_memory.active()
+        if memory is None:
+            return super().find(image)
+        key = image_memory.key_of(self.identity, image)
+        found = memory.images.get(key)
+        if found is None:
+            found = super().find(image)
+            image_memory.read_only(found.boxes, found.scores)
+            memory.images.add(key, found)
+        return found
 
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
         return self._candidates(self._infer([image])[0])
