@@ -1,4 +1,4 @@
-"""Lateral actions and trajectories with values calculated by hand.
+"""Lateral actions with values calculated by hand.
 
 Ego drives at 20 m/s from x = 100 in lane -1 (y = -2).
 """
@@ -12,7 +12,7 @@ import pytest
 from recorded_scene import RunScene
 from storyboard_xml import speed_xml
 from street_scene import NOTHING, after
-from trajectories import RELATIVE, follow_points
+from trajectories import CORNER, follow_points
 from whole_run import Run
 
 from eidrive_scenario.errors import ScenarioError
@@ -191,64 +191,6 @@ def test_teleport_is_visible_in_the_next_view(scene: RunScene) -> None:
     played = scene(1, ("Ego", action))
     assert (played.at(0.1).x, played.at(0.1).y) == pytest.approx((500.0, 2.0))
     assert played.at(0.2).x == pytest.approx(498.0)
-
-
-CORNER = [(100.0, -2.0, None), (110.0, -2.0, None), (110.0, 18.0, None)]
-
-
-@pytest.mark.element("FollowTrajectoryAction", "Polyline")
-def test_trajectory_without_timing_keeps_the_own_speed(scene: RunScene) -> None:
-    played = scene(2, ("Ego", follow_points(CORNER)))
-    assert (played.at(0.4).x, played.at(0.4).y) == pytest.approx((108.0, -2.0))
-    assert (played.at(1.0).x, played.at(1.0).y, played.at(1.0).yaw) == pytest.approx((110.0, 8.0, math.pi / 2))
-    assert played.when("action 0", "completeState") == pytest.approx(1.5)
-
-
-@pytest.mark.element("FollowTrajectoryAction", "Timing")
-@pytest.mark.parametrize(
-    ("domain", "offset", "scale", "start"),
-    [("relative", 0, 1, 0.5), ("absolute", 0.5, 1, 0.5), ("relative", 1, 2, 1.5)],
-)
-def test_trajectory_with_timing_passes_vertices_at_their_times(
-    scene: RunScene, domain: str, offset: float, scale: float, start: float
-) -> None:
-    """10 m in 2 s from 0.5 s: 5 m/s, and half of it with doubled times."""
-    timed = [(100.0, -2.0, 0.0), (110.0, -2.0, 2.0)]
-    timing = f'<Timing domainAbsoluteRelative="{domain}" offset="{offset}" scale="{scale}"/>'
-    later = after(0.45)
-    played = scene(6, ("Ego", follow_points(timed, reference=timing), later))
-    assert played.at(start + scale).x == pytest.approx(105.0)
-    assert played.at(start + scale).speed == pytest.approx(5.0 / scale)
-    assert played.when("action 0", "completeState") == pytest.approx(start + 2 * scale)
-
-
-def test_trajectory_in_follow_mode_changes_speed_linearly(scene: RunScene) -> None:
-    """From 20 m/s, 10 m in 1 s: braking to standstill."""
-    timed = [(100.0, -2.0, 0.0), (110.0, -2.0, 1.0)]
-    played = scene(2, ("Ego", follow_points(timed, "follow")))
-    assert played.at(0.5).x == pytest.approx(107.5)
-
-
-@pytest.mark.parametrize("later", [False, True])
-def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Run, later: bool) -> None:
-    """At 20 m/s from x = 110, in an event as in Init: x = 150 after 2 s."""
-    action = follow_points([(110.0, -2.0, None), (500.0, -2.0, None)], reference=RELATIVE)
-    warnings: list[str] = []
-
-    def look(simulation: Simulation, frame: Frame) -> None:
-        warnings[:] = [str(diagnostic) for diagnostic in simulation.storyboard.context.warnings]
-
-    if later:
-        played = run(3, ("Ego", action, after(0.45)), driven=False, during=look)
-    else:
-        played = run(3, driven=False, init=f'<Private entityRef="Ego">{action}</Private>', during=look)
-    start = 0.5 if later else 0.0
-    for frame, x in zip(played.frames, played.x("Ego"), strict=True):
-        if frame.view.time > start + 0.1:
-            assert x == pytest.approx(110.0 + 20.0 * (frame.view.time - start), abs=1e-6)
-    (warning,) = [text for text in warnings if "no times for Timing to scale" in text]
-    assert "scene.xosc:" in warning
-    assert warning.endswith("specify the time of each vertex, or <None/> as the TimeReference")
 
 
 def test_trajectory_without_timing_holds_the_lateral_domain_only(scene: RunScene) -> None:

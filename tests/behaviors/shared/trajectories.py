@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from storyboard_xml import private_xml
 
 RELATIVE = '<Timing domainAbsoluteRelative="relative" offset="0" scale="1"/>'
+CORNER = [(100.0, -2.0, None), (110.0, -2.0, None), (110.0, 18.0, None)]
+"""Points without times of `follow_points`: 10 m ahead from s = 100, then 20 m to the left."""
 
 
 def world(x: float, y: float, h: float | None = None) -> str:
