@@ -119,11 +119,13 @@ def _warnings(runs: Sequence[ReportedRun]) -> list[str]:
     for run in runs:
         for warning in run.warnings:
             commands.setdefault(warning, run.command)
-    return [
+    lines = [
         f"{count} run{'' if count == 1 else 's'}: {warning}"
         + f" (such as {commands[warning]})" * bool(commands[warning])
         for warning, count in counts.most_common(MOST_WARNINGS)
     ]
+    left = len(counts) - len(lines)
+    return [*lines, f"{left} more in the results of the runs"] if left else lines
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:

@@ -100,6 +100,15 @@ def test_report_lists_each_warning_once_with_number_and_command_of_runs(tmp_path
     assert warnings_of(write_report(runs[2:], tmp_path / "none")) == []
 
 
+def test_report_lists_most_frequent_warnings_and_counts_the_others(tmp_path: Path) -> None:
+    rare = [f"warning {number}" for number in range(120)]
+    runs = [result(1, "none", True, warnings=rare), result(2, "none", True, warnings=["frequent"])]
+    summary, first, *others, last = warnings_of(write_report([*runs, {**runs[1], "seed": 3}], tmp_path))
+    assert (summary, first) == ("3 runs have warnings", "2 runs: frequent")
+    assert len(others) == 99
+    assert last == "21 more in the results of the runs"
+
+
 def test_report_of_result_with_invalid_warnings_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="warnings"):
         write_report([result(1, "none", True, warnings=3)], tmp_path)
