@@ -147,9 +147,11 @@ class Agent:
         covariance = self.perception.pose_covariance
         self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
         state = self._state(ego)
-        found = fresh if self.points is None else self.points.perceive(readings, fresh)
+        found = fresh if self.points is None else self.points.perceive(readings, fresh, self.perception.pose)
         if found is not None and not own_perception:
-            self._reports.add(Report(self.name, found, now, replace(state, pose_covariance=None)))
+            own_state = replace(state, pose_covariance=None)
+            change = self.perception.pose_change(found.time)
+            self._reports.add(Report(self.name, found, now, own_state, pose_change=change))
             self._add_own_region(found.time)
         obeys = self.planner is not None and self.settings.obey_signals
         return StationPerception(

@@ -176,12 +176,7 @@ def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception
     """Build the perception of merged points: that of the station, without localization."""
     detector = build_detector(settings)
     detector.setup(installation)
-    return Perception(
-        detector,
-        tracker=_tracker(settings, detector),
-        latency=settings.detector_latency,
-        pose_noise=_pose_noise(settings, installation.spec.name, installation.seed),
-    )
+    return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
 
 
 def _tracker(settings: AgentSettings, detector: Detector) -> TrackingMethod | None:

@@ -20,6 +20,8 @@ class Report(msgspec.Struct, frozen=True, gc=False):
     """Detections of one station, measured at `detections.time` and received at `arrived` [s].
 
     state     reported state of the station; None if it is not reported
+    pose_change  covariance (3, 3) of the change of the error of x, y [m] and yaw [rad] of the station since its last
+              report, of which positions relative to its assumed pose are a sum; None: its detections have no such error
     complete  whether the list contains all detected objects; if False, objects that are not listed stay unchanged
     """
 
@@ -28,6 +30,7 @@ class Report(msgspec.Struct, frozen=True, gc=False):
     arrived: float
     state: StationState | None = None
     complete: bool = True
+    pose_change: Array | None = None
 
 
 class FusionMethod(ABC):

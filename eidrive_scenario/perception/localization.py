@@ -83,6 +83,22 @@ class InertialFilter:
     def __init__(self, start: Estimate, noise: MotionNoise) -> None:
         self.estimate = start
         self._noise = noise
+        self._propagation = np.zeros((6, 6))
+        """Covariance of the error of the state and its error before the last `begin_step`."""
+
+    def begin_step(self) -> None:
+        """Begin a time step, in which predictions and corrections change the error."""
+        self._propagation = self.estimate.covariance
+
+    @property
+    def pose_covariance(self) -> Array:
+        """Covariance (3, 3) of the errors of x, y [m] and yaw [rad]."""
+        return self.estimate.covariance[PLANE]
+
+    @property
+    def lagged_covariance(self) -> Array:
+        """Covariance (3, 3) of the errors of x, y [m] and yaw [rad] with those before the time step."""
+        return self._propagation[PLANE]
 
     def predict(self, imu: ImuReading, step: float) -> None:
         """Predict the state by `step` [s] with the accelerations and turn rates of the IMU."""
@@ -119,6 +135,7 @@ class InertialFilter:
         drive[:, :2] *= (noise.acceleration / math.sqrt(step), noise.turn_rate / math.sqrt(step))
         across = noise.drift + noise.slip * abs(speed * turn)
         drive[:, 2:] *= np.array([across, noise.turn_walk, noise.acceleration_walk]) * math.sqrt(step)
+        self._propagation = forward @ self._propagation
         self.estimate = Estimate(state, forward @ self.estimate.covariance @ forward.T + drive @ drive.T)
 
     def correct(self, gnss: GnssReading) -> None:
@@ -130,6 +147,7 @@ class InertialFilter:
         rest[:, :2] -= gain
         state = state + gain @ (gnss.position[:2] - state[:2])
         state[YAW] = wrap_angle(float(state[YAW]))
+        self._propagation = rest @ self._propagation
         self.estimate = Estimate(state, rest @ covariance @ rest.T + gain @ noise @ gain.T)
 
 
@@ -155,16 +173,32 @@ class Localizer:
     @property
     def estimate(self) -> Estimate:
         """Newest estimate. Raise ValueError before the first reading."""
+        return self._started.estimate
+
+    @property
+    def pose_covariance(self) -> Array:
+        """Covariance (3, 3) of the errors of the estimated x, y [m] and yaw [rad]."""
+        return self._started.pose_covariance
+
+    @property
+    def lagged_covariance(self) -> Array:
+        """Covariance (3, 3) of these errors with those of the last reading; 0 at the first one."""
+        return self._started.lagged_covariance
+
+    @property
+    def _started(self) -> InertialFilter:
         if self._filter is None:
             raise ValueError("there is no estimate before the first reading")
-        return self._filter.estimate
+        return self._filter
 
     def with_estimated_pose(self, readings: Readings) -> Readings:
         """Return the readings with the estimated motion, and with the sensor poses that follow from it."""
         truth = readings.ego
         if self._filter is None:
             self._filter = InertialFilter(self._first(truth), self._noise)
-        elif self._imu is not None or readings.imu is not None:
+        else:
+            self._filter.begin_step()
+        if self._imu is not None or readings.imu is not None:
             imu = readings.imu or self._imu
             if imu is not None and readings.time > self._time:
                 self._filter.predict(imu, readings.time - self._time)

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
+import numpy as np
+
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects, with_pose_error
-from eidrive_scenario.perception.localization import PLANE, Localizer
+from eidrive_scenario.perception.localization import Localizer
 from eidrive_scenario.perception.own_bodies import outlines, rows_on_bodies, without_rows
 from eidrive_scenario.perception.pose_noise import PoseNoiseProcess
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
 from eidrive_scenario.tolerances import TIME_TOLERANCE
@@ -52,6 +55,11 @@ class Perception:
         self._pose_error = pose_error
         self._pose_noise = pose_noise
         self._false_objects = false_objects
+        self._pose_sources = [source for source in (localizer, pose_noise) if source is not None]
+        """Independent random errors of the pose."""
+        self._pose_errors = PoseErrors()
+        self.pose: PoseUncertainty | None = None
+        """Uncertainty of the pose that `locate` returned last; None: it is exact."""
         self._computing: deque[tuple[float, Detections, Readings]] = deque()
 
     @property
@@ -60,11 +68,9 @@ class Perception:
 
         The covariances of its objects do not contain it: it is common to all objects, and tracking does not reduce it.
         """
-        estimated = None if self._localizer is None else self._localizer.estimate.covariance[PLANE]
-        if self._pose_noise is None:
-            return estimated
-        noise = self._pose_noise.covariance
-        return noise if estimated is None else estimated + noise
+        if not self._pose_sources:
+            return None
+        return sum((source.pose_covariance for source in self._pose_sources), np.zeros((3, 3)))
 
     def locate(self, readings: Readings) -> Readings:
         """Return the readings with the pose that the station assumes: estimated by its localizer, with its error."""
@@ -72,7 +78,34 @@ class Perception:
             readings = self._localizer.with_estimated_pose(readings)
         if self._pose_error is not None:
             readings = with_pose_error(readings, self._pose_error)
-        return readings if self._pose_noise is None else self._pose_noise.displaced(readings)
+        if self._pose_noise is not None:
+            readings = self._pose_noise.displaced(readings)
+        if (covariance := self.pose_covariance) is not None:
+            self.pose = self._pose_uncertainty(readings, covariance)
+            self._pose_errors.add(self.pose)
+            self.set_pose(self.pose)
+        return readings
+
+    def set_pose(self, pose: PoseUncertainty) -> None:
+        """Pass the uncertainty of the assumed pose in a time step to the tracker."""
+        if self._tracker is not None:
+            self._tracker.set_pose(pose)
+
+    def _pose_uncertainty(self, readings: Readings, covariance: Array) -> PoseUncertainty:
+        """Return the uncertainty of the assumed pose in these readings, with this covariance (3, 3)."""
+        x, y, _ = readings.ego.position.tolist()
+        lagged = sum((source.lagged_covariance for source in self._pose_sources), np.zeros((3, 3)))
+        before = self._pose_errors.last_covariance
+        return PoseUncertainty(readings.time, x, y, covariance, lagged @ np.linalg.pinv(before, hermitian=True))
+
+    def pose_change(self, time: float) -> Array | None:
+        """Return the covariance (3, 3) of the change of the pose error since the last call, until `time` [s].
+
+        By this the positions of all objects relative to the assumed pose change together. None: the pose is exact.
+        """
+        if not self._pose_sources:
+            return None
+        return self._pose_errors.advance(time)
 
     @property
     def has_exact_pose(self) -> bool:
@@ -109,20 +142,14 @@ class Perception:
             _, found, past = self._computing.popleft()
             newest = self._track(found, past)
         if newest is None and self._tracker is not None:
-            self._set_pose(readings)
             newest = self._tracker.predict(now - self._latency)
             if self._tracker_checked and newest is not None:
                 check_detections(self._tracker, "predict", newest)
         return newest
 
-    def _set_pose(self, readings: Readings) -> None:
-        if self._tracker is not None and self._pose_noise is not None:
-            self._tracker.set_pose(self._pose_noise.uncertainty(readings))
-
     def _track(self, found: Detections, readings: Readings) -> Detections:
         if self._tracker is None:
             return found
-        self._set_pose(readings)
 
         def in_view(boxes: Array) -> Array:
             shares = self.detector.in_view(boxes, readings, found)

@@ -12,7 +12,6 @@ from pydantic import Field
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.localization import at_pose
-from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings
@@ -45,16 +44,19 @@ class PoseNoiseProcess:
         self._unit: Array | None = None
         """Error in standard deviations (3,): x, y, yaw."""
         self._time = -math.inf
+        self._kept = 0.0
+        """Correlation of the error with that of the last call."""
 
     @property
-    def covariance(self) -> Array:
+    def pose_covariance(self) -> Array:
         """Covariance (3, 3) of the errors of x, y [m] and yaw [rad]."""
         return np.diag(self._deviations**2)
 
-    def uncertainty(self, readings: Readings) -> PoseUncertainty:
-        """Return the uncertainty of the assumed pose in these readings."""
-        x, y, _ = readings.ego.position.tolist()
-        return PoseUncertainty(x, y, self.covariance, self.settings.correlation_time)
+    @property
+    def lagged_covariance(self) -> Array:
+        """Covariance (3, 3) of the errors of x, y [m] and yaw [rad] with those of the last call of `error`; 0 at the
+        first one."""
+        return self._kept * self.pose_covariance
 
     def error(self, time: float) -> Array:
         """Return the error (3,) of x, y [m] and yaw [rad] at `time` [s], which does not decrease between calls."""
@@ -62,7 +64,7 @@ class PoseNoiseProcess:
             self._unit = self._random.standard_normal(3)
         elif time > self._time:
             span = self.settings.correlation_time
-            kept = math.exp(-(time - self._time) / span) if span > 0.0 else 0.0
+            kept = self._kept = math.exp(-(time - self._time) / span) if span > 0.0 else 0.0
             self._unit = kept * self._unit + math.sqrt(1.0 - kept * kept) * self._random.standard_normal(3)
         self._time = time
         errors: Array = self._deviations * self._unit

@@ -22,6 +22,10 @@ from eidrive_scenario.world.actor import ActorSpec
 GATE = AssociationGate.of(0.99, 0.0)
 """Gate of the offset between a reported object and the ego body, given the covariances of both."""
 
+REPEATED = 1.0
+"""Time for which a station that has reported the ego body is expected to report it again [s]: the longest interval
+between two reports of an object (ETSI TS 103 324, T_GenCpmMax)."""
+
 
 class _Place(NamedTuple):
     """Place of the body at one time [s].
@@ -58,6 +62,8 @@ class OwnBody:
         """Last center of the body, and the distance from it within which all stored outlines are [m]."""
         self._tracks: dict[str, int] = {}
         """Object id of the ego body at each station."""
+        self._reported: dict[str, float] = {}
+        """Time of the last report of each station that contains the ego body [s]."""
 
     def record(self, ego: EgoState, attached: Array = NOTHING_ATTACHED) -> None:
         """Store the place of the body, and the boxes (K, 7) of its trailers."""
@@ -138,16 +144,14 @@ class OwnBody:
         place = self._at(detections.time)
         detections = _without_bodies(detections, place.trailers)
         inside = rows_on_bodies(detections, [place.body])
+        if not inside:
+            row = self._likeliest_row(detections, station, state, own, pose_covariance)
+            inside = [] if row is None else [row]
         if inside:
+            self._reported[station] = detections.time
             if len(inside) == 1 and detections.tracks:
                 self._tracks[station] = detections.tracks[inside[0]]
-            return without_rows(detections, inside)
-        row = self._likeliest_row(detections, self._tracks.get(station), state, own, pose_covariance)
-        if row is None:
-            return detections
-        if detections.tracks:
-            self._tracks[station] = detections.tracks[row]
-        return without_rows(detections, [row])
+        return without_rows(detections, inside)
 
     def _may_be_body(self, kind: str) -> bool:
         """Return whether the body may be reported with this class. A roadside unit is no road user."""
@@ -158,12 +162,14 @@ class OwnBody:
     def _likeliest_row(
         self,
         detections: Detections,
-        track: int | None,
+        station: str,
         state: StationState | None,
         own: Detections | None,
         pose_covariance: Array | None,
     ) -> int | None:
         """Return the row of the likeliest object within the gate, or None."""
+        track = self._tracks.get(station)
+        is_repeated = detections.time - self._reported.get(station, -math.inf) <= REPEATED
         body: Array | None = None
         best: tuple[float, int] | None = None
         for row, kind in enumerate(detections.classes):
@@ -180,8 +186,8 @@ class OwnBody:
             position = detections.boxes[row, :2]
             spread = covariance if pose_covariance is None else covariance + pose_covariance[:2, :2]
             distance, cost = _squared_mahalanobis(position - body, spread)
-            known = track is not None and bool(detections.tracks) and detections.tracks[row] == track
-            if distance > (UNASSIGNED_GATE if known else GATE.chi_square) or (best is not None and cost >= best[0]):
+            is_wide = detections.tracks[row] == track if detections.tracks else is_repeated
+            if distance > (UNASSIGNED_GATE if is_wide else GATE.chi_square) or (best is not None and cost >= best[0]):
                 continue
             if not _explained(position, covariance, detections.time, cost, own):
                 best = cost, row

@@ -89,10 +89,13 @@ class ReportStore:
                 continue
             detections = _numbered(message)
             state: StationState | None = message.state
+            pose_change: Array | None = None
             if not own:
                 detections = self._without_own_body(message, detections, pose_covariance)
                 state = relative_state(state, ego, pose_covariance)
-            elif state is not None:
+            elif state is not None and state.pose_covariance is not None:
+                # Messages to itself may be lost: the change between two of them is at most that of independent errors.
+                pose_change = 2.0 * state.pose_covariance
                 state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
             lifetime = self._usual_lifetime if complete and perceived else self._long_lifetime
@@ -100,7 +103,7 @@ class ReportStore:
                 lifetimes[station] = lifetime
                 self._next_deletion = -math.inf
             self.add(
-                Report(station, detections, received.arrived, state, complete),
+                Report(station, detections, received.arrived, state, complete, pose_change),
                 None if complete else self._assembled_detections(message, pose_covariance),
             )
         if now > self._next_deletion:

@@ -7,6 +7,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.perception.pipeline import Perception
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
@@ -36,11 +37,16 @@ class PointCloudSharing:
             points = cloud.points()
             self._received[sender] = (cloud.time, points[~points_in_box(points, body)])
 
-    def perceive(self, readings: Readings, alone: Detections | None) -> Detections | None:
-        """Return newly available objects in merged points, or None. `alone` are the objects in ego points."""
+    def perceive(self, readings: Readings, alone: Detections | None, pose: PoseUncertainty | None) -> Detections | None:
+        """Return newly available objects in merged points, or None.
+
+        alone  objects in the ego points;  pose  uncertainty of the assumed pose; None: it is exact
+        """
         self.own = self._fusion.shared_cloud(readings) or self.own
         if self._perception is None:
             return alone
+        if pose is not None:
+            self._perception.set_pose(pose)
         oldest = readings.time - self._fusion.max_point_age - TIME_TOLERANCE
         self._received = {sender: held for sender, held in self._received.items() if held[0] >= oldest}
         return self._perception.perceive(

@@ -11,6 +11,8 @@ import numpy as np
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 
+HEADING = 2
+"""Index of the heading in the state of a model that measures it."""
 ACCELERATION_DENSITY = 6.0
 """Spectral density of white acceleration [m²/s³]: a speed changes by 2.4 m/s in a second (standard deviation)."""
 TURN_DENSITY = 0.15
@@ -21,6 +23,8 @@ KNOWN_SPEED = 0.5
 """Standard deviation of a velocity that the detector provides [m/s]."""
 HEADING_DEVIATION = math.radians(6.0)
 """Standard deviation between the axes of a box and of its object [rad]."""
+WANDERING_DENSITY = 0.01
+"""Spectral density of the position of a standing object [m²/s]: 0.1 m in a second (standard deviation)."""
 UNKNOWN_TURN = 0.3
 """Standard deviation of the turn rate of an object at its first detection [rad/s]."""
 BACKWARDS = 0.5
@@ -37,17 +41,22 @@ class Estimates(NamedTuple):
     covariance: Array
 
 
+class Update(NamedTuple):
+    """Estimates after a measurement, and the log-likelihoods (N,) of the measurements without constants."""
+
+    estimates: Estimates
+    log_likelihood: Array
+
+
 class MotionModel(ABC):
     """State of a track and its transition. Positions [m], angles [rad], all in the world frame."""
 
     size: int
     """Number of states."""
+    motion: slice
+    """Indices of the states that are 0 for an object at rest."""
     measures_heading: bool = False
     """Whether a box corrects the third state, a heading, by its axis."""
-
-    def no_tracks(self) -> Estimates:
-        """Return the estimates of no track."""
-        return Estimates(np.empty((0, self.size)), np.empty((0, self.size, self.size)))
 
     @abstractmethod
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
@@ -58,12 +67,16 @@ class MotionModel(ABC):
         """Return the estimates after `step` [s]."""
 
     @abstractmethod
-    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         """Return the estimates updated with one measured box per track (N, 7) and position noise (N, 2, 2)."""
 
     @abstractmethod
     def velocity(self, state: Array) -> Array:
         """Return velocities (N, 2) [m/s]."""
+
+    @abstractmethod
+    def speed_variance(self, tracks: Estimates) -> Array:
+        """Return the variances (N,) of the speeds in the directions of motion [m²/s²]."""
 
 
 class ConstantVelocity(MotionModel):
@@ -73,6 +86,7 @@ class ConstantVelocity(MotionModel):
     """
 
     size = 4
+    motion = slice(2, 4)
 
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
         known = np.asarray(np.all(np.isfinite(velocity), axis=1))
@@ -94,11 +108,16 @@ class ConstantVelocity(MotionModel):
         covariance = forward @ tracks.covariance @ forward.T + ACCELERATION_DENSITY * drift
         return Estimates(tracks.state @ forward.T, covariance)
 
-    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         return _correct(tracks, boxes[:, :2] - tracks.state[:, :2], noise)
 
     def velocity(self, state: Array) -> Array:
         return state[:, 2:4]
+
+    def speed_variance(self, tracks: Estimates) -> Array:
+        velocity = tracks.state[:, 2:4]
+        variance = np.einsum("ni,nij,nj->n", velocity, tracks.covariance[:, 2:4, 2:4], velocity)
+        return np.asarray(variance / np.maximum(np.square(velocity).sum(axis=1), 1e-12))
 
 
 class TurnRate(MotionModel):
@@ -109,6 +128,7 @@ class TurnRate(MotionModel):
     """
 
     size = 5
+    motion = slice(3, 5)
     measures_heading = True
 
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
@@ -149,7 +169,7 @@ class TurnRate(MotionModel):
         covariance = forward @ tracks.covariance @ transposed(forward) + (gain * density) @ transposed(gain)
         return Estimates(state, covariance)
 
-    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         """Update with the position, and with the box axis if it is closer to the heading than the other axis."""
         off = (boxes[:, 6] - tracks.state[:, 2] + np.pi / 2.0) % np.pi - np.pi / 2.0
         usable = np.abs(off) < np.pi / 4.0
@@ -157,7 +177,7 @@ class TurnRate(MotionModel):
         full = np.zeros((len(boxes), 3, 3))
         full[:, :2, :2] = noise
         full[:, 2, 2] = np.where(usable, HEADING_DEVIATION**2, 1e6)
-        state, covariance = _correct(tracks, innovation, full)
+        (state, covariance), likelihood = _correct(tracks, innovation, full)
         backwards = state[:, 3] < -BACKWARDS
         if backwards.any():
             # The same motion with the front at the other end: heading + pi, -speed.
@@ -167,22 +187,63 @@ class TurnRate(MotionModel):
             mirror[3] = -1.0
             covariance[backwards] *= mirror[:, None] * mirror
         state[:, 2] = wrap_angle(state[:, 2])
-        return Estimates(state, covariance)
+        return Update(Estimates(state, covariance), likelihood)
 
     def velocity(self, state: Array) -> Array:
         return np.stack([state[:, 3] * np.cos(state[:, 2]), state[:, 3] * np.sin(state[:, 2])], axis=1)
 
+    def speed_variance(self, tracks: Estimates) -> Array:
+        return tracks.covariance[:, 3, 3]
 
-def _correct(tracks: Estimates, innovation: Array, noise: Array) -> Estimates:
+
+class Standing(MotionModel):
+    """Model of an object at rest, with the states of another model whose motion is 0.
+
+    The center of its box wanders as the visible part of the object changes.
+    """
+
+    def __init__(self, base: MotionModel) -> None:
+        self._base = base
+        self.size, self.motion, self.measures_heading = base.size, base.motion, base.measures_heading
+
+    def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
+        return self._at_rest(self._base.begin(boxes, velocity, noise))
+
+    def predict(self, tracks: Estimates, step: float) -> Estimates:
+        state, covariance = self._at_rest(tracks)
+        covariance[:, 0, 0] += WANDERING_DENSITY * step
+        covariance[:, 1, 1] += WANDERING_DENSITY * step
+        return Estimates(state, covariance)
+
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
+        return self._base.update(tracks, boxes, noise)
+
+    def velocity(self, state: Array) -> Array:
+        return np.zeros((len(state), 2))
+
+    def speed_variance(self, tracks: Estimates) -> Array:
+        return np.zeros(len(tracks.state))
+
+    def _at_rest(self, tracks: Estimates) -> Estimates:
+        state, covariance = tracks.state.copy(), tracks.covariance.copy()
+        state[:, self.motion] = 0.0
+        covariance[:, self.motion] = 0.0
+        covariance[:, :, self.motion] = 0.0
+        return Estimates(state, covariance)
+
+
+def _correct(tracks: Estimates, innovation: Array, noise: Array) -> Update:
     """Return the Kalman update in Joseph form; the first entries of the state are measured."""
     measured, size = innovation.shape[1], tracks.state.shape[1]
     spread = tracks.covariance[:, :measured, :measured] + noise
     gain = transposed(np.asarray(np.linalg.solve(spread, tracks.covariance[:, :measured]), dtype=np.float64))
+    squared = np.einsum("ni,ni->n", innovation, np.linalg.solve(spread, innovation[:, :, None])[:, :, 0])
+    likelihood = -0.5 * (squared + np.log(np.linalg.det(spread)))
     state = tracks.state + np.einsum("nij,nj->ni", gain, innovation)
     rest: Array = np.broadcast_to(np.eye(size), (len(state), size, size)).copy()
     rest[:, :, :measured] -= gain
     covariance = rest @ tracks.covariance @ transposed(rest) + gain @ noise @ transposed(gain)
-    return Estimates(state, covariance)
+    return Update(Estimates(state, covariance), likelihood)
 
 
 def transposed(matrices: Array) -> Array:

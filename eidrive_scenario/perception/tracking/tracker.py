@@ -15,16 +15,15 @@ from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.tracking.association import associate, position_noise
 from eidrive_scenario.perception.tracking.existence import MOST, detected, likelihood_ratio, missed, survived
 from eidrive_scenario.perception.tracking.history import TrackHistory
+from eidrive_scenario.perception.tracking.interacting_models import InteractingModels, Tracks
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.perception.tracking.settings import NO_TRACKER, TrackerKind, TrackerSettings
-from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, UncertainPose
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
-MOVING = 1.0
-"""Minimum speed at which the front of an object is taken from its direction of motion [m/s]."""
 ACROSS = math.cos(math.pi / 4.0)
 """Cosine of the angle between two axes from which on one is across the other."""
 PART = 0.5
@@ -50,10 +49,11 @@ class Tracker(TrackingMethod):
         super().__init__(settings)
         if settings.kind == NO_TRACKER:
             raise ValueError("tracker settings: kind 'none' disables tracking (expected cv or ctrv)")
-        self._model: MotionModel = MODELS[settings.kind]()
+        self._pose_errors: PoseErrors | None = None
+        self._filter = InteractingModels(MODELS[settings.kind]())
         self._gate = -2.0 * math.log1p(-settings.gate)
         self._time: float | None = None
-        self._tracks = self._model.no_tracks()
+        self._tracks = self._filter.no_tracks()
         self._shape = np.empty((0, 5))
         """z, length, width, height and yaw (N, 5)."""
         self._existence = np.empty(0)
@@ -61,11 +61,12 @@ class Tracker(TrackingMethod):
         self._confirmed = 0
 
     def set_pose(self, pose: PoseUncertainty) -> None:
-        if isinstance(self._model, UncertainPose):
-            self._model.pose = pose
-        elif self._time is None:
-            self._model = UncertainPose(self._model, pose)
-            self._tracks = self._model.no_tracks()
+        if self._pose_errors is None and self._time is None:
+            self._pose_errors = PoseErrors()
+            self._filter = InteractingModels(MODELS[self.settings.kind](), self._pose_errors)
+            self._tracks = self._filter.no_tracks()
+        if self._pose_errors is not None:
+            self._pose_errors.add(pose)
 
     def update(self, detections: Detections, in_view: Callable[[Array], Array] | None = None) -> Detections:
         """Return the confirmed objects at the time of these detections, with velocities, covariances and track numbers.
@@ -82,13 +83,16 @@ class Tracker(TrackingMethod):
             )
         self._time = detections.time
         if step > 0.0 and self._histories:
-            self._tracks = self._model.predict(self._tracks, step)
+            self._tracks = self._filter.predict(self._tracks, step)
             self._existence = survived(self._existence, step, self.settings.lifetime)
+        if self._pose_errors is not None:
+            self._pose_errors.advance(detections.time)
         noise = position_noise(detections.covariance)
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
-        rows, columns = associate(self._tracks, confirmed, detections.boxes, noise, self._gate)
+        predicted = self._filter.combined(self._tracks)
+        rows, columns = associate(predicted, confirmed, detections.boxes, noise, self._gate)
         hit = set(rows)
-        self._update_existence(rows, detections, columns, noise, in_view)
+        self._update_existence(predicted, rows, detections, columns, noise, in_view)
         if rows:
             self._correct(rows, detections, columns, noise)
         for row, history in enumerate(self._histories):
@@ -102,6 +106,7 @@ class Tracker(TrackingMethod):
 
     def _update_existence(
         self,
+        predicted: Estimates,
         rows: list[int],
         detections: Detections,
         columns: list[int],
@@ -111,8 +116,8 @@ class Tracker(TrackingMethod):
         """Update the existence of all tracks; those in `rows` are detected."""
         settings = self.settings
         if rows:
-            offset = detections.boxes[columns, :2] - self._tracks.state[rows, :2]
-            spread = self._tracks.covariance[rows][:, :2, :2] + noise[columns]
+            offset = detections.boxes[columns, :2] - predicted.state[rows, :2]
+            spread = predicted.covariance[rows][:, :2, :2] + noise[columns]
             determinant = spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2
             squared = np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset)
             ratio = likelihood_ratio(
@@ -125,7 +130,7 @@ class Tracker(TrackingMethod):
             self._existence[rows] = detected(self._existence[rows], ratio)
         lost = np.setdiff1d(np.arange(len(self._histories)), rows)
         if len(lost):
-            share = 1.0 if in_view is None else np.clip(in_view(self._boxes(lost, self._tracks.state[lost])), 0.0, 1.0)
+            share = 1.0 if in_view is None else np.clip(in_view(self._boxes(lost, predicted.state[lost])), 0.0, 1.0)
             self._existence[lost] = missed(self._existence[lost], settings.detection_probability * share)
 
     def _boxes(self, rows: NDArray[np.intp] | list[int], state: Array) -> Array:
@@ -135,25 +140,25 @@ class Tracker(TrackingMethod):
 
     def _correct(self, rows: list[int], detections: Detections, columns: list[int], noise: Array) -> None:
         boxes = detections.boxes[columns]
-        before = Estimates(self._tracks.state[rows], self._tracks.covariance[rows])
         shape = self._shape[rows]
         confirmed = np.array([self._histories[row].number is not None for row in rows], dtype=bool)
         is_part = confirmed & (boxes[:, 3] < PART * shape[:, 1])
         noise = noise[columns] + _axis_noise(shape, boxes, confirmed)
         if is_part.any():
             noise[is_part] += _part_noise(shape[is_part], boxes[is_part])
-        state, covariance = self._model.update(before, boxes, noise)
-        self._tracks.state[rows], self._tracks.covariance[rows] = state, covariance
+        self._tracks = self._filter.share_pose_change(self._tracks, rows, boxes, noise)
+        tracks = self._filter.update(self._tracks.take(rows), boxes, noise)
+        self._tracks.put(rows, tracks)
         share = np.array([max(SMOOTHING, 1.0 / (self._histories[row].hits + 1.0)) for row in rows])
         of_size = np.where(is_part, 0.0, share)
         shape[:, :4] += of_size[:, None] * (boxes[:, 2:6] - shape[:, :4])
-        shape[:, 4] = self._headings(shape[:, 4], boxes[:, 6], state, of_size)
+        shape[:, 4] = self._headings(shape[:, 4], boxes[:, 6], self._filter.course(tracks), of_size)
         self._shape[rows] = shape
 
-    def _headings(self, held: Array, measured: Array, state: Array, share: Array) -> Array:
-        """Return headings (N,): the axis of the boxes, with the front in the direction of motion or else unchanged."""
-        vx, vy = self._model.velocity(state).T
-        course = np.where(vx * vx + vy * vy > MOVING * MOVING, np.arctan2(vy, vx), held)
+    def _headings(self, held: Array, measured: Array, course: Array, share: Array) -> Array:
+        """Return headings (N,): the axis of the boxes, with the front in the direction of motion, NaN if unknown, or
+        else unchanged."""
+        course = np.where(np.isnan(course), held, course)
         turned = np.where(np.cos(measured - course) < 0.0, measured + math.pi, measured)
         held = np.where(np.cos(held - course) < 0.0, held + math.pi, held)
         # An axis across the course is the other axis of the box: the L-shape fit mistook the width for the length.
@@ -164,10 +169,7 @@ class Tracker(TrackingMethod):
         if not columns:
             return
         boxes = detections.boxes[columns]
-        new = self._model.begin(boxes, detections.velocity[columns], noise[columns])
-        self._tracks = Estimates(
-            np.concatenate([self._tracks.state, new.state]), np.concatenate([self._tracks.covariance, new.covariance])
-        )
+        self._tracks = self._tracks.join(self._filter.begin(boxes, detections.velocity[columns], noise[columns]))
         self._shape = np.concatenate([self._shape, boxes[:, 2:7]])
         self._existence = np.concatenate([self._existence, np.clip(detections.scores[columns], 0.0, MOST)])
         for column in columns:
@@ -185,7 +187,7 @@ class Tracker(TrackingMethod):
             if existence[row] >= self.settings.delete_existence and history.is_alive(now, self.settings)
         ]
         if len(kept) < len(self._histories):
-            self._tracks = Estimates(self._tracks.state[kept], self._tracks.covariance[kept])
+            self._tracks = self._tracks.take(kept)
             self._shape = self._shape[kept]
             self._existence = self._existence[kept]
             self._histories = [self._histories[row] for row in kept]
@@ -203,9 +205,9 @@ class Tracker(TrackingMethod):
             for row, history in enumerate(self._histories)
             if history.number is not None and history.is_alive(time, self.settings)
         ]
-        tracks = Estimates(self._tracks.state[shown], self._tracks.covariance[shown])
+        tracks = self._tracks.take(shown)
         if shown and step > 0.0:
-            tracks = self._model.predict(tracks, step)
+            tracks = self._filter.predict(tracks, step)
         return self._report(time, shown, tracks, survived(self._existence[shown], step, self.settings.lifetime))
 
     def _confirm_and_report(self, now: float) -> Detections:
@@ -214,18 +216,19 @@ class Tracker(TrackingMethod):
                 self._confirmed += 1
                 history.number = self._confirmed
         shown = [row for row, history in enumerate(self._histories) if history.number is not None]
-        tracks = Estimates(self._tracks.state[shown], self._tracks.covariance[shown])
+        tracks = self._tracks.take(shown)
         return self._report(now, shown, tracks, self._existence[shown])
 
-    def _report(self, time: float, rows: list[int], tracks: Estimates, existence: Array) -> Detections:
+    def _report(self, time: float, rows: list[int], tracks: Tracks, existence: Array) -> Detections:
         histories = [self._histories[row] for row in rows]
+        state, covariance = self._filter.combined(tracks)
         return Detections(
             time,
-            self._boxes(rows, tracks.state),
+            self._boxes(rows, state),
             np.array([history.score for history in histories]) * existence,
             tuple([history.name for history in histories]),
-            self._model.velocity(tracks.state).copy(),
-            tracks.covariance[:, :2, :2],
+            self._filter.velocity(tracks),
+            covariance[:, :2, :2],
             tuple([history.number or 0 for history in histories]),
             existence,
         )

@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-import math
+from bisect import bisect_right
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from eidrive_scenario.arrays import Array
-from eidrive_scenario.perception.tracking.motion_models import Estimates, MotionModel, transposed
+from eidrive_scenario.perception.tracking.motion_models import HEADING, Estimates, MotionModel, Update, transposed
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
-HEADING = 2
-"""Index of the heading in the state of a model that measures it."""
+MAX_STEPS = 1000
+"""Maximum number of time steps between two scans whose poses are stored; tracks do not coast for longer."""
 
 
 class PoseUncertainty(NamedTuple):
-    """Random error of the pose that a station assumes: a Gauss-Markov process of first order.
+    """Random error of the pose that a station assumes, in one time step.
 
-    x, y              assumed position [m]
-    covariance        (3, 3) of the errors of x, y [m] and yaw [rad]
-    correlation_time  time after which the correlation of the error is 1/e [s]; 0: independent in each time step
+    time        time of the pose [s]
+    x, y        assumed position [m]
+    covariance  (3, 3) of the errors of x, y [m] and yaw [rad]
+    transition  (3, 3) regression of the error on that of the last time step: 0 if they are independent, the identity
+                if the error is constant
     """
 
+    time: float
     x: float
     y: float
     covariance: Array
-    correlation_time: float
+    transition: Array
 
 
 def pose_jacobian(points: Array, x: float, y: float) -> Array:
@@ -40,6 +45,57 @@ def pose_jacobian(points: Array, x: float, y: float) -> Array:
     return jacobian
 
 
+class PoseErrors:
+    """Uncertainty of the pose of a station in the time steps since the last scan."""
+
+    def __init__(self) -> None:
+        self._poses: list[PoseUncertainty] = []
+        self.independent = np.zeros((3, 3))
+        """Covariance (3, 3) of the part of the error in the last scan that is independent of the scan before."""
+
+    def add(self, pose: PoseUncertainty) -> None:
+        """Store the pose of the next time step."""
+        self._poses.append(pose)
+        if len(self._poses) > MAX_STEPS:
+            del self._poses[0]
+
+    @property
+    def last_covariance(self) -> Array:
+        """Covariance (3, 3) in the last time step; 0 before the first one."""
+        return self._poses[-1].covariance if self._poses else np.zeros((3, 3))
+
+    @property
+    def of_scan(self) -> PoseUncertainty:
+        """Pose in the last scan."""
+        return self._poses[0]
+
+    def at(self, time: float) -> PoseUncertainty:
+        """Return the pose of the last time step up to `time` [s]."""
+        return self._poses[self._last_until(time)]
+
+    def advance(self, time: float) -> Array:
+        """Begin a scan at `time` [s]; return the covariance (3, 3) of the change of the error since the last scan."""
+        regression, self.independent = self.regression(time)
+        before, after = self.of_scan.covariance, self.at(time).covariance
+        lagged = regression @ before
+        del self._poses[: self._last_until(time)]
+        change: Array = before + after - lagged - lagged.T
+        return change
+
+    def regression(self, time: float) -> tuple[Array, Array]:
+        """Return the regression (3, 3) of the error at `time` [s] on that of the last scan, and the covariance (3, 3)
+        of the independent part."""
+        regression, independent = np.eye(3), np.zeros((3, 3))
+        for before, pose in pairwise(self._poses[: self._last_until(time) + 1]):
+            step = pose.transition
+            regression = step @ regression
+            independent = step @ (independent - before.covariance) @ step.T + pose.covariance
+        return regression, independent
+
+    def _last_until(self, time: float) -> int:
+        return max(bisect_right(self._poses, time + TIME_TOLERANCE, key=lambda pose: pose.time) - 1, 0)
+
+
 class UncertainPose(MotionModel):
     """Motion model whose last three states are the pose error of the station.
 
@@ -52,40 +108,44 @@ class UncertainPose(MotionModel):
     so that it does not appear as a velocity.
     """
 
-    def __init__(self, base: MotionModel, pose: PoseUncertainty) -> None:
+    def __init__(self, base: MotionModel, errors: PoseErrors) -> None:
         self._base = base
         self.size = base.size + 3
-        self.measures_heading = base.measures_heading
-        self.pose = pose
+        self.motion, self.measures_heading = base.motion, base.measures_heading
+        self._errors = errors
 
     def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
         held, size = self._base.begin(boxes, velocity, noise), self._base.size
         state = np.zeros((len(boxes), self.size))
         covariance = np.zeros((len(boxes), self.size, self.size))
         state[:, :size], covariance[:, :size, :size] = held.state, held.covariance
-        covariance[:, size:, size:] = self.pose.covariance
+        covariance[:, size:, size:] = self._errors.of_scan.covariance
         return Estimates(state, covariance)
 
     def predict(self, tracks: Estimates, step: float) -> Estimates:
-        state, covariance = self._base.predict(self._shifted(tracks, -1.0), step)
-        span = self.pose.correlation_time
-        kept = math.exp(-step / span) if span > 0.0 else 0.0
-        decay = np.ones(self.size)
-        decay[-3:] = kept
-        covariance = covariance * (decay[:, None] * decay)
-        covariance[:, -3:, -3:] += (1.0 - kept * kept) * self.pose.covariance
-        return self._shifted(Estimates(state * decay, covariance), 1.0)
+        before = self._errors.of_scan
+        after = self._errors.at(before.time + step)
+        regression, independent = self._errors.regression(before.time + step)
+        state, covariance = self._base.predict(self._shifted(tracks, before, -1.0), step)
+        change = np.eye(self.size)
+        change[-3:, -3:] = regression
+        covariance = change @ covariance @ change.T
+        covariance[:, -3:, -3:] += independent
+        return self._shifted(Estimates(state @ change.T, covariance), after, 1.0)
 
-    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         return self._base.update(tracks, boxes, noise)
 
     def velocity(self, state: Array) -> Array:
         return self._base.velocity(state)
 
-    def _shifted(self, tracks: Estimates, sign: float) -> Estimates:
+    def speed_variance(self, tracks: Estimates) -> Array:
+        return self._base.speed_variance(tracks)
+
+    def _shifted(self, tracks: Estimates, pose: PoseUncertainty, sign: float) -> Estimates:
         """Return the tracks with the effect of the pose error on their position and heading added or subtracted."""
         shift: Array = np.broadcast_to(np.eye(self.size), tracks.covariance.shape).copy()
-        shift[:, :2, -3:] = sign * pose_jacobian(tracks.state[:, :2], self.pose.x, self.pose.y)
+        shift[:, :2, -3:] = sign * pose_jacobian(tracks.state[:, :2], pose.x, pose.y)
         if self.measures_heading:
             shift[:, HEADING, -1] = sign
         state = np.einsum("nij,nj->ni", shift, tracks.state)

@@ -84,7 +84,7 @@ def test_turn_rate_predict_covariance_follows_numerical_jacobian(turn: float) ->
 def test_update_weights_by_variance() -> None:
     """Prior and measurement of equal variance average, and the variance halves."""
     before = Estimates(np.array([[0.0, 0.0, 0.0, 0.0]]), 0.01 * np.eye(4)[None])
-    state, covariance = ConstantVelocity().update(before, box(1.0, -2.0), noise(0.1))
+    (state, covariance), _ = ConstantVelocity().update(before, box(1.0, -2.0), noise(0.1))
     np.testing.assert_allclose(state[0, :2], [0.5, -1.0])
     assert covariance[0, 0, 0] == pytest.approx(0.005)
     assert covariance[0, 2, 2] == pytest.approx(0.01)
@@ -94,9 +94,9 @@ def test_turn_rate_update_ignores_box_across_heading() -> None:
     """A heading of 0 and a box at 80 degrees: the fit mistook the width for the length."""
     model = TurnRate()
     before = Estimates(np.array([[0.0, 0.0, 0.0, 5.0, 0.0]]), np.diag([0.1, 0.1, 0.02, 1.0, 0.1])[None])
-    across, _ = model.update(before, box(0.0, 0.0, math.radians(80)), noise())
-    oblique, _ = model.update(before, box(0.0, 0.0, math.radians(10)), noise())
-    reverse, _ = model.update(before, box(0.0, 0.0, math.radians(190)), noise())
+    (across, _), _ = model.update(before, box(0.0, 0.0, math.radians(80)), noise())
+    (oblique, _), _ = model.update(before, box(0.0, 0.0, math.radians(10)), noise())
+    (reverse, _), _ = model.update(before, box(0.0, 0.0, math.radians(190)), noise())
     assert across[0, 2] == pytest.approx(0.0, abs=1e-6)
     assert 0.0 < oblique[0, 2] < math.radians(10)
     assert reverse[0, 2] == pytest.approx(oblique[0, 2])
@@ -108,7 +108,7 @@ def test_turn_rate_update_reverses_backward_motion() -> None:
     tracks = model.begin(box(0.0, 0.0, math.pi), UNKNOWN, noise())
     for tick in range(1, 20):
         tracks = model.predict(tracks, 0.1)
-        tracks = model.update(tracks, box(0.8 * tick, 0.0, math.pi), noise())
+        tracks = model.update(tracks, box(0.8 * tick, 0.0, math.pi), noise()).estimates
     assert tracks.state[0, 3] == pytest.approx(8.0, abs=0.5)
     assert abs(tracks.state[0, 2]) < 0.05
     assert np.all(np.linalg.eigvalsh(tracks.covariance[0]) > 0.0)

@@ -16,7 +16,7 @@ from eidrive_scenario.perception.pose_noise import PoseNoise, PoseNoiseProcess
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.perception.tracking.settings import TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
-from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, UncertainPose
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty, UncertainPose
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 
 STATION = (5.0, 1.0)
@@ -26,14 +26,21 @@ NOISE = 0.01 * np.eye(2)[None]
 UNKNOWN = np.full((1, 2), np.nan)
 
 
-def pose(correlation_time: float) -> PoseUncertainty:
-    return PoseUncertainty(*STATION, POSE, correlation_time)
+def pose_errors(covariance: Array, kept: float, count: int = 30) -> PoseErrors:
+    """Return the errors of `count` poses, 0.1 s apart, whose correlation from one to the next is `kept`."""
+    errors = PoseErrors()
+    for step in range(count):
+        errors.add(PoseUncertainty(0.1 * step, *STATION, covariance, kept * np.eye(3)))
+    return errors
 
 
-def filtered(model: MotionModel, boxes: list[Array], noise: Array) -> Estimates:
+def filtered(model: MotionModel, boxes: list[Array], noise: Array, errors: PoseErrors | None = None) -> Estimates:
     held = model.begin(boxes[0], UNKNOWN, noise)
-    for box in boxes[1:]:
-        held = model.update(model.predict(held, 0.1), box, noise)
+    for step, box in enumerate(boxes[1:], 1):
+        predicted = model.predict(held, 0.1)
+        if errors is not None:
+            errors.advance(0.1 * step)
+        held = model.update(predicted, box, noise).estimates
     return held
 
 
@@ -48,7 +55,8 @@ def test_independent_pose_errors_are_measurement_noise() -> None:
     scans, and this variance by 2 %."""
     own = pose_part(CAR[:, :2], *STATION, POSE)
     assert own[0, 0, 0] == pytest.approx(0.09 + math.radians(30.0) ** 2)
-    found = filtered(UncertainPose(ConstantVelocity(), pose(0.0)), measured(), NOISE)
+    errors = pose_errors(POSE, 0.0)
+    found = filtered(UncertainPose(ConstantVelocity(), errors), measured(), NOISE, errors)
     expected = filtered(ConstantVelocity(), measured(), NOISE + own)
     assert found.state[0, 2:4] == pytest.approx(expected.state[0, 2:4], abs=0.03)
     assert found.covariance[0, 2:4, 2:4] == pytest.approx(expected.covariance[0, 2:4, 2:4], rel=0.02, abs=0.01)
@@ -57,8 +65,8 @@ def test_independent_pose_errors_are_measurement_noise() -> None:
 @pytest.mark.parametrize("model", [ConstantVelocity(), TurnRate()])
 def test_constant_pose_error_leaves_the_filter_unchanged(model: MotionModel) -> None:
     """An error of infinite correlation time moves the whole scene, which motion relative to the pose cannot show."""
-    offset = PoseUncertainty(*STATION, np.diag([0.09, 0.09, 0.0]), 1e12)
-    found = filtered(UncertainPose(model, offset), measured(), NOISE)
+    errors = pose_errors(np.diag([0.09, 0.09, 0.0]), 1.0)
+    found = filtered(UncertainPose(model, errors), measured(), NOISE, errors)
     expected = filtered(model, measured(), NOISE)
     assert found.state[0, : model.size] == pytest.approx(expected.state[0])
     assert found.covariance[0, : model.size, : model.size] == pytest.approx(expected.covariance[0])
@@ -81,7 +89,8 @@ class NoisyDetector(Detector):
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
 def test_parked_car_is_tracked_consistently(kind: str, span: float) -> None:
     """NEES of positions relative to the assumed pose: 2 on average for a consistent filter, less if motion is weaker
-    than assumed. Without the pose error in the filter it was 39 for cv without correlation, with speeds of 13 m/s."""
+    than assumed. Without the pose error in the filter it was 39 for cv without correlation, with speeds of 13 m/s. A
+    car that stands gets no speed from the pose error, which is 0.6 m at its place."""
     noise = PoseNoiseProcess(PoseNoise(position=0.3, yaw=1.0, correlation_time=span), "RSU", 1)
     settings = TrackerSettings.model_validate({"kind": kind})
     perception = Perception(NoisyDetector(), tracker=Tracker(settings), pose_noise=noise)
@@ -101,6 +110,5 @@ def test_parked_car_is_tracked_consistently(kind: str, span: float) -> None:
         squared.append(error @ np.linalg.solve(found.covariance[0], error))
         speeds.append(float(np.hypot(*found.velocity[0])))
     assert len(squared) == 540
-    assert 0.5 < np.mean(squared) < 3.0
-    assert np.mean(speeds) < 1.2
-    assert max(speeds) < 4.5
+    assert 1.5 < np.mean(squared) < 2.5
+    assert np.mean(speeds) < 0.2

@@ -30,6 +30,8 @@ SMOOTHING = 0.4
 """Weight of the newest difference quotient in the velocity of an object whose detector estimates none."""
 VELOCITY_ERROR = 1.5
 """Assumed standard deviation of a velocity per standard deviation of the position [1/s]."""
+AXIAL_SPEED = 1.0
+"""Minimum speed of a vehicle whose direction of motion is taken from its velocity instead of its axis [m/s]."""
 LASTING = 1.0
 """Time constant of the mean speed [s], with which a lost object moves on."""
 ALONG = math.cos(math.radians(40.0))
@@ -94,8 +96,16 @@ class KnownObject(msgspec.Struct):
 
     @property
     def speed_error(self) -> float:
-        """Assumed standard deviation of the velocity [m/s]. The direction of a slower motion is unknown."""
+        """Assumed standard deviation of the velocity [m/s]."""
         return VELOCITY_ERROR * self.error
+
+    @property
+    def has_course(self) -> bool:
+        """Whether the direction of its velocity is that of its motion; otherwise a vehicle moves along its axis.
+
+        A slow vehicle has no lateral motion, so that a velocity across its axis is noise.
+        """
+        return self.speed >= self.speed_error and (self.speed >= AXIAL_SPEED or self.kind in ON_FOOT)
 
     @property
     def seems_to_stand(self) -> bool:

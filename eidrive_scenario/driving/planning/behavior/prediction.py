@@ -143,12 +143,11 @@ class Predictor:
         """Along curves for which the vehicle is too fast: only if it follows no other lane."""
         direction = math.atan2(known.vy, known.vx)
         noise = known.speed_error
-        is_unknown = now < noise
         for course in courses:
             along, left, heading = course.place(known.x, known.y)
             turn = float(wrap_angle(direction - heading))
             along_lane = travelled
-            if is_unknown:
+            if not known.has_course:
                 along_lane, turn = travelled * max(math.cos(turn), 0.0), 0.0
             if abs(turn) > ALIGNED or abs(left) > LANE_WIDTH:
                 continue
@@ -185,10 +184,10 @@ class Predictor:
 def _straight_on(known: KnownObject, travelled: Array, speed: Array) -> Hypothesis:
     """Return the motion of an object that follows no lane.
 
-    The direction of a velocity within its error is noise: a vehicle then moves along its axis.
+    A vehicle whose direction of motion is unknown moves along its axis.
     """
     direction = math.atan2(known.vy, known.vx)
-    if known.speed < known.speed_error and known.kind not in ON_FOOT:
+    if not known.has_course and known.kind not in ON_FOOT:
         ahead = math.cos(direction - known.yaw)
         direction = known.yaw if ahead >= 0.0 else known.yaw + math.pi
         travelled, speed = travelled * abs(ahead), speed * abs(ahead)
