@@ -211,7 +211,11 @@ def _spans(
             spacing = min(spacing, outwards * rings + math.sqrt(1.0 - min(outwards**2, 1.0)) * columns)
         open_low, open_high = not low > 0.0, not high < 0.0
         ends = _hidden_ends(points[:, :2], (ax, ay), low, high, hidden)
-        if high - low <= THIN < shape.high[1 - axis] - shape.low[1 - axis]:
+        depth = shape.high[1 - axis] - shape.low[1 - axis]
+        if depth <= THIN < high - low:
+            # Only the side along this axis is hit: the object may extend beyond its points at the near end as well.
+            open_low = open_high = True
+        if high - low <= THIN < depth:
             # A side across this axis faces the sensor and ends the object, even if something hides more of it.
             ends = ends[0] and open_low, ends[1] and open_high
         if any(cut):

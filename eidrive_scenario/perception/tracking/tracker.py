@@ -160,7 +160,8 @@ class Tracker(TrackingMethod):
         else unchanged."""
         course = np.where(np.isnan(course), held, course)
         turned = np.where(np.cos(measured - course) < 0.0, measured + math.pi, measured)
-        held = np.where(np.cos(held - course) < 0.0, held + math.pi, held)
+        # A velocity across the axis says nothing about the front.
+        held = np.where(np.cos(held - course) < -ACROSS, held + math.pi, held)
         # An axis across the course is the other axis of the box: the L-shape fit mistook the width for the length.
         turned = np.where(np.cos(turned - course) < ACROSS, held, turned)
         return np.asarray(held + share * ((turned - held + math.pi) % (2.0 * math.pi) - math.pi))
