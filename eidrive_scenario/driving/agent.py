@@ -39,8 +39,8 @@ NOTHING_FUSED = Detections(0.0)
 class Agent:
     """Agent of one station. Its only inputs are sensor readings, received messages and the goal.
 
-    It keeps the newest report of each sender for the lifetime of reports. It transmits its own detections, not fused ones,
-    which avoids data incest.
+    It keeps the newest report of each sender for its lifetime. It transmits its own detections, not fused ones, which
+    avoids data incest.
     """
 
     def __init__(

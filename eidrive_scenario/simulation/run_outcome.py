@@ -145,8 +145,8 @@ def expired_messages(links: Mapping[tuple[str, str], LinkStatistics]) -> Iterato
         link = links[sender, receiver]
         more = f", and messages of {len(others)} more station{'s' * (len(others) > 1)}" if others else ""
         yield Diagnostic(
-            f"station {receiver!r} does not use {link.expired} of {link.received} received messages of {sender!r}{more}: "
-            f"they are too old on arrival (mean delay {link.mean_delay or 0.0:.3g} s)",
+            f"station {receiver!r} does not use {link.expired} of {link.received} received messages of {sender!r}"
+            f"{more}: they are too old on arrival (mean delay {link.mean_delay or 0.0:.3g} s)",
             "limits are its property report_timeout, and max_age or max_lateness of its fusion method",
         )
 

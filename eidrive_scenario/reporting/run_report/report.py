@@ -30,7 +30,7 @@ MOST_WARNINGS = 100
 SHOWN = 4
 """Maximum number of metrics in the overview."""
 EXPIRED = "messages.expired"
-"""Metric that the overview shows in addition if it is not 0."""
+"""Metric of the messages that were too old on arrival."""
 _UNITS = {"count": "", "impact_speed": "m/s"}
 """Units that differ from the unit of the criterion, by the last part of the name of the metric."""
 
@@ -131,7 +131,8 @@ def _warnings(runs: Sequence[ReportedRun]) -> list[str]:
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
-    """Return the preferred metrics, then the most frequent ones, without times, whose mean has no meaning, and EXPIRED."""
+    """Return the preferred metrics, then the most frequent ones, without times, whose mean has no meaning, and EXPIRED
+    if it is not 0."""
     counts = Counter(name for run in runs for name in run.metrics if not name.endswith(".time"))
 
     def rank(name: str) -> tuple[int, int, str]:
