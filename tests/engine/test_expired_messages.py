@@ -115,3 +115,18 @@ def test_warning_about_expired_messages_is_one_per_receiver() -> None:
 def test_link_without_receptions_has_no_warning() -> None:
     assert texts({("A", "B"): LinkStatistics(3, 0, 3, 0, 100, None, None, None, None, None)}) == []
     assert texts({}) == []
+
+
+@pytest.mark.parametrize("latency", [1.1, 1.25, 1.4])
+def test_success_over_latency_ends_where_the_planner_expects_to_pass_first(latency: float) -> None:
+    """Up to the braking distance before the crossing, at 4 s, the planner gives way to a car that it expects before 6.1 s.
+
+    That car needs 33.05 m to the crossing, accelerates with 3.5 m/s² and is known as it was before the latency.
+    """
+    moving = 4.0 - latency
+    expected = 4.0 + (33.05 - 0.5 * 3.5 * moving**2) / (3.5 * moving)
+    channel = f"{{model: composed, delay: {{kind: constant, seconds: {latency}}}}}"
+    settings = RunSettings(channel=channel, parameters={"Planner": "behavior"})
+    result = run_file("coop/scenario_1", seed=1, settings=settings)
+    assert result.passed is (expected < 6.1)
+    assert result.metrics["messages.expired"] == 0.0

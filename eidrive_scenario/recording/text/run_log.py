@@ -50,8 +50,8 @@ class RunLog:
         self._decisions = Decisions()
 
     def observe(self, frame: Frame) -> None:
-        """Write one line for each change, new decision of a planner and message of a radio channel in this frame, and for
-        each received message that is too old.
+        """Write one line for each change, new decision of a planner, message of a radio channel, and received message
+        that is too old, in this frame.
 
         The standbyState of an element that starts in the same tick is omitted. The line of a message begins with its
         sending time.

@@ -78,8 +78,7 @@ class SeriesBuilder:
     @property
     def width(self) -> int:
         """Number of columns including the last frame."""
-        by_sender = (*self._generated.values(), *self._expired.values())
-        return 3 * len(self._generated) + sum(map(len, by_sender))
+        return sum(3 + len(senders) + len(self._expired[name]) for name, senders in self._generated.items())
 
     def keep(self) -> None:
         """Add the values of the last frame."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -165,7 +166,7 @@ def test_report_older_than_report_timeout_is_deleted(car: ActorSpec) -> None:
     ],
 )
 def test_message_older_than_its_lifetime_on_arrival_is_expired(
-    car: ActorSpec, delay: float, settings: dict[str, object], used: bool
+    car: ActorSpec, delay: float, settings: dict[str, Any], used: bool
 ) -> None:
     cooperation = Cooperation(car, f"{{delay: {{kind: constant, seconds: {delay}}}}}", **settings)
     steps = [cooperation.step({"RSU": (HIDDEN,)})["Ego"] for _ in range(round(delay / DT) + 4)]
