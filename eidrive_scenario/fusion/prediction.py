@@ -23,7 +23,7 @@ def predictable_time(deviation: float) -> float:
 
 
 CAR_LENGTH = 5.0
-"""Length of a car [m], twice the distance within which the planner `behavior` recognises an object."""
+"""Length of a car [m], twice the distance within which the planner `behavior` recognizes an object."""
 REPORT_LIFETIME = predictable_time(CAR_LENGTH)
 """Default maximum age of a report [s]: 2.28 s. The standard deviation that prediction adds is then the length of a car,
 and the predicted box of a car does not overlap with the car any more.

@@ -73,10 +73,9 @@ def test_expired_messages_are_in_recording_replay_tables_and_log(late: RunResult
 
 def test_expired_messages_are_in_report(late: RunResult, tmp_path: Path) -> None:
     page = html.fromstring(write_report([late.as_json()], tmp_path).read_text(encoding="utf-8"))
-    titles = [
-        " ".join(cell.text_content().split()) for cell in page.iterfind(".//table[@class='overview']/thead/tr/th")
-    ]
-    cells = [cell.text_content().strip() for cell in page.find(".//table[@class='overview']/tbody/tr")]
+    (table,) = page.iterfind(".//table[@class='overview']")
+    titles = [str(cell.xpath("string()")) for cell in table.iterfind("thead/tr/th")]
+    cells = [str(cell.xpath("string()")) for cell in table.iterfind("tbody/tr/td")]
     assert cells[titles.index("messages expiredmean (range)")] == f"{RECEIVED:.2f}"
     timely = {**late.as_json(), "metrics": {**late.metrics, "messages.expired": 0.0}}
     assert "messages expired" not in write_report([timely], tmp_path).read_text(encoding="utf-8")
@@ -119,7 +118,7 @@ def test_link_without_receptions_has_no_warning() -> None:
 
 @pytest.mark.parametrize("latency", [1.1, 1.25, 1.4])
 def test_success_over_latency_ends_where_the_planner_expects_to_pass_first(latency: float) -> None:
-    """Up to the braking distance before the crossing, at 4 s, the planner gives way to a car that it expects before 6.1 s.
+    """At 4 s, the braking distance before the crossing, the planner gives way to a car that it expects before 6.1 s.
 
     That car needs 33.05 m to the crossing, accelerates with 3.5 m/s² and is known as it was before the latency.
     """
