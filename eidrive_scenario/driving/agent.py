@@ -39,8 +39,8 @@ NOTHING_FUSED = Detections(0.0)
 class Agent:
     """Agent of one station. Its only inputs are sensor readings, received messages and the goal.
 
-    It keeps the newest report of each sender until `report_timeout`. It transmits its own detections, not fused ones,
-    which avoids data incest.
+    It keeps the newest report of each sender for its lifetime. It transmits its own detections, not fused ones, which
+    avoids data incest.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Agent:
             self._regions = PerceptionRegionStore(REGION_LIFETIME)
             everywhere = ViewSector(*spec.offset, 0.0, math.pi, math.inf)
             self._view = (everywhere,) if planner.view is None else planner.view
-        self._own_body = OwnBody(spec, duration=settings.lifetime(complete=False), dt=dt)
+        self._own_body = OwnBody(spec, duration=settings.report_lifetime, dt=dt)
         self._reports = ReportStore(
             self.name, settings, fusion=fusion, own_body=self._own_body, regions=self._regions, points=points
         )
@@ -145,7 +145,7 @@ class Agent:
             self._detections = fresh
         detections = self._detections
         covariance = self.perception.pose_covariance
-        self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
+        expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
         state = self._state(ego)
         found = fresh if self.points is None else self.points.perceive(readings, fresh, self.perception.pose)
         if found is not None and not own_perception:
@@ -164,6 +164,7 @@ class Agent:
             goal,
             self.perception.signals(readings) if obeys else (),
             message_interval,
+            expired,
         )
 
     @property
@@ -199,6 +200,7 @@ class Agent:
         return AgentStep(
             detections=detections,
             inbox=perceived.inbox,
+            expired=perceived.expired,
             fused=perceived.fused,
             plan=plan,
             control=self._control(ego, plan) if action.control is None else action.control,

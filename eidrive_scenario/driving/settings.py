@@ -15,6 +15,7 @@ from eidrive_scenario.driving.planner_settings import (
 )
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.files.yaml_text import load_yaml
+from eidrive_scenario.fusion.prediction import REPORT_LIFETIME
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.properties import property_entries
 from eidrive_scenario.openscenario.values.references import resolve_references
@@ -42,9 +43,6 @@ LOCALIZING = ("gnss", "imu")
 """Kinds of sensors for localization."""
 
 _OF_THE_TRUTH_SENSOR = ("range", "field_of_view", "visibility", "mount")
-
-PARTIAL_LIFETIME = 1.5
-"""Lifetime of a report that omits unchanged objects [s]; as `max_age` of covariance intersection."""
 
 MAX_TIME = 1e4
 """Maximum latency, lifetime and clock error [s]."""
@@ -106,9 +104,7 @@ class AgentSettings(Settings):
     message_rate    rate of CPMs; None: one in each tick
     message_phase   time from the entry of the station to its first message or, with `etsi`, its first evaluation of the
                     rules; None: random, because stations are not synchronized. Not used with a message in each tick
-    report_timeout  lifetime of a report. Default: 1 s for a complete list of objects; 1.5 s for CAMs and CPMs by the
-                    ETSI rules, which repeat stationary objects once per second (T_GenCamMax, T_GenCpmMax), so that a
-                    message may be delayed by 0.5 s
+    report_timeout  maximum age of a report that is used; None: while its objects are predictable (REPORT_LIFETIME)
     antenna_height  above the reference point; None: on the roof
     messages        kinds of sent messages: `cpm` (perceived objects), `cam` (ego state)
     generation      `each_tick`, `rate` (message_rate), or `etsi`: by the rules of EN 302 637-2 and TS 103 324; None
@@ -147,7 +143,7 @@ class AgentSettings(Settings):
     cooperates_with: Annotated[tuple[str, ...] | None, BeforeValidator(_names)] = None
     message_rate: Annotated[float, Field(ge=1e-3, le=10_000.0)] | None = None
     message_phase: Annotated[float, Field(ge=0.0, le=MAX_TIME)] | None = None
-    report_timeout: Annotated[float, Field(gt=0.0, le=MAX_TIME)] = 1.0
+    report_timeout: Annotated[float, Field(gt=0.0, le=MAX_TIME)] | None = None
     antenna_height: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     messages: Annotated[tuple[Literal["cpm", "cam"], ...], BeforeValidator(_names)] = ("cpm",)
     generation: Literal["each_tick", "rate", "etsi"] | None = None
@@ -178,10 +174,10 @@ class AgentSettings(Settings):
 
     @model_validator(mode="after")
     def _in_time(self) -> AgentSettings:
-        if self.detector_latency >= self.report_timeout:
+        if self.detector_latency >= self.report_lifetime:
             raise ValueError(
                 f"detector_latency is not below report_timeout (got {self.detector_latency:g} s and "
-                f"{self.report_timeout:g} s)"
+                f"{self.report_lifetime:.3g} s)"
             )
         return self
 
@@ -190,10 +186,10 @@ class AgentSettings(Settings):
         """Whether the settings select senders, which may be all; driving stations receive from all by default."""
         return "cooperates_with" in self.model_fields_set and self.cooperates_with != ()
 
-    def lifetime(self, *, complete: bool) -> float:
-        """Return the lifetime of a report [s]; `complete` if it lists all objects in sight of its sender."""
-        given = "report_timeout" in self.model_fields_set
-        return self.report_timeout if complete or given else PARTIAL_LIFETIME
+    @property
+    def report_lifetime(self) -> float:
+        """Maximum age of a report that the station uses [s]."""
+        return REPORT_LIFETIME if self.report_timeout is None else self.report_timeout
 
     @property
     def clock(self) -> StationClock:

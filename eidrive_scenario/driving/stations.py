@@ -209,6 +209,9 @@ class Stations(DrivingStack):
             )
             for name, agent in self._agents.items()
         }
+        for name, perceived in sensed.items():
+            for row in perceived.expired:
+                channel.count_expired(perceived.inbox[row].message.sender, name)
         return fuse_reports(self._agents, sensed, now)
 
     def act(self, world: World, view: WorldView, inputs: StackInputs) -> dict[str, AgentStep]:

@@ -40,6 +40,7 @@ class StationPerception(msgspec.Struct, frozen=True, gc=False):
     goal              request of the scenario; None if there is none
     signals           traffic lights and stop signs in sight, if the station obeys them
     message_interval  minimum time between two messages under congestion control [s]
+    expired           rows of the received messages that are not used because they are too old
     """
 
     time: float
@@ -51,6 +52,7 @@ class StationPerception(msgspec.Struct, frozen=True, gc=False):
     goal: Goal | None = None
     signals: Sequence[SignalReading] = ()
     message_interval: float = 0.0
+    expired: tuple[int, ...] = ()
 
 
 class AgentStep(msgspec.Struct, frozen=True, gc=False):
@@ -65,3 +67,5 @@ class AgentStep(msgspec.Struct, frozen=True, gc=False):
     outbox: tuple[Message, ...]
     estimate: EgoState | None = None
     """Estimated ego state; None if the station uses its true state."""
+    expired: tuple[int, ...] = ()
+    """Rows of `inbox` with messages that are not used because they are too old."""

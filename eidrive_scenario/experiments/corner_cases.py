@@ -39,7 +39,7 @@ ARMS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
         "roadside unit, right clock": {**UNIT, "ClockOffset": "0"},
         "clock 0.5 s ahead": {**UNIT, "ClockOffset": "0.5"},
         "clock 0.5 s behind": {**UNIT, "ClockOffset": "-0.5"},
-        "clock 1.2 s behind": {**UNIT, "ClockOffset": "-1.2"},
+        "clock 2.4 s behind": {**UNIT, "ClockOffset": "-2.4"},
     },
     "jammer": {
         "roadside unit, no jammer": {**UNIT, "JammerPower": "-30"},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,17 +62,27 @@ def _plans(frame: Frame) -> Iterator[Row]:
 
 
 def _messages(run: RecordedRun) -> Iterator[Row]:
+    # Frames are read twice: whether a message is too old is known after its outcome
+    expired = {message for frame in run.frames() for message in _expired(frame)}
     for frame in run.frames():
-        yield from run.converted(frame, lambda one: _outcomes(one.links))
+        yield from run.converted(frame, lambda one: _outcomes(one.links, expired))
     outcome = run.outcome()
-    yield from () if outcome is None else _outcomes(outcome.final_links)
+    yield from () if outcome is None else _outcomes(outcome.final_links, expired)
 
 
-def _outcomes(events: Iterable[LinkEvent]) -> Iterator[Row]:
+def _expired(frame: Frame) -> Iterator[tuple[str, str, int]]:
+    """Yield sender, receiver and number of each received message that is too old."""
+    for receiver, step in frame.steps.items():
+        for message in (step.inbox[row].message for row in step.expired):
+            yield message.sender, receiver, message.number
+
+
+def _outcomes(events: Iterable[LinkEvent], expired: Container[tuple[str, str, int]]) -> Iterator[Row]:
     for event in events:
         radio = (event.path_loss_db, event.snr_db, event.los, ", ".join(event.blockers))
         outcome = (event.outcome, event.arrives, event.reason, event.size)
-        yield (event.sent, event.sender, event.receiver, event.number, *outcome, *radio)
+        is_expired = (event.sender, event.receiver, event.number) in expired
+        yield (event.sent, event.sender, event.receiver, event.number, *outcome, *radio, is_expired)
 
 
 def _transitions(frame: Frame) -> Iterator[Row]:
@@ -133,6 +143,7 @@ TABLES: Mapping[str, Table] = {
             "size": int,
             **_floats("path_loss_db", "snr_db"),
             **dict.fromkeys(("los", "blockers"), str),
+            "expired": bool,
         },
         _messages,
     ),

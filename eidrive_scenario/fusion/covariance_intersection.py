@@ -16,6 +16,7 @@ from eidrive_scenario.fusion.grouping import Objects, group_tracks
 from eidrive_scenario.fusion.headings import fuse_headings
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table
+from eidrive_scenario.fusion.prediction import REPORT_LIFETIME
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, predict_tracks, rows_of
 from eidrive_scenario.settings import Settings
@@ -30,14 +31,13 @@ class CovarianceIntersectionSettings(Settings):
 
     gate           probability that two estimates of one object are within the association gate
     gate_distance  maximum distance between centers of one object if a report has no covariance [m]
-    max_age        time after the last report of an object at which its track is deleted, and maximum delay of reports
-                   [s]; objects at rest are reported once per second (ETSI TS 103 324, T_GenCpmMax)
+    max_age        time after the last report of an object at which its track is deleted, and maximum age of reports [s]
     existence      minimum existence probability of reported objects; from 0.5 existence is the likelier hypothesis
     """
 
     gate: float = Field(default=0.99, gt=0.0, lt=1.0)
     gate_distance: PositiveFloat = 4.0
-    max_age: PositiveFloat = 1.5
+    max_age: PositiveFloat = REPORT_LIFETIME
     existence: float = Field(default=0.5, ge=0.0, le=1.0)
 
 
@@ -60,6 +60,10 @@ class CovarianceIntersectionFusion(FusionMethod):
         self._history = ReportHistory(self.settings.max_age, self._gate)
         self._order: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
         """Stations of the last reports, and the same in order of their names."""
+
+    @property
+    def max_report_age(self) -> float:
+        return self.settings.max_age
 
     def add_report(self, report: Report) -> None:
         self._history.add_report(report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, Self
@@ -48,10 +49,14 @@ class FusionMethod(ABC):
     """Whether a built-in method only copies and averages finite numbers, so that its results are not checked."""
 
     def add_report(self, report: Report) -> None:  # noqa: B027 - optional
-        """Process a received report. Every report is passed in order of arrival, before the next `fuse`.
-
-        This includes out-of-sequence and incomplete reports.
+        """Process a received report. Every report that is not too old is passed in order of arrival, before the next
+        `fuse`. This includes out-of-sequence and incomplete reports.
         """
+
+    @property
+    def max_report_age(self) -> float:
+        """Maximum age of reports that the method uses [s], in addition to the lifetime of reports of the station."""
+        return math.inf
 
     @property
     def max_point_age(self) -> float:

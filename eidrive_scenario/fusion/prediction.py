@@ -5,11 +5,31 @@ from __future__ import annotations
 import numpy as np
 
 from eidrive_scenario.arrays import Array, Bools
-from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY
+from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, KNOWN_SPEED
 
 _PLACE = np.diag([1.0, 1.0, 0.0, 0.0])
 _SPEED = np.diag([0.0, 0.0, 1.0, 1.0])
 _BOTH = np.eye(4, k=2) + np.eye(4, k=-2)
+
+
+def predictable_time(deviation: float) -> float:
+    """Return the time [s] in which prediction adds a standard deviation [m] to each coordinate of a position.
+
+    It is the root of deviation² = KNOWN_SPEED² t² + ACCELERATION_DENSITY t³ / 3, the variance that `predict` adds to an
+    object with a reported velocity.
+    """
+    roots = np.roots([ACCELERATION_DENSITY / 3.0, KNOWN_SPEED**2, 0.0, -(deviation**2)])
+    return float(roots.real.max())  # the only positive root: the coefficients change their sign once
+
+
+CAR_LENGTH = 5.0
+"""Length of a car [m], twice the distance within which the planner `behavior` recognizes an object."""
+REPORT_LIFETIME = predictable_time(CAR_LENGTH)
+"""Default maximum age of a report [s]: 2.28 s. The standard deviation that prediction adds is then the length of a car,
+and the predicted box of a car does not overlap with the car any more.
+
+One lost message about an object at rest, which is reported once per second (ETSI TS 103 324, T_GenCpmMax), is bridged.
+"""
 
 
 def predict(

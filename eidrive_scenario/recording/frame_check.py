@@ -22,7 +22,8 @@ _COLUMNS = {
 
 
 def check_frame(frame: Frame) -> None:
-    """Raise ValueError if the time is not finite or an array of the view does not have one row per actor."""
+    """Raise ValueError if the time is not finite, an array of the view does not have one row per actor, or a station
+    names a message that it did not receive."""
     view = frame.view
     if not math.isfinite(view.time):
         raise ValueError(f"time is not finite (got {view.time})")
@@ -33,3 +34,6 @@ def check_frame(frame: Frame) -> None:
         shape = getattr(view, name).shape
         if shape != ((count, columns) if columns else (count,)):
             raise ValueError(f"{name} has an invalid shape (got {shape} for {count} actors)")
+    for name, step in frame.steps.items():
+        if not all(0 <= row < len(step.inbox) for row in step.expired):
+            raise ValueError(f"expired messages of {name} were not received (got rows {list(step.expired)[:5]})")

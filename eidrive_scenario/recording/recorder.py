@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     from mcap.writer import Writer
 
 TOPIC = "/frame"
-FORMAT = "3"
+FORMAT = "4"
 """Version of the recording format, stored in the metadata."""
-READABLE = ("2", FORMAT)
-"""Versions that are read. Version 2 lacks the commands of frames and the outcome of the run."""
+READABLE = ("2", "3", FORMAT)
+"""Versions that are read. Version 3 lacks the expired messages of stations, version 2 also the commands of frames and
+the outcome of the run."""
 CHUNK_SIZE = 256 * 2**10
 """Uncompressed size at which a chunk is written [bytes]."""
 _SPAN = 1_000_000_000

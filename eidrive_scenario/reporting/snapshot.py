@@ -12,7 +12,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.tolerances import TIME_TOLERANCE
-from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.world.view import WorldView
 
 DEFAULT_SETTINGS = AgentSettings()
@@ -59,8 +59,10 @@ class SnapshotBuilder:
         """Process the next frame and return the snapshot at its time."""
         now = frame.view.time
         step = frame.steps.get(self.station)
-        for received in step.inbox if step else ():
-            self._receive(received)
+        inbox, expired = (step.inbox, step.expired) if step else ((), ())
+        for row, received in enumerate(inbox):
+            if row not in expired:
+                self._receive(received)
         for event in frame.links:
             if event.receiver == self.station:
                 self._links[event.sender] = event
@@ -68,7 +70,7 @@ class SnapshotBuilder:
         self._newest = {
             key: held
             for key, held in self._newest.items()
-            if now - held.message.detections.time <= self._lifetime(held.message) + TIME_TOLERANCE
+            if now - held.message.detections.time <= self._settings.report_lifetime + TIME_TOLERANCE
         }
         oldest = now - LINK_LIFETIME - TIME_TOLERANCE
         self._links = {name: event for name, event in self._links.items() if event.sent >= oldest}
@@ -85,8 +87,8 @@ class SnapshotBuilder:
     def _receive(self, received: ReceivedMessage) -> None:
         message = received.message
         if message.objects is not None:
-            lifetime = self._settings.lifetime(complete=False)
-            complete = self._partial.setdefault(message.sender, PartialReportAssembler(lifetime)).update(message)
+            assembler = PartialReportAssembler(self._settings.report_lifetime)
+            complete = self._partial.setdefault(message.sender, assembler).update(message)
             received = replace(received, message=replace(message, detections=complete))
         key = message.sender, message.kind
         held = self._newest.get(key)
@@ -100,7 +102,3 @@ class SnapshotBuilder:
             return step.detections
         held = self._newest.get((self.station, "cpm"))
         return held.message.detections if held is not None else Detections(now)
-
-    def _lifetime(self, message: Message) -> float:
-        """Return the time for which the station uses a message [s]."""
-        return self._settings.lifetime(complete=message.objects is None and message.kind == "cpm")

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import msgspec
 
 from eidrive_scenario.driving.motionless import MotionlessStations
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.false_tracks import FalseTracks
 from eidrive_scenario.exit_codes import ABORTED, FAILED, PASSED
@@ -20,12 +21,15 @@ from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 TIME_LIMIT = "time limit"
 """Reason for the end of a run that reaches the limit of simulated time."""
 EXIT_COMMAND = "command: "
 FATAL_CRITERION = "criterion: "
 """Prefixes of the reasons for an end by an exit command, and by a fatal criterion; its name follows."""
+EXPIRED_SHARE = 0.1
+"""Share of the received messages of a link that may be too old for their receiver without a warning."""
 
 
 class RunEnd(msgspec.Struct, frozen=True):
@@ -78,7 +82,7 @@ def build_result(
         trace_hash=trace_hash,
         simulated_s=frame.view.time,
         wall_s=end.wall_s,
-        warnings=tuple(dict.fromkeys([*state.warnings, *late_warnings])),
+        warnings=tuple(dict.fromkeys([*state.warnings, *late_warnings, *map(str, expired_messages(links))])),
         parameters=dict(scenario.parameters),
         run=settings.run,
         links=links,
@@ -129,6 +133,22 @@ def scheduled_end(storyboard: Storyboard, time: float, time_limit: float) -> str
 def _is_failed_early(reason: str) -> bool:
     """Whether a run ended because it failed, before the rest of the storyboard."""
     return reason == f"{EXIT_COMMAND}exitFailure" or reason.startswith(FATAL_CRITERION)
+
+
+def expired_messages(links: Mapping[tuple[str, str], LinkStatistics]) -> Iterator[Diagnostic]:
+    """Yield a warning for each receiver of a link with more than EXPIRED_SHARE of messages that are too old for it."""
+    senders: dict[str, list[str]] = {}
+    for (sender, receiver), link in links.items():
+        if link.expired > EXPIRED_SHARE * link.received:
+            senders.setdefault(receiver, []).append(sender)
+    for receiver, (sender, *others) in sorted(senders.items()):
+        link = links[sender, receiver]
+        more = f", and messages of {len(others)} more station{'s' * (len(others) > 1)}" if others else ""
+        yield Diagnostic(
+            f"station {receiver!r} does not use {link.expired} of {link.received} received messages of {sender!r}"
+            f"{more}: they are too old on arrival (mean delay {link.mean_delay or 0.0:.3g} s)",
+            "limits are its property report_timeout, and max_age or max_lateness of its fusion method",
+        )
 
 
 def late_warnings(

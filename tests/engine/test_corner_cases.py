@@ -54,8 +54,11 @@ def test_wrong_place_is_not_corrected_by_a_right_report() -> None:
     assert failed(play("contradicting_senders", "both")) == {"min_speed"}
 
 
-def test_clock_behind_by_more_than_the_report_timeout_hides_the_crossing_car() -> None:
-    assert "collision" in failed(play("wrong_clock", "rsu", ClockOffset="-1.2"))
+def test_clock_behind_by_more_than_the_report_lifetime_hides_the_crossing_car() -> None:
+    result = play("wrong_clock", "rsu", ClockOffset="-2.3")
+    assert "collision" in failed(result)
+    assert result.metrics["messages.expired"] == result.links["RSU", "Ego"].received > 0
+    assert any("does not use" in warning for warning in result.warnings)
 
 
 def test_jammer_blocks_the_unit_from_its_start_on() -> None:

@@ -81,10 +81,11 @@ def test_run_with_cam_and_cpm_reports_sender_and_objects(tmp_path: Path) -> None
     assert set(more[1:60]) == {1}, "one object more: the unit"
 
 
-def test_run_with_clock_offset_beyond_the_timeout_ignores_reports(tmp_path: Path) -> None:
-    """Reports of a unit whose clock is 1.2 s behind are older than the report timeout of the receivers."""
-    late = simulate(with_properties(tmp_path, "RsuStack", ("clock_offset", "-1.2")), "ideal")
+def test_run_with_clock_offset_beyond_the_lifetime_ignores_reports(tmp_path: Path) -> None:
+    """Reports of a unit whose clock is 2.4 s behind are older than the lifetime of reports, 2.28 s."""
+    late = simulate(with_properties(tmp_path, "RsuStack", ("clock_offset", "-2.4")), "ideal")
     assert not late.passed
+    assert late.links["RSU", "Ego"].expired == late.links["RSU", "Ego"].received > 0
     assert simulate(with_properties(tmp_path, "RsuStack", ("clock_offset", "0.01")), "ideal").passed
 
 

@@ -25,7 +25,8 @@ SENDER_REPORT_SUFFIX = " itself"
 
 
 class ReportStore:
-    """Newest report of each station until the end of its lifetime. Every report is passed to the fusion method.
+    """Newest report of each station until the end of its lifetime. Every report is passed to the fusion method, except
+    those that are too old when they arrive.
 
     regions  perception regions that received CPMs are added to; None if the station does not use them
     points   received point clouds; None if the station does not use them
@@ -49,10 +50,8 @@ class ReportStore:
         self._points = points
         self._reports: dict[str, Report] = {}
         self._partial: dict[str, PartialReportAssembler] = {}
-        self._usual_lifetime = settings.lifetime(complete=True)
-        self._long_lifetime = settings.lifetime(complete=False)
-        self._lifetimes: dict[str, float] = {}
-        """Lifetime of the reports of each station [s]."""
+        self._lifetime = min(settings.report_lifetime, fusion.max_report_age)
+        """Maximum age of a report that is used [s]."""
         self._next_deletion = math.inf
         """Time up to which no report exceeds its lifetime [s]."""
 
@@ -69,14 +68,17 @@ class ReportStore:
         *,
         pose_covariance: Array | None,
         own_perception: bool,
-    ) -> None:
+    ) -> tuple[int, ...]:
         """Store the newest report of each sender, and delete reports that exceed their lifetime.
+
+        Return the rows of messages in the inbox that are not used because they are too old.
 
         ego              assumed pose of the station, with (3, 3) `pose_covariance` of x, y and yaw; None: it is exact
         own_perception   whether the channel carries the detections of a station back to itself
         """
-        name, regions, points, lifetimes = self._name, self._regions, self._points, self._lifetimes
-        for received in inbox:
+        name, regions, points = self._name, self._regions, self._points
+        expired: list[int] = []
+        for row, received in enumerate(inbox):
             message = self._clock.with_local_timestamps(received.message, now)
             sender, perceived, complete = message.sender, message.kind == "cpm", message.objects is None
             own = sender == name
@@ -85,7 +87,13 @@ class ReportStore:
             if regions is not None:
                 regions.add_message(message)
             if points is not None and message.points is not None and not own:
-                points.add_points(sender, message.points, self._own_body.box(message.points.time))
+                if self._is_expired(message.points.time, self._fusion.max_point_age, now):
+                    expired.append(row)
+                else:
+                    points.add_points(sender, message.points, self._own_body.box(message.points.time))
+                continue
+            if self._is_expired(message.detections.time, self._lifetime, now):
+                expired.append(row)
                 continue
             detections = _numbered(message)
             state: StationState | None = message.state
@@ -98,16 +106,13 @@ class ReportStore:
                 pose_change = 2.0 * state.pose_covariance
                 state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
-            lifetime = self._usual_lifetime if complete and perceived else self._long_lifetime
-            if lifetimes.get(station, self._usual_lifetime) != lifetime:
-                lifetimes[station] = lifetime
-                self._next_deletion = -math.inf
             self.add(
                 Report(station, detections, received.arrived, state, complete, pose_change),
                 None if complete else self._assembled_detections(message, pose_covariance),
             )
         if now > self._next_deletion:
             self._delete_old(now)
+        return tuple(expired)
 
     def add(self, report: Report, completed: Detections | None = None) -> None:
         """Pass a report to the fusion method, and store it unless a newer one of its station is stored.
@@ -120,19 +125,24 @@ class ReportStore:
         station = report.station
         held = self._reports.get(station)
         if held is None:
-            self._next_deletion = min(self._next_deletion, self._end_of_life(station, report))
+            self._next_deletion = min(self._next_deletion, self._end_of_life(report))
         if held is None or report.detections.time >= held.detections.time:
             self._reports[station] = report
 
-    def _end_of_life(self, station: str, report: Report) -> float:
-        """Return the time up to which a report is stored [s]."""
-        return report.detections.time + self._lifetimes.get(station, self._usual_lifetime)
+    @staticmethod
+    def _is_expired(time: float, lifetime: float, now: float) -> bool:
+        """Return whether a measurement at `time` [s] exceeds its lifetime [s]."""
+        return time + lifetime < now - TIME_TOLERANCE
+
+    def _end_of_life(self, report: Report) -> float:
+        """Return the time up to which a report is stored [s], also if the clock of its sender is fast."""
+        return min(report.detections.time, report.arrived) + self._lifetime
 
     def _delete_old(self, now: float) -> None:
         """Delete reports that exceed their lifetime."""
         oldest, expired = math.inf, []
         for station, held in self._reports.items():
-            end = self._end_of_life(station, held)
+            end = self._end_of_life(held)
             if end < now - TIME_TOLERANCE:
                 expired.append(station)
             elif end < oldest:
@@ -145,7 +155,7 @@ class ReportStore:
         """Return all known objects of the sender of a message that lists a part of them."""
         memory = self._partial.get(message.sender)
         if memory is None:
-            memory = self._partial[message.sender] = PartialReportAssembler(self._long_lifetime)
+            memory = self._partial[message.sender] = PartialReportAssembler(self._lifetime)
         return self._without_own_body(message, memory.update(message), pose_covariance)
 
     def _without_own_body(self, message: Message, detections: Detections, pose_covariance: Array | None) -> Detections:

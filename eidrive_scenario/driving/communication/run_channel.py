@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents
-from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics, message_counts
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics, message_counts, with_expired
 
 
 class RunChannel:
@@ -38,6 +39,8 @@ class RunChannel:
         """The last channel after cooperation was switched off: its statistics remain part of the result."""
         self._statistics: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
         """Time and value of the last statistics: those of many links are expensive."""
+        self._expired: Counter[tuple[str, str]] = Counter()
+        """Number of received messages that are too old for their receiver, by sender and receiver."""
 
     def select(
         self, source: str | Path | Mapping[str, Any], *, origin: str, line: int | None, scope: Scope | None
@@ -88,6 +91,10 @@ class RunChannel:
             check_delivered(self._checked, delivered, now)
         return delivered
 
+    def count_expired(self, sender: str, receiver: str) -> None:
+        """Count a received message that its receiver does not use because it is too old."""
+        self._expired[sender, receiver] += 1
+
     def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
         """Transmit messages to their receivers; return the outcomes that are known."""
         if self.active is None:
@@ -113,9 +120,10 @@ class RunChannel:
         if channel is None:
             return {}
         if self._statistics is None or self._statistics[0] != now:
-            self._statistics = now, channel.statistics(now)
+            statistics = channel.statistics(now)
             if not is_built_in(type(channel)):
-                check_statistics(channel, self._statistics[1])
+                check_statistics(channel, statistics)
+            self._statistics = now, with_expired(statistics, self._expired)
         return self._statistics[1]
 
     def _checked_events(self, events: Sequence[LinkEvent]) -> Sequence[LinkEvent]:

@@ -9,7 +9,7 @@ from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.export.foxglove.schemas import Foxglove, set_stamp
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.decisions import Decisions
-from eidrive_scenario.recording.text.link_text import describe_link
+from eidrive_scenario.recording.text.link_text import describe_expired, describe_link
 from eidrive_scenario.recording.text.run_log import describe_change, describe_kind
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent
@@ -39,6 +39,9 @@ class RunMessages:
             if change.transition is not None:
                 text = f"{describe_kind(change.kind)} {change.path} {describe_change(change)}"
                 yield self._message(time, "INFO", "storyboard", text)
+        for name, step in frame.steps.items():
+            for row in step.expired:
+                yield self._message(time, "WARNING", name, describe_expired(step.inbox[row].message))
         for name, plan in self._decisions.new(frame):
             yield self._message(time, "INFO" if plan.braking is None else "WARNING", name, plan.reason)
         due = [one for one in self._violations if (one.first_violation or 0.0) <= time + TIME_TOLERANCE]

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message
 
 NOT_TRANSMITTED = frozenset({"queue", "absent"})
 """Loss reasons of messages that a radio never transmitted."""
 
 _SIGHT = {"los": "no obstacle", "nlosv": "behind", "nlos": "behind a building or the ground"}
+
+
+def describe_expired(message: Message) -> str:
+    """Return the text about a received message that is too old: `message 7 of RSU is not used: it is too old; …`."""
+    text = f"message {message.number} of {message.sender} is not used: it is too old on arrival"
+    return f"{text}; measured at {message.detections.time:.3f} s by the clock of {message.sender}"
 
 
 def describe_link(link: LinkEvent) -> str:

@@ -11,7 +11,7 @@ from typing import Protocol, TextIO
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.decisions import Decisions
-from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_link
+from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_expired, describe_link
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import NO_TRIGGER
 from eidrive_scenario.v2x.messages.message import LinkEvent
@@ -50,7 +50,8 @@ class RunLog:
         self._decisions = Decisions()
 
     def observe(self, frame: Frame) -> None:
-        """Write one line for each change, new decision of a planner and message of a radio channel in this frame.
+        """Write one line for each change, new decision of a planner, message of a radio channel, and received message
+        that is too old, in this frame.
 
         The standbyState of an element that starts in the same tick is omitted. The line of a message begins with its
         sending time.
@@ -59,6 +60,9 @@ class RunLog:
         for change in frame.changes:
             if change.transition is not None or change.path not in started:
                 self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {describe_change(change)}\n")
+        for name, step in frame.steps.items():
+            for row in step.expired:
+                self._stream.write(f"{frame.view.time:9.3f} s  {name}: {describe_expired(step.inbox[row].message)}\n")
         for name, plan in self._decisions.new(frame):
             self._stream.write(f"{frame.view.time:9.3f} s  {name}: {plan.reason}\n")
         self.write_links(frame.links)

@@ -15,6 +15,8 @@ TTC_LIMIT = 10.0
 """Maximum time to collision in the charts [s]."""
 FAR = 100.0
 """Maximum gap in the charts [m]."""
+_BY_SENDER = ("age", "expired")
+"""Columns with a value for each sender."""
 
 Values = dict[str, Any]
 
@@ -22,9 +24,10 @@ Values = dict[str, Any]
 class SeriesBuilder:
     """Observer of the frames of a run.
 
-    columns   by station and frame: speed [m/s], gap to the nearest body [m], smallest time to collision [s], and the
-              age of information by sender [s]: the time since the newest received message was generated. None:
-              absent, farther than FAR, above TTC_LIMIT, nothing received yet
+    columns   by station and frame: speed [m/s], gap to the nearest body [m], smallest time to collision [s], and by
+              sender the age of information [s], the time since the newest received message was generated, and the
+              number of messages so far that were too old on arrival. None: absent, farther than FAR, above TTC_LIMIT,
+              nothing received yet, none too old yet
     contact   the first contact of a driven vehicle or of its trailers: time [s] and description; None without a contact
     decisive  that contact, else the smallest gap of a driven vehicle. Without driven vehicles all actors are
               considered; None if no two actors were present at the same time
@@ -35,6 +38,8 @@ class SeriesBuilder:
         self._columns: dict[str, dict[str, Any]] = {}
         self._generated: dict[str, dict[str, float]] = {}
         """Time of generation of the newest message by receiver and sender [s]."""
+        self._expired: dict[str, dict[str, int]] = {}
+        """Number of messages that were too old on arrival, by receiver and sender."""
         self._pending: dict[str, Values] = {}
         self._driven = False
         self._contact: tuple[float, str] | None = None
@@ -53,8 +58,12 @@ class SeriesBuilder:
                 sender = received.message.sender
                 if sender != name:
                     newest[sender] = max(newest.get(sender, -math.inf), received.message.generated)
+            expired = self._expired.setdefault(name, {})
+            for row in step.expired:
+                sender = step.inbox[row].message.sender
+                expired[sender] = expired.get(sender, 0) + 1
             ages = {sender: _rounded(now - generated, 3) for sender, generated in newest.items()}
-            self._pending[name] = {"age": ages}
+            self._pending[name] = {"age": ages, "expired": dict(expired)}
             if name in driven:
                 attached = frame.attached(name)
                 gap, other = nearest_body(view, name, attached)
@@ -69,16 +78,17 @@ class SeriesBuilder:
     @property
     def width(self) -> int:
         """Number of columns including the last frame."""
-        return sum(3 + len(senders) for senders in self._generated.values())
+        return sum(3 + len(senders) + len(self._expired[name]) for name, senders in self._generated.items())
 
     def keep(self) -> None:
         """Add the values of the last frame."""
         for name, values in self._pending.items():
-            columns = self._columns.setdefault(name, {"speed": [], "gap": [], "ttc": [], "age": {}})
+            columns = self._columns.setdefault(name, {"speed": [], "gap": [], "ttc": [], "age": {}, "expired": {}})
             for key in ("speed", "gap", "ttc"):
                 _pad(columns[key], self._frames).append(values.get(key))
-            for sender, age in values["age"].items():
-                _pad(columns["age"].setdefault(sender, []), self._frames).append(age)
+            for key in _BY_SENDER:
+                for sender, value in values[key].items():
+                    _pad(columns[key].setdefault(sender, []), self._frames).append(value)
         self._frames += 1
 
     def take(self) -> dict[str, Values]:
@@ -87,8 +97,9 @@ class SeriesBuilder:
         for name, columns in self._columns.items():
             lists = {key: _pad(columns[key], self._frames) for key in ("speed", "gap", "ttc")}
             found[name] = {key: values for key, values in lists.items() if any(value is not None for value in values)}
-            if columns["age"]:
-                found[name]["age"] = {sender: _pad(ages, self._frames) for sender, ages in columns["age"].items()}
+            for key in _BY_SENDER:
+                if columns[key]:
+                    found[name][key] = {sender: _pad(values, self._frames) for sender, values in columns[key].items()}
         self._columns, self._frames = {}, 0
         return found
 

@@ -29,6 +29,8 @@ MOST_WARNINGS = 100
 """Maximum number of different warnings of a page; the most frequent ones come first."""
 SHOWN = 4
 """Maximum number of metrics in the overview."""
+EXPIRED = "messages.expired"
+"""Metric of the messages that were too old on arrival."""
 _UNITS = {"count": "", "impact_speed": "m/s"}
 """Units that differ from the unit of the criterion, by the last part of the name of the metric."""
 
@@ -129,14 +131,16 @@ def _warnings(runs: Sequence[ReportedRun]) -> list[str]:
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
-    """Return the preferred metrics, then the most frequent ones, without times, whose mean has no meaning."""
+    """Return the preferred metrics, then the most frequent ones, without times, whose mean has no meaning, and EXPIRED
+    if it is not 0."""
     counts = Counter(name for run in runs for name in run.metrics if not name.endswith(".time"))
 
     def rank(name: str) -> tuple[int, int, str]:
         priority = next((index for index, start in enumerate(PREFERRED) if name.startswith(start)), len(PREFERRED))
         return priority, -counts[name], name
 
-    return sorted(counts, key=rank)[:SHOWN]
+    shown = sorted(counts, key=rank)[:SHOWN]
+    return shown if EXPIRED in shown or not any(run.metrics.get(EXPIRED) for run in runs) else [*shown, EXPIRED]
 
 
 def _title(metric: str, runs: Sequence[ReportedRun]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from eidrive_scenario.v2x.statistics.reception_log import ReceptionStatistics
@@ -23,6 +23,7 @@ class LinkStatistics:
                 since the first reception [s]
     reception   by distance class: lower bound [m], messages whose outcome is known, delivered messages
     channel_busy_ratio  share of time in which the receiver measures a busy channel; None if the model has none
+    expired     number of received messages that the receiver does not use because they are too old
     """
 
     sent: int
@@ -39,6 +40,7 @@ class LinkStatistics:
     lost_by: Mapping[str, int] = field(default_factory=dict)
     reception: tuple[tuple[float, int, int], ...] = ()
     channel_busy_ratio: float | None = None
+    expired: int = 0
 
     def as_json(self) -> dict[str, Any]:
         """Return the fields for `--json`: times in seconds, sizes in bytes."""
@@ -102,11 +104,21 @@ class LinkCounters:
         )
 
 
+def with_expired(
+    links: Mapping[tuple[str, str], LinkStatistics], expired: Mapping[tuple[str, str], int]
+) -> Mapping[tuple[str, str], LinkStatistics]:
+    """Return the statistics with the number of expired messages, both by sender and receiver."""
+    if not expired:
+        return links
+    return {stations: replace(link, expired=expired.get(stations, 0)) for stations, link in links.items()}
+
+
 def message_counts(links: Collection[LinkStatistics]) -> dict[str, float]:
     """Return the counts of messages over all links, as metrics of a run."""
     return {
         "messages.sent": sum(link.sent for link in links),
         "messages.received": sum(link.received for link in links),
         "messages.lost": sum(link.lost for link in links),
+        "messages.expired": sum(link.expired for link in links),
         "messages.bytes": sum(link.bytes_sent for link in links),
     }

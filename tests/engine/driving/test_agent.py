@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
 from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.messages.message import ReceivedMessage
 from eidrive_scenario.v2x.profile import build_channel, load_profile
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -141,12 +143,48 @@ def test_report_older_than_report_timeout_is_deleted(car: ActorSpec) -> None:
     cooperation = Cooperation(car, "{model: composed}")
     cooperation.step({"RSU": (HIDDEN,)})
     del cooperation.agents["RSU"]
-    ages = [cooperation.tick * DT for _ in range(30) if known(cooperation.step({})["Ego"])]
-    assert max(ages) == pytest.approx(1.05), "the tick counter is one on: last known at an age of 1.00 s"
+    ages = [cooperation.tick * DT for _ in range(60) if known(cooperation.step({})["Ego"])]
+    assert max(ages) == pytest.approx(2.30), "the tick counter is one on: last known at an age of 2.25 s of 2.28 s"
     short = Cooperation(car, "{model: composed}", report_timeout=0.2)
     short.step({"RSU": (HIDDEN,)})
     del short.agents["RSU"]
     assert [bool(known(short.step({})["Ego"])) for _ in range(6)] == [True] * 4 + [False] * 2
+
+
+@pytest.mark.parametrize(
+    ("delay", "settings", "used"),
+    [
+        (2.25, {}, True),
+        (2.3, {}, False),
+        (0.2, {"report_timeout": 0.2}, True),
+        (0.25, {"report_timeout": 0.2}, False),
+        (3.0, {"report_timeout": 4.0}, True),
+        (2.25, {"fusion": "covariance_intersection"}, True),
+        (2.3, {"fusion": "covariance_intersection"}, False),
+        (0.25, {"fusion": "covariance_intersection", "fusion_settings": {"max_age": 0.2}}, False),
+        (3.0, {"fusion": "covariance_intersection", "report_timeout": 4.0}, False),
+    ],
+)
+def test_message_older_than_its_lifetime_on_arrival_is_expired(
+    car: ActorSpec, delay: float, settings: dict[str, Any], used: bool
+) -> None:
+    cooperation = Cooperation(car, f"{{delay: {{kind: constant, seconds: {delay}}}}}", **settings)
+    steps = [cooperation.step({"RSU": (HIDDEN,)})["Ego"] for _ in range(round(delay / DT) + 4)]
+    for step in steps:
+        assert step.expired == (() if used else tuple(range(len(step.inbox))))
+        assert known(step) == ([HIDDEN] if used and step.inbox else [])
+    assert [len(step.inbox) for step in steps[-4:]] == [1] * 4
+
+
+def test_report_of_a_fast_clock_ends_with_its_lifetime_after_arrival(car: ActorSpec) -> None:
+    """Its time of measurement lies a minute ahead, as does the end of its lifetime by that time."""
+    ego, fast = agent(car, report_timeout=0.2), agent(RSU, clock_offset=60.0)
+    (message,) = fast.act(readings(0.0, (30.0, -6.0), HIDDEN), (), 0.0, None).outbox
+    inboxes = [(ReceivedMessage(message, 0.05),), *[()] * 5]
+    steps = [
+        ego.act(readings(0.05 * (1 + tick), (0.0, 0.0)), inboxes[tick], 0.05 * (1 + tick), None) for tick in range(6)
+    ]
+    assert [bool(known(step)) for step in steps] == [True] * 5 + [False]
 
 
 def test_out_of_sequence_message_does_not_replace_newer_report(car: ActorSpec) -> None:

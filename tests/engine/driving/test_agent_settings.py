@@ -30,7 +30,7 @@ def test_defaults_of_agent_settings() -> None:
     found = settings()
     assert (found.detector, found.planner, found.cooperates_with) == ("oracle", None, None)
     assert found.fusion == "covariance_intersection"
-    assert (found.report_timeout, found.planner_settings.min_existence) == (1.0, 0.5)
+    assert (found.report_timeout, found.planner_settings.min_existence) == (None, 0.5)
     assert found.rig_sensors(frozenset({"truth"})) == {"truth": TruthSettings()}
     assert found.rig_sensors(frozenset({"camera"})) == {"camera": CameraSettings()}
 

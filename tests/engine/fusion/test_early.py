@@ -142,6 +142,8 @@ def test_early_fusion_ignores_old_points_and_keeps_the_newest() -> None:
     new = rsu.act(readings(0.1, (40.0, 12.0, math.pi)), (), 0.1, None).outbox[0]
     assert len(ego.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(old, 0.2)], 0.2, None).fused) == 1
     assert len(ego.act(readings(0.25, (0.0, 0.0, 0.0)), (), 0.25, None).outbox) == 1
+    late = ego.act(readings(0.3, (0.0, 0.0, 0.0)), [ReceivedMessage(old, 0.3)], 0.3, None)
+    assert (len(late.fused), late.expired) == (0, (0,))
     fresh = agent(EGO)
     step = fresh.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(new, 0.15), ReceivedMessage(old, 0.2)], 0.2, None)
     assert len(step.fused) == 0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from eidrive_scenario.fusion.prediction import predict
+from eidrive_scenario.fusion.prediction import CAR_LENGTH, REPORT_LIFETIME, predict, predictable_time
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, ConstantVelocity, Estimates
 
 STATE = np.array([[1.0, 2.0, 10.0, -3.0]])
@@ -62,3 +62,17 @@ def test_predict_negative_step_increases_the_covariance() -> None:
     _, covariance = predict(STATE, SPREAD, np.array([-0.02]), np.zeros(1))
     assert np.linalg.eigvalsh(covariance[0]).min() > 0.0
     assert covariance[0, 2, 2] > SPREAD[0, 2, 2]
+
+
+@pytest.mark.parametrize("deviation", [0.1, 1.0, 4.0])
+def test_prediction_over_predictable_time_adds_the_deviation(deviation: float) -> None:
+    """Reported velocities have a deviation of 0.5 m/s."""
+    covariance = np.diag([0.0, 0.0, 0.25, 0.25])[None]
+    _, after = predict(STATE, covariance, np.array([predictable_time(deviation)]), np.zeros(1))
+    np.testing.assert_allclose(after[0, [0, 1], [0, 1]], deviation**2)
+
+
+def test_report_lifetime_is_time_of_a_car_length() -> None:
+    """0.25 · 2.28² + 6 / 3 · 2.28³ = 1.30 + 23.70 = 25.00 [m²]."""
+    assert CAR_LENGTH == 5.0
+    assert pytest.approx(2.28, abs=0.001) == REPORT_LIFETIME

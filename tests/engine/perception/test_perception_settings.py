@@ -104,8 +104,8 @@ def test_run_with_unsuitable_weights_is_error_with_line(write: Write, tmp_path: 
 
 
 def test_detector_latency_above_report_timeout_is_error(write: Write) -> None:
-    (diagnostic,) = diagnostics_of(write(detector_latency="1.5"))
-    assert "detector_latency is not below report_timeout (got 1.5 s and 1 s)" in diagnostic
+    (diagnostic,) = diagnostics_of(write(detector_latency="2.5"))
+    assert "detector_latency is not below report_timeout (got 2.5 s and 2.28 s)" in diagnostic
 
 
 def test_invalid_detector_settings_are_errors_with_line(write: Write) -> None:

@@ -1,5 +1,6 @@
 """Recordings: lossless round trip, and reading of truncated files."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from eidrive_scenario.errors import InputError, SettingError, SimulationError
 from eidrive_scenario.recording import Recorder, TraceHash, read_recording
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.frame_check import check_frame
+from eidrive_scenario.recording.json_text import JsonText
 from eidrive_scenario.simulation.recorded_outcome import RunRecorder
 
 MakeFrame = Callable[..., Frame]
@@ -46,6 +49,29 @@ def test_recorded_frames_are_read_bit_for_bit(tmp_path: Path, make_frame: MakeFr
         assert first.view.position.tobytes() == second.view.position.tobytes()
         assert second.steps["Ego"].detections.boxes.shape == (0, 7)
         assert np.array_equal(first.steps["Rsu"].detections.velocity, second.steps["Rsu"].detections.velocity, True)
+
+
+@pytest.mark.parametrize("version", ["2", "3"])
+def test_frame_of_former_format_has_no_expired_messages(
+    tmp_path: Path, make_frame: MakeFrame, monkeypatch: pytest.MonkeyPatch, version: str
+) -> None:
+    frame = make_frame(3)
+    text = json.loads(JsonText(Frame).encode(frame))
+    for step in text["steps"].values():
+        assert step.pop("expired") == []
+    monkeypatch.setattr(JsonText, "encode", lambda self, record: json.dumps(text).encode())
+    monkeypatch.setattr("eidrive_scenario.recording.recorder.FORMAT", version)
+    (again,) = read_recording(record(tmp_path / "run.mcap", [frame])).frames()
+    assert {tuple(step.expired) for step in again.steps.values()} == {()}
+    assert fingerprint([again]) == fingerprint([frame])
+
+
+@pytest.mark.parametrize("row", [1, -1])
+def test_frame_with_expired_message_that_was_not_received_is_damage(make_frame: MakeFrame, row: int) -> None:
+    frame = make_frame(0)
+    ego = replace(frame.steps["Ego"], inbox=frame.steps["Ego"].inbox[:1], expired=(row,))
+    with pytest.raises(ValueError, match="expired messages of Ego were not received"):
+        check_frame(replace(frame, steps={**frame.steps, "Ego": ego}))
 
 
 def test_recording_contains_metadata_and_attachments(tmp_path: Path, make_frame: MakeFrame) -> None:

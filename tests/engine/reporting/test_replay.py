@@ -145,13 +145,13 @@ def test_page_size_counts_frames_before_a_station(street: Play, monkeypatch: pyt
     assert any("too large for one page" in line for line in report.lines())
 
 
-@pytest.mark.parametrize(("timeout", "last"), [(0.2, 33), (1.0, 49), (2.0, 69), ("soon", 49), (-1.0, 49)])
+@pytest.mark.parametrize(("timeout", "last"), [(0.2, 33), (1.0, 49), (2.0, 69), (None, 74), ("soon", 74), (-1.0, 74)])
 def test_replay_report_timeout_of_station_ends_received_boxes(
     street: Play, tmp_path: Path, timeout: object, last: int
 ) -> None:
     """The message delay is 1 tick, and all messages from tick 30 are lost: the last report is from tick 29.
 
-    A timeout of 0.2 s is 4 ticks, so the report is used until tick 33.
+    A timeout of 0.2 s is 4 ticks, so the report is used until tick 33; the default of 2.28 s is 45 ticks.
     """
     settings = {"stations": {"Ego": {"report_timeout": timeout}}}
     recorder = Recorder(tmp_path / "run.mcap", metadata={"seed": "1", "settings": json.dumps(settings)})

@@ -86,11 +86,22 @@ def test_top_view_without_channel_has_no_received_boxes(street: Play) -> None:
     assert not list(etree.fromstring(svg).iter(f"{SVG}line"))
 
 
-def test_snapshot_keeps_message_for_report_timeout(street: Play) -> None:
-    """All messages from tick 30 are lost. The last one was measured at 1.45 s and expires after 1 s."""
+def test_snapshot_keeps_message_for_its_lifetime(street: Play) -> None:
+    """All messages from tick 30 are lost. The last one was measured at 1.45 s and expires after 2.28 s."""
     frames = street(1, frozenset(range(30, 100)))
-    assert len(snapshot_at(frames, 49).received) == 1
-    assert len(snapshot_at(frames, 50).received) == 0
+    assert len(snapshot_at(frames, 74).received) == 1
+    assert len(snapshot_at(frames, 75).received) == 0
+
+
+def test_snapshot_omits_expired_message(street: Play) -> None:
+    frames = street(1)
+    frames = [
+        msgspec.structs.replace(
+            frame, steps={**frame.steps, "Ego": msgspec.structs.replace(frame.steps["Ego"], expired=(0,))}
+        )
+        for frame in frames
+    ]
+    assert snapshot_at(frames, 40).received == ()
 
 
 def test_snapshot_of_own_detections_over_channel_has_channel_delay(street: Play) -> None:

@@ -29,9 +29,10 @@ function chartsOf(station) {
   add("speed", "speed", "m/s");
   add("gap", "gap to the nearest body", "m");
   add("ttc", "time to collision", "s");
-  const ages = Object.entries(columns.age || {});
-  if (ages.length) found.push({ title: "age of information", unit: "s",
-    lines: ages.map(([name, values]) => ({ name, color: senderColor(name), values })) });
+  for (const [key, title, unit] of [["age", "age of information", "s"], ["expired", "messages too old on arrival", "total"]]) {
+    const lines = Object.entries(columns[key] || {}).map(([name, values]) => ({ name, color: senderColor(name), values }));
+    if (lines.length) found.push({ title, unit, lines });
+  }
   for (const chart of found) {
     let lowest = 0, highest = 0;
     for (const { values } of chart.lines) for (const v of values) { lowest = Math.min(lowest, v); highest = Math.max(highest, v); }

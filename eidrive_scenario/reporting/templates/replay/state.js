@@ -42,7 +42,7 @@ function addPart(part) {
   for (const [name, parts] of Object.entries(part.stations)) addStation(name, parts, before);
   Object.values(data.stations).forEach(padColumns);
   for (const [name, columns] of Object.entries(part.series)) addSeries(name, columns, before);
-  for (const { age, ...columns } of Object.values(data.series)) { padColumns(columns); padColumns(age || {}); }
+  for (const { age, expired, ...columns } of Object.values(data.series)) for (const one of [columns, age, expired]) padColumns(one || {});
   for (const row of part.timeline) {
     const known = data.timeline.findIndex(([path]) => path === row[0]);
     if (known < 0) data.timeline.push(row); else data.timeline[known] = row;
@@ -61,11 +61,13 @@ function addStation(name, parts, before) {
   for (const boxes of parts.received || []) for (const sender of Object.keys(boxes || {})) known.add(sender);
 }
 
-function addSeries(name, { age, ...columns }, before) {
+function addSeries(name, { age, expired, ...columns }, before) {
   const series = data.series[name] || (data.series[name] = {});
   for (const [key, column] of Object.entries(columns)) addColumn(series, key, column, before);
-  if (age) series.age = series.age || {};
-  for (const [sender, column] of Object.entries(age || {})) addColumn(series.age, sender, column, before);
+  for (const [key, bySender] of Object.entries({ age, expired })) {
+    if (bySender) series[key] = series[key] || {};
+    for (const [sender, column] of Object.entries(bySender || {})) addColumn(series[key], sender, column, before);
+  }
 }
 
 /* What is shown: time [s], index of the frame, station ("" for none), view, and layers by name. */
