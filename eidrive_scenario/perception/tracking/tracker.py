@@ -91,6 +91,14 @@ class Tracker(TrackingMethod):
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
         predicted = self._filter.combined(self._tracks)
         rows, columns = associate(predicted, confirmed, detections.boxes, noise, self._gate)
+        on_bodies = self._boxes_on_bodies(predicted, confirmed, detections.boxes)
+        for column, row in on_bodies.items():
+            if column not in columns and row not in rows:
+                rows.append(row)
+                columns.append(column)
+                # It says that the object is there, and little about its place.
+                offset = detections.boxes[column, :2] - predicted.state[row, :2]
+                noise[column] += np.outer(offset, offset)
         hit = set(rows)
         self._update_existence(predicted, rows, detections, columns, noise, in_view)
         if rows:
@@ -99,10 +107,24 @@ class Tracker(TrackingMethod):
             history.record_scan(row in hit, self.settings)
         for row, column in zip(rows, columns, strict=True):
             self._histories[row].record_detection(detections, column)
-        taken = set(columns)
+        taken = {*columns, *on_bodies}
         self._initiate(detections, [column for column in range(len(detections)) if column not in taken], noise)
         self._delete(detections.time)
         return self._confirm_and_report(detections.time)
+
+    def _boxes_on_bodies(self, predicted: Estimates, confirmed: Bools, boxes: Array) -> dict[int, int]:
+        """Return the boxes with their centers on the body of a confirmed track, with the row of this track.
+
+        Two bodies cannot overlap, so that they show this object: a part of it, or all of it outside the gate.
+        """
+        tracks = np.flatnonzero(confirmed)
+        length, width, yaw = self._shape[tracks][:, [1, 2, 4]].T
+        offset = boxes[None, :, :2] - predicted.state[tracks, None, :2]
+        cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+        ahead = cos * offset[..., 0] + sin * offset[..., 1]
+        aside = cos * offset[..., 1] - sin * offset[..., 0]
+        on_body = (2.0 * np.abs(ahead) < length[:, None]) & (2.0 * np.abs(aside) < width[:, None])
+        return {column: int(tracks[place]) for place, column in np.argwhere(on_body).tolist()}
 
     def _update_existence(
         self,

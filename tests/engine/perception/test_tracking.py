@@ -304,3 +304,23 @@ def test_update_with_older_detections_raises() -> None:
     track.update(cars(1.0, (0, 0)))
     with pytest.raises(ValueError, match=r"out of sequence \(got 0\.5 s; expected at least 1\.0 s\)"):
         track.update(cars(0.5, (0, 0)))
+
+
+def test_boxes_on_the_body_of_a_track_are_no_other_objects() -> None:
+    """A car of 4.6 m is tracked; then a scan shows a box across its rear only, then parts at both ends. Bodies cannot
+    overlap, so that all of them are the car, which a center 2 m off moves by less than a tenth of that. A car behind it
+    is another one."""
+    track = tracker()
+    for scan in range(20):
+        track.update(cars(DT * scan, (20, 0)))
+    part = cars(2.0, (18, 0, math.pi / 2.0))
+    part.boxes[0, 3:6] = 1.7, 0.6, 1.5
+    for scan in range(20, 24):
+        held = track.update(replace(part, time=DT * scan))
+        assert held.tracks == (1,)
+        assert held.boxes[0, 0] == pytest.approx(20.0, abs=0.2)
+        assert held.boxes[0, 3] == pytest.approx(4.6)
+    assert track.update(cars(2.4, (18, 0), (22, 0))).tracks == (1,)
+    for scan in range(25, 28):
+        held = track.update(cars(DT * scan, (20, 0), (14, 0)))
+    assert held.tracks == (1, 2)
