@@ -15,6 +15,7 @@ from eidrive_scenario.evaluation.criteria_parser import unsupported_criteria
 from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.simulation.run_outcome import HOW_TO_JUDGE, UNJUDGED
 
 
 def check_scenario(source: Source, ignored: Collection[str] = (), settings: RunSettings | None = None) -> CheckReport:
@@ -51,6 +52,9 @@ def scenario_diagnostics(
         simulation.close()
         for diagnostic in (*simulation.progress_warnings, *simulation.start_warnings):
             yield Level.WARNING, diagnostic
+        if not simulation.can_be_judged:
+            hint = f"{HOW_TO_JUDGE} of `eidrive run`"
+            yield Level.NOTE, Diagnostic(UNJUDGED, hint, str(scenario.path or ""))
         yield from ((Level.WARNING, diagnostic) for diagnostic in torchscript_warnings(scenario))
     except InputError as error:
         yield from (found for found in _errors(error) if found[1] not in errors)

@@ -51,6 +51,7 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
     ):
         words += [] if number == default else [option, repr(float(number))]
     words += ["--allow-torchscript"] if settings.allow_torchscript else []
+    words += ["--no-criteria"] if settings.no_criteria else []
     return shlex.join(words)
 
 

@@ -23,6 +23,7 @@ from eidrive_scenario.pytest_plugin.option_values import (
     parse_seconds,
     parse_seconds_or_none,
     parse_topics,
+    parse_without_criteria,
 )
 
 _DEFAULT_MAX_RUNS = 100
@@ -30,6 +31,7 @@ _SHOWN = (
     "channel",
     "drive",
     "criterion",
+    "without_criteria",
     "detector",
     "planner",
     "seeds",
@@ -107,6 +109,12 @@ OPTIONS = (
         "YAML|FILE",
         "add criteria to those of each scenario, such as '{collision: {of: Ego}}', or those of a file; repeatable",
         repeatable=True,
+    ),
+    Option(
+        "without_criteria",
+        "error|warn|pass",
+        "outcome of a run that no criterion judges: an error of the test, a warning, or neither (default: error)",
+        parse_without_criteria,
     ),
     Option("detector", "NAME", "detector of all stations (default: the file's own)"),
     Option("planner", "NAME", "planner of all driven stations (default: the file's own)"),
