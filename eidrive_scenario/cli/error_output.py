@@ -72,19 +72,25 @@ def print_error(error: BaseException, what: str = "run", file: object = None) ->
 
 
 def print_unused_projects(diagnostics: Iterable[Diagnostic]) -> None:
-    """Print on stderr which projects may define unknown extensions, if the extensions of these projects are not used.
+    """Print on stderr which projects and tests may define unknown extensions, if these extensions are not used.
 
     They are not imported for their files alone, because scenarios of others must not execute code.
     """
-    from eidrive_scenario.project import VARIABLE, unused_project
+    from eidrive_scenario.project import conftest_above, unused_project
     from eidrive_scenario.registry import GROUPS, singular
 
     unknown = tuple(f"unknown {kind} " for kind in (*map(singular, GROUPS), "channel model", "command"))
     sources = dict.fromkeys(one.source for one in diagnostics if one.source and one.message.startswith(unknown))
-    for folder in dict.fromkeys(unused_project(Path(source)) for source in sources):
-        if folder is not None:
-            setting = f"{VARIABLE}={shlex.quote(str(folder))}"
-            typer.echo(f"{folder}: extensions of this project are used only there, or with {setting}", err=True)
+    notices: dict[str, None] = {}
+    for path in map(Path, sources):
+        if (folder := unused_project(path)) is not None:
+            option = f"--project {shlex.quote(str(folder))}"
+            notices[f"{folder}: extensions of this project are used only there, or with eidrive {option}"] = None
+        elif (conftest := conftest_above(path)) is not None:
+            name = "modules of the table tool.eidrive in pyproject.toml"
+            notices[f"{conftest}: only pytest knows extensions that it registers; name the module in {name}"] = None
+    for notice in notices:
+        typer.echo(notice, err=True)
 
 
 def show_traceback(error: BaseException) -> None:

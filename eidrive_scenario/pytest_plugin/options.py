@@ -182,6 +182,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     markers.add_ini_option(parser)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Select the project of the root, as `eidrive` does, before a `conftest.py` registers further extensions."""
+    from eidrive_scenario.errors import InputError
+    from eidrive_scenario.project import VARIABLE, select_project
+
+    if VARIABLE in os.environ:
+        return
+    try:
+        select_project(early_config.rootpath)
+    except InputError as error:
+        raise pytest.UsageError(str(error)) from None
+
+    def restore() -> None:
+        os.environ.pop(VARIABLE, None)
+
+    early_config.add_cleanup(restore)
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the markers, check the values of all options and store the paths of the command line."""
     config.stash[_INI] = {option.name: value for option in OPTIONS if (value := _ini_value(config, option)) is not None}

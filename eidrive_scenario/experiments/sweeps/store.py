@@ -26,8 +26,8 @@ APPLICATION = 0x65694452
 PASSED, FAILED, NOT_JUDGED = "passed", "failed", "not judged"
 ABORTED, CRASHED, INVALID, EXCLUDED = "aborted", "crashed", "invalid", "excluded"
 STATUSES = (PASSED, FAILED, NOT_JUDGED, ABORTED, CRASHED, INVALID, EXCLUDED)
-"""Outcomes of a run: verdict of its criteria; end without a criterion; aborted by an error or its wall limit; end of its
-worker process; invalid input; excluded by constraints of parameters."""
+"""Outcomes of a run: verdict of its criteria; end without a criterion; aborted by an error or its wall limit; end of
+its worker process; invalid input; excluded by constraints of parameters."""
 FOLDER = "folder"
 """Column of a result with the folder of the files of the run, relative to that of the store."""
 REPEATABLE = (ABORTED, CRASHED)
