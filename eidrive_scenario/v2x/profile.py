@@ -56,15 +56,12 @@ def load_profile(
     """
     if isinstance(source, Mapping):
         return _parse(source, "custom", origin or "channel", line, {}, scope)
-    if isinstance(source, str) and is_reference(source.strip()) and scope is not None:
-        source = Path(str(resolve_references(source.strip(), scope, source=origin, line=line)).strip())
-        if str(source) == NO_COOPERATION:
-            return None
+    source = _named_by_reference(source, origin, line, scope)
+    if str(source).strip() == NO_COOPERATION:
+        return None
     if isinstance(source, str):
         text = source.strip()
-        if text == NO_COOPERATION:
-            return None
-        if "{" in text or "\n" in text or ": " in text:
+        if _is_inline(text):
             data = load_yaml(source, source=origin or "channel", line=line)
             lines = {} if line is None else key_lines(source, line)
             return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines, scope)
@@ -83,6 +80,30 @@ def load_profile(
         raise SettingError(Diagnostic(message, hint, origin, line))
     data, lines = load_yaml_file(path)
     return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
+
+
+def profile_file(
+    source: str | Path, folders: Sequence[Path] = (), *, origin: str = "", scope: Scope | None = None
+) -> Path | None:
+    """Return the file of a profile that `load_profile` reads; None for a YAML text, and if there is no such file.
+
+    Raise SettingError for an invalid reference.
+    """
+    source = _named_by_reference(source, origin, None, scope)
+    if isinstance(source, str) and _is_inline(source.strip()):
+        return None
+    return _find(Path(str(source).strip()), Path(origin).parent, folders)
+
+
+def _named_by_reference(source: str | Path, origin: str, line: int | None, scope: Scope | None) -> str | Path:
+    """Return the path or name to which a reference such as `$Channel` refers; another source unchanged."""
+    if isinstance(source, str) and is_reference(source.strip()) and scope is not None:
+        return Path(str(resolve_references(source.strip(), scope, source=origin, line=line)).strip())
+    return source
+
+
+def _is_inline(text: str) -> bool:
+    return "{" in text or "\n" in text or ": " in text
 
 
 def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel | None = None) -> Channel | None:
