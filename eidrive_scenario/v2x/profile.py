@@ -9,9 +9,10 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.extension_settings import settings_type_of
 from eidrive_scenario.files.bounded import is_regular_file
+from eidrive_scenario.files.similar_paths import file_suggestion
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml, load_yaml_file
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.openscenario.values.references import is_reference, resolve_references
+from eidrive_scenario.openscenario.values.references import is_reference, parameter_hints, resolve_references
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.channel import Channel
@@ -74,7 +75,7 @@ def load_profile(
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
         message = f"no {kind} {quoted(str(source))}"
-        hint = suggestion(source.stem, names)
+        hint = file_suggestion(source, SUFFIXES, names, folder=Path(origin).parent)
         if is_regular_file(source):
             message, hint = f"file {quoted(str(source))} is not a channel profile", "expected a file name in .yaml"
         raise SettingError(Diagnostic(message, hint, origin, line))
@@ -159,6 +160,7 @@ def _parse(
     scope: Scope | None,
     folder: Path | None = None,
 ) -> ChannelProfile:
+    origins = parameter_hints(data, scope)
     data = resolve_references(data, scope, source=source, line=line, lines=lines)
     data = _with_paths(data, folder) if folder is not None else data
     model = data.get("model", ChannelProfile.model_fields["model"].default)
@@ -167,5 +169,5 @@ def _parse(
         message, hint = f"unknown channel model {quoted(model)}", suggestion(str(model), models)
         raise SettingError(Diagnostic(message, hint, source, lines.get("model", line)))
     settings_type = settings_type_of("channels", model, models.load(model, Channel), ChannelProfile)
-    profile = parse_settings(settings_type, data, source=source, line=line, lines=lines)
+    profile = parse_settings(settings_type, data, source=source, line=line, lines=lines, origins=origins)
     return profile if profile.name else profile.model_copy(update={"name": name})

@@ -16,6 +16,7 @@ from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, Settin
 from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.files.encodable import encodable
+from eidrive_scenario.files.similar_paths import file_suggestion
 
 T = TypeVar("T")
 FORMAT = 1
@@ -126,7 +127,8 @@ class ResultStore:
     def read(cls, path: Path) -> Iterator[Self]:
         """Open a store for reading. Raise SettingError if there is none."""
         if not path.is_file():
-            raise _error("no such store", "give the file of a sweep", path)
+            hint = file_suggestion(path, {path.suffix, ".db"}, otherwise="give the file of a sweep")
+            raise _error("no such store", hint, path)
         connection = _checked(path, lambda: _connect(path, read_only=True))
         try:
             _checked(path, lambda: _check_format(path, connection))
