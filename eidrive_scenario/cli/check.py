@@ -14,6 +14,7 @@ from eidrive_scenario.cli.added_options import AllowTorchscript, Criteria, Drive
 from eidrive_scenario.cli.error_output import print_error, print_unused_projects
 from eidrive_scenario.cli.hung_check import HungCheck
 from eidrive_scenario.cli.option_values import check_seconds
+from eidrive_scenario.cli.short_help import HelpAll
 from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.exit_codes import ABORTED, INVALID_INPUT
@@ -39,6 +40,7 @@ def check(
         float | None,
         typer.Option(metavar="SECONDS", help="Maximum wall time of each file.", show_default="none"),
     ] = None,
+    help_all: HelpAll = False,
 ) -> None:
     """Print all diagnostics of scenarios, distributions and roads as `file:line: problem; hint`.
 
