@@ -135,7 +135,7 @@ def modules_of(folder: Path) -> tuple[str, ...]:
     names = _texts(path, _table(path) or {}, "modules", hint)
     for name in names:
         if not all(part.isidentifier() for part in name.split(".")):
-            raise _error(path, f"tool.eidrive.modules: {quoted(name)} is no name of a module", hint)
+            raise _error(path, f"tool.eidrive.modules: {quoted(name)} is not the name of a module", hint)
     return tuple(names)
 
 

@@ -68,6 +68,9 @@ def test_command_of_unnamed_registration_is_that_of_pytest(root: Path, tmp_path:
     assert words[:2] == ["pytest", f"{root}/scenarios/long.xosc::scenarios/long[seed=1]"]
     done = execute([*words, "-p", "no:cacheprovider"], tmp_path)
     assert (done.returncode, REASON in done.stdout) == (1, True)
+    unknown = execute(["eidrive", "run", "scenarios/long.xosc"], root)
+    assert unknown.returncode == 2
+    assert f"{root / 'conftest.py'}: only pytest knows extensions that it registers; name the module" in unknown.stderr
 
 
 @pytest.mark.timeout(300)
@@ -118,7 +121,7 @@ def test_scenario_does_not_import_modules_of_its_project(root: Path, tmp_path: P
     ("modules", "code", "expected"),
     [
         ("3", 2, "tool.eidrive.modules: '3'"),
-        ('["no name"]', 2, "'no name' is no name of a module"),
+        ('["no name"]', 2, "'no name' is not the name of a module"),
         ('["absent"]', 3, "module 'absent' of the project"),
         ('["faulty"]', 3, "faulty.py:1"),
     ],
